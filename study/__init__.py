@@ -1,0 +1,1 @@
+"""The study: scenes, organs, curves and their similarity, results; `study.run` wires the models."""
