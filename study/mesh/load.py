@@ -1,0 +1,179 @@
+"""Mesh files: read, checked, repaired and reported, or refused with the reason."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+
+from study.mesh.check import repair_tetrahedra
+from study.mesh.draft import Draft, element_map, start_draft
+from study.mesh.gmsh import is_gmsh_text, read_gmsh
+from study.mesh.gmsh4 import is_gmsh_4, read_gmsh_4
+from study.mesh.kinds import (
+    MeshError,
+    MeshReport,
+    SurfaceMesh,
+    SurfaceQuality,
+    TetrahedralMesh,
+    TetrahedronQuality,
+)
+from study.mesh.obj import read_obj
+from study.mesh.polydata import read_polydata
+from study.mesh.quality import sliver_notes, surface_quality, tetrahedron_quality
+from study.mesh.raw import RawMesh
+from study.mesh.stl import read_stl
+from study.mesh.surface import enclosed_volume, repair_surface
+from study.mesh.tetrahedra import volumes
+from study.mesh.through_meshio import read_with_meshio
+from study.mesh.unit import METRES, check_extent, check_unit_name, choose_unit
+
+MAX_BYTES = 2**30
+MAX_ELEMENTS = 5_000_000
+
+_MAX_COORDINATE = 1e6  # metres; anything beyond is a misread number
+_MESHIO = {
+    ".vtu": "vtu",
+    ".vtk": "vtk",
+    ".msh": "gmsh",
+    ".inp": "abaqus",
+    ".mesh": "medit",
+    ".meshb": "medit",
+    ".ply": "ply",
+    ".off": "off",
+}
+FORMATS = ".vtu, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh (MEDIT), .stl, .obj, .ply, .off"
+
+
+def load_mesh(
+    path: str | Path, unit: str | None
+) -> tuple[TetrahedralMesh | SurfaceMesh, MeshReport]:
+    """Tetrahedra, or else the closed surface, in a mesh file.
+
+    `unit` names the file's length unit: m, dm, cm, mm, um or in; None guesses millimetres or
+    metres from the volume, which then has to be a liver's.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read or its mesh cannot be used; the message names the file, the
+        first bad elements and the remedy.
+    """
+    source = Path(path)
+    try:
+        check_unit_name(unit)
+        data = _content(source)
+        return _checked(_read(source, data), unit, source, hashlib.sha256(data).hexdigest())
+    except MeshError as error:
+        raise MeshError(f"{source}: {error}") from error
+
+
+def _content(source: Path) -> bytes:
+    try:
+        if not source.exists():
+            raise MeshError("no such file")
+        if not source.is_file():
+            raise MeshError("not a regular file; name the mesh file itself")
+        size = source.stat().st_size
+        if size == 0:
+            raise MeshError("the file is empty")
+        if size > MAX_BYTES:
+            raise MeshError(f"{size} bytes, the limit is {MAX_BYTES}; coarsen the mesh")
+        return source.read_bytes()
+    except OSError as error:
+        raise MeshError(f"cannot be opened: {error.strerror or error}") from error
+
+
+def _read(source: Path, data: bytes) -> RawMesh:
+    suffix = source.suffix.lower()
+    if suffix == ".stl":
+        return read_stl(data)
+    if suffix == ".obj":
+        return read_obj(data)
+    if suffix == ".msh" and is_gmsh_text(data):
+        return read_gmsh(data)
+    if suffix == ".msh" and is_gmsh_4(data):
+        return read_gmsh_4(data)
+    if suffix == ".vtk" and re.search(rb"(?im)^DATASET\s+POLYDATA\b", data[:4096]):
+        return read_polydata(data)
+    if suffix in _MESHIO:
+        return read_with_meshio(source, data, _MESHIO[suffix])
+    raise MeshError(f"unknown file name ending `{suffix}`; can be read: {FORMATS}")
+
+
+def _checked(
+    raw: RawMesh, unit: str | None, source: Path, sha256: str
+) -> tuple[TetrahedralMesh | SurfaceMesh, MeshReport]:
+    solid = _is_solid(raw)
+    draft = _repaired(raw, solid, unit)
+    volume = _volume(draft)
+    name, unit_notes = choose_unit(unit, volume)
+    scale = METRES[name]
+    points = draft.points * scale
+    extent = np.ptp(points, axis=0)
+    check_extent(extent, name)
+    mesh = (TetrahedralMesh if solid else SurfaceMesh)(points, draft.elements)
+    quality, shape_notes = _quality(mesh, draft)
+    report = MeshReport(
+        file=str(source),
+        sha256=sha256,
+        unit=name,
+        scale=scale,
+        kind="tetrahedra" if solid else "surface",
+        volume=volume * scale**3,
+        extent=extent,
+        offset=draft.offset * scale,
+        node_map=draft.node_map,
+        element_map=element_map(draft, len(raw.tetrahedra if solid else raw.triangles)),
+        quality=quality,
+        notes=(*raw.notes, *_unused(raw, solid), *draft.notes, *unit_notes, *shape_notes),
+    )
+    return mesh, report
+
+
+def _is_solid(raw: RawMesh) -> bool:
+    """Whether the mesh consists of tetrahedra; refuse volume cells that cannot be used."""
+    if raw.solids:
+        cells = ", ".join(f"{count} {name}" for name, count in raw.solids.items())
+        beside = f" beside {len(raw.tetrahedra)} tetrahedra" if len(raw.tetrahedra) else ""
+        raise MeshError(f"{cells} cells{beside}; only tetrahedra can be used: split them before")
+    count = len(raw.tetrahedra) or len(raw.triangles)
+    if count == 0:
+        raise MeshError("neither tetrahedra nor triangles; export the volume or its surface")
+    if count > MAX_ELEMENTS:
+        raise MeshError(f"{count} elements, the limit is {MAX_ELEMENTS}; coarsen the mesh")
+    return len(raw.tetrahedra) > 0
+
+
+def _unused(raw: RawMesh, solid: bool) -> list[str]:
+    if not solid or not len(raw.triangles):
+        return []
+    return [
+        f"{len(raw.triangles)} triangles beside the tetrahedra not used: the boundary follows "
+        "from the tetrahedra"
+    ]
+
+
+def _repaired(raw: RawMesh, solid: bool, unit: str | None) -> Draft:
+    # Without a declared unit, the finest one that can be guessed sets the limit.
+    limit = _MAX_COORDINATE / METRES[unit or "mm"]
+    if solid:
+        return repair_tetrahedra(start_draft(raw.points, raw.tetrahedra, limit))
+    return repair_surface(start_draft(raw.points, raw.triangles, limit))
+
+
+def _volume(draft: Draft) -> float:
+    if draft.elements.shape[1] == 4:
+        return float(volumes(TetrahedralMesh(draft.points, draft.elements)).sum())
+    return enclosed_volume(draft.points, draft.elements)
+
+
+def _quality(
+    mesh: TetrahedralMesh | SurfaceMesh, draft: Draft
+) -> tuple[TetrahedronQuality | SurfaceQuality, list[str]]:
+    if isinstance(mesh, SurfaceMesh):
+        return surface_quality(mesh), []
+    quality = tetrahedron_quality(mesh, draft.element_ids)
+    return quality, sliver_notes(quality)

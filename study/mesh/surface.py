@@ -1,0 +1,182 @@
+"""Checks and repairs of closed triangle surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from study.mesh.draft import Draft, drop_duplicates, drop_unused_nodes, listing, weld
+from study.mesh.kinds import FloatArray, IndexArray, MeshError
+from study.mesh.topology import (
+    components,
+    edges_of,
+    group_rows,
+    same_turn,
+    shared_pairs,
+)
+
+
+def repair_surface(draft: Draft) -> Draft:
+    """Weld nodes, drop useless triangles and turn the rest outwards; refuse what is not closed.
+
+    Crossings of the surface with itself are not looked for.
+
+    Raises
+    ------
+    MeshError
+        On open or crowded edges, several pieces, one-sided surfaces, and a surface without volume.
+    """
+    draft = drop_unused_nodes(drop_duplicates(_without_degenerate(weld(draft))))
+    if not len(draft.elements):
+        raise MeshError("no triangle with three distinct corners is left; export the mesh again")
+    edges = edges_of(draft.elements)
+    pairs = _edge_pairs(draft, edges)
+    _refuse_pieces(draft, pairs // 3)
+    draft = _outward(_consistent(draft, edges, pairs))
+    return _noting_flat(_noting_shape(draft))
+
+
+def enclosed_volume(points: FloatArray, triangles: IndexArray) -> float:
+    """Volume inside a closed surface, negative if its normals point inwards."""
+    corner = points[triangles] - points.mean(axis=0)  # against cancellation
+    return float(np.linalg.det(corner).sum() / 6)
+
+
+def genus(triangles: IndexArray) -> int:
+    """Number of handles of a closed surface in one piece, from V - E + F = 2 - 2 g.
+
+    A node where the surface only touches itself counts once for each of its fans of triangles.
+    """
+    return (2 - (_fan_count(triangles) - len(triangles) // 2)) // 2
+
+
+def _without_degenerate(draft: Draft) -> Draft:
+    a, b, c = draft.elements.T
+    degenerate = (a == b) | (b == c) | (c == a)
+    if not degenerate.any():
+        return draft
+    return draft.keeping(np.flatnonzero(~degenerate)).noting(
+        f"{int(degenerate.sum())} degenerate triangles (two equal corners) dropped; "
+        f"first (0-based): {listing(draft.element_ids[degenerate])}"
+    )
+
+
+def _edge_pairs(draft: Draft, edges: IndexArray) -> IndexArray:
+    """The two directed edges along every edge of a closed surface, shape (e, 2)."""
+    groups = group_rows(edges)
+    problems = []
+    open_edges = edges[groups.first[groups.count == 1]]
+    if len(open_edges):
+        loops = _loop_count(open_edges)
+        where = draft.element_ids[groups.first[groups.count == 1] // 3]
+        problems.append(
+            f"{len(open_edges)} open edges in {loops} holes, the first at triangles (0-based) "
+            f"{listing(where)}; close the surface"
+        )
+    crowded = groups.first[groups.count > 2]
+    if len(crowded):
+        problems.append(
+            f"{len(crowded)} non-manifold edges with more than two triangles, the first at "
+            f"triangles (0-based) {listing(draft.element_ids[crowded // 3])}; remove inner walls"
+        )
+    if problems:
+        raise MeshError("not the surface of a body: " + "; ".join(problems))
+    return shared_pairs(groups)
+
+
+def _loop_count(open_edges: IndexArray) -> int:
+    nodes, numbered = np.unique(open_edges, return_inverse=True)
+    return components(numbered.reshape(-1, 2), len(nodes))[0]
+
+
+def _refuse_pieces(draft: Draft, neighbours: IndexArray) -> None:
+    count, piece = components(neighbours, len(draft.elements))
+    if count > 1:
+        sizes = np.sort(np.bincount(piece))[::-1]
+        raise MeshError(
+            f"{count} separate surfaces, of {listing(sizes)} triangles; keep one piece (an inner "
+            "one may be a cavity: fill it or mesh the body elsewhere)"
+        )
+
+
+def _consistent(draft: Draft, edges: IndexArray, pairs: IndexArray) -> Draft:
+    """Turn triangles so that neighbours run along their common edge in opposite directions.
+
+    Every triangle stands for two items, as it is and turned; items that go together are linked.
+    A triangle linked to its own turned form lies on a one-sided surface.
+    """
+    count = len(draft.elements)
+    clash = same_turn(edges[pairs[:, 0]], edges[pairs[:, 1]])
+    if not clash.any():
+        return draft
+    one, other = pairs.T // 3
+    links = np.stack([one, other + count * clash], axis=1)
+    mirrored = np.stack([one + count, other + count * ~clash], axis=1)
+    side = components(np.concatenate([links, mirrored]), 2 * count)[1]
+    if np.any(side[:count] == side[count:]):
+        raise MeshError("one-sided surface: no consistent outside; mesh the organ again")
+    turned = side[:count] != side[0]
+    turned = ~turned if turned.sum() > count / 2 else turned
+    return _turning(draft, turned).noting(
+        f"{int(turned.sum())} triangles wound against their neighbours, now turned round; "
+        f"first (0-based): {listing(draft.element_ids[turned])}"
+    )
+
+
+def _outward(draft: Draft) -> Draft:
+    volume = enclosed_volume(draft.points, draft.elements)
+    area = np.prod(np.sort(np.ptp(draft.points, axis=0))[1:])
+    if abs(volume) <= draft.tolerance * area:
+        raise MeshError("the surface encloses no volume: a sheet, or a surface folded onto itself")
+    if volume > 0:
+        return draft
+    everything = np.ones(len(draft.elements), dtype=bool)
+    return _turning(draft, everything).noting("normals pointed inwards, all triangles turned round")
+
+
+def _turning(draft: Draft, turned: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Draft:
+    elements = draft.elements.copy()
+    elements[turned, 1:] = elements[turned, :0:-1]
+    return replace(draft, elements=elements)
+
+
+def _noting_shape(draft: Draft) -> Draft:
+    handles = genus(draft.elements)
+    pinched = _fan_count(draft.elements) - len(draft.points)
+    if handles:
+        draft = draft.noting(f"WARNING: genus {handles}: handles, usually a segmentation artefact")
+    if pinched:
+        draft = draft.noting(f"WARNING: the surface touches itself at {pinched} nodes")
+    return draft
+
+
+def _fan_count(triangles: IndexArray) -> int:
+    """Number of closed fans of triangles round a node, of a closed and consistently wound surface.
+
+    Edge row i starts at corner i; across the edge the same node is where the other row ends.
+    """
+    one, other = shared_pairs(group_rows(edges_of(triangles))).T
+    links = np.concatenate(
+        [np.stack([one, _next(other)], axis=1), np.stack([_next(one), other], axis=1)]
+    )
+    return components(links, triangles.size)[0]
+
+
+def _next(corner: IndexArray) -> IndexArray:
+    """The next of the three corners of the same triangle."""
+    return corner - corner % 3 + (corner + 1) % 3
+
+
+def _noting_flat(draft: Draft) -> Draft:
+    corner = draft.points[draft.elements]
+    sides = corner - np.roll(corner, 1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    height = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / longest
+    flat = np.flatnonzero(height <= draft.tolerance)
+    if not len(flat):
+        return draft
+    return draft.noting(
+        f"{len(flat)} triangles without area kept, since dropping them would open the surface; "
+        f"first (0-based): {listing(draft.element_ids[flat])}"
+    )
