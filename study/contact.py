@@ -1,0 +1,58 @@
+"""Support and tool as fields over the surface, the same for every model and every mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """Winkler foundation of the surface that faces `outward`, near its extreme plane.
+
+    `level`: largest coordinate [m] of the organ along `outward`; `depth` [m]: where it ends;
+    `stiffness` [Pa/m]: traction per displacement of a surface that squarely faces `outward`.
+    """
+
+    outward: Floats
+    level: float
+    depth: float
+    stiffness: float
+
+    def density(self, points: Floats, normals: Floats) -> Floats:
+        """Stiffness per area [Pa/m] at points (..., 3) with outward normals (..., 3).
+
+        Area counts by its projection on the side. Over the deeper half of the depth the stiffness
+        fades to zero without a kink, so that integrals converge under refinement.
+        """
+        below = np.clip((self.level - points @ self.outward) / self.depth, 0.0, 1.0)
+        fade = np.clip(2.0 * (1.0 - below), 0.0, 1.0)
+        smooth = fade**2 * (3.0 - 2.0 * fade)
+        return np.asarray(self.stiffness * smooth * np.clip(normals @ self.outward, 0.0, None))
+
+
+@dataclass(frozen=True)
+class ToolPatch:
+    """Blunt tool at `centre` [m] pushing along the unit vector `direction` with `force` [N]."""
+
+    centre: Floats
+    direction: Floats
+    radius: float
+    force: float
+
+    def profile(self, points: Floats, normals: Floats) -> Floats:
+        """Traction at points (..., 3) with outward normals (..., 3), up to a factor.
+
+        (1 - (r/radius)^2)^2 over the surface that faces the tool, r measured across its axis, times
+        the surface's projection on it. Each model scales its own integral to `force`.
+        """
+        offset = points - self.centre
+        along = offset @ self.direction
+        across = np.maximum((offset**2).sum(axis=-1) - along**2, 0.0) / self.radius**2
+        near = (across < 1.0) & (np.abs(along) < 2.0 * self.radius)
+        facing = np.clip(-(normals @ self.direction), 0.0, None)
+        return np.asarray(np.where(near, (1.0 - across) ** 2 * facing, 0.0))

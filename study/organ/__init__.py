@@ -1,0 +1,1 @@
+"""The organ: its shape, its meshes, and places on it."""

@@ -1,0 +1,24 @@
+"""A block of tetrahedra on the lower corner of the axes."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+
+from study.mesh.kinds import TetrahedralMesh
+from study.mesh.tetrahedra import oriented
+
+
+def block_mesh(size: tuple[float, float, float], element_size: float) -> TetrahedralMesh:
+    """Block [0, size] [m] of cells no longer than `element_size`, each cut into six (Kuhn)."""
+    counts = np.maximum(1, np.ceil(np.array(size) / element_size - 1e-9).astype(int))
+    axes = [np.linspace(0.0, s, n + 1) for s, n in zip(size, counts, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape(counts + 1)
+    lowest = number[:-1, :-1, :-1].ravel()
+    stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
+    # Each order of walking the three axes from the lowest to the highest corner is a tetrahedron.
+    walks = np.array([np.cumsum([0, *stride[list(order)]]) for order in permutations(range(3))])
+    tetrahedra = (lowest[:, None, None] + walks[None]).reshape(-1, 4)
+    return oriented(TetrahedralMesh(points, tetrahedra))

@@ -1,0 +1,106 @@
+"""Quantities with units, read from text such as "9.5 kPa"."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+    from pydantic_core import CoreSchema
+
+# pint evaluates arithmetic and guesses at commas, so it never sees raw text: one plain number and
+# at most four unit names joined by * or /.
+_NUMBER = r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)"
+_UNIT = r"[A-Za-z]{1,12}(\^[1-4])?"
+_TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
+_LONGEST_TEXT = 80
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Annotation of a float field: its SI unit and the closed range of allowed SI values.
+
+    As an annotation `Annotated[float, Quantity("Pa", 100, 1e6)]` it makes pydantic accept a text
+    with any unit of that dimension, or a bare number in the SI unit.
+    """
+
+    unit: str
+    low: float
+    high: float
+
+    def read(self, value: object) -> float:
+        """SI value of a text with unit or of a bare SI number; ValueError says what is wrong."""
+        number = _parsed(value, self.unit) if isinstance(value, str) else _bare(value, self.unit)
+        if not math.isfinite(number):
+            raise ValueError("must be finite")
+        if not self.low <= number <= self.high:
+            raise ValueError(f"must lie between {self.low:g} and {self.high:g} {self.unit}".strip())
+        return number
+
+    def text(self, value: float) -> str:
+        """The value as text that `read` takes back unchanged."""
+        return f"{value!r} {self.unit}".strip()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Let pydantic call `read`."""
+        from pydantic_core import core_schema
+
+        read = self._read_count if source is int else self.read
+        return core_schema.no_info_plain_validator_function(read)
+
+    def _read_count(self, value: object) -> int:
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise ValueError("write a whole number")  # noqa: TRY004 - see _bare
+        return int(self.read(value))
+
+
+def _bare(value: object, unit: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        # pydantic reports ValueErrors only.
+        raise ValueError(f'write a number with its unit, for example "1 {unit}"')  # noqa: TRY004
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("must be finite") from None
+
+
+def _parsed(text: str, unit: str) -> float:
+    match = _TEXT.fullmatch(text.strip()) if len(text) <= _LONGEST_TEXT else None
+    example = f'write for example "1 {unit}"' if unit else "write a plain number"
+    if match is None:
+        raise ValueError(f"not one number with a unit; {example}")
+    if not match["unit"]:
+        if unit:
+            raise ValueError(f"the unit is missing; {example}")
+        return float(match["number"])
+    converted = float(match["number"]) * _factor(match["unit"], unit, example)
+    return float(f"{converted:.15g}")  # 1.5 l is 0.0015 m^3, without the rounding of the factor
+
+
+def _factor(name: str, unit: str, example: str) -> float:
+    import pint
+
+    registry = _registry()
+    try:
+        given = registry.Quantity(1.0, registry.Unit(name.replace(" ", "")))
+        return float(given.to(unit or "dimensionless").magnitude)
+    except pint.UndefinedUnitError:
+        raise ValueError(
+            f"{name!r} is not a known unit (upper and lower case matter); {example}"
+        ) from None
+    except pint.DimensionalityError:
+        kind = f"a unit like {unit}" if unit else "a number without unit"
+        raise ValueError(f"{name!r} is not {kind}; {example}") from None
+    except pint.PintError as error:
+        raise ValueError(f"{name!r}: {error}; {example}") from None
+
+
+@cache
+def _registry() -> UnitRegistry[float]:
+    import pint
+
+    return pint.UnitRegistry()

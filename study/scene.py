@@ -1,0 +1,191 @@
+"""Scene: everything a study of one organ under one tool is told, in SI units.
+
+A scene is written as TOML; `study.scene_file` reads, checks and writes it. The annotations state
+the unit and the allowed range of each quantity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from study.quantity import Quantity
+
+Length = Annotated[float, Quantity("m", 1e-6, 10.0)]
+Share = Annotated[float, Quantity("", 0.0, 1.0)]
+Modulus = Annotated[float, Quantity("Pa", 100.0, 1e6)]
+Reading = Annotated[float, Quantity("Pa", 500.0, 150e3)]
+Duration = Annotated[float, Quantity("s", 0.0, 3600.0)]
+Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
+
+Component = Annotated[float, Quantity("", -1.0, 1.0)]
+
+Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
+SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
+ModelName = Literal["fem", "basafa", "msm"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A place on or in the organ, given in one of three ways.
+
+    `side` and `at`: seen from that side, two fractions of the bounding box along its two other axes
+    (in the order x, y, z), on the first surface met. `fraction`: three fractions of the bounding
+    box. `point`: coordinates [m]. The last two move to the nearest surface if `snap` is set.
+    """
+
+    side: Side | None = None
+    at: tuple[Share, Share] | None = None
+    fraction: tuple[Share, Share, Share] | None = None
+    point: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    snap: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Organ:
+    """The shape: a built-in one, or a mesh file, which takes precedence.
+
+    `volume` scales the built-in liver, `size` is the block's. `point` is a single control mass
+    point without a mesh; its mass is `mass`, or, without one, that for which eq. (2) at the scene's
+    damping ratio meets the benchmark's gamma_0.
+    """
+
+    shape: Literal["liver", "block", "point"] = "liver"
+    volume: Annotated[float, Quantity("m^3", 1e-9, 10.0)] = 1.5e-3
+    size: tuple[Length, Length, Length] = (0.12, 0.08, 0.06)
+    mass: Annotated[float, Quantity("kg", 1e-6, 100.0)] | None = None
+    mesh: str | None = None
+    unit: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Support:
+    """Elastic foundation on the surface that faces `side`, down to `depth` from its extreme point.
+
+    `stiffness` is its traction per displacement [Pa/m].
+    """
+
+    side: Side = "posterior"
+    depth: Length = 0.03
+    stiffness: Annotated[float, Quantity("Pa/m", 1.0, 1e12)] = 2e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """Load factor over time: `step` from the start, `ramp-hold-release`, or `sinusoid`."""
+
+    kind: Literal["step", "ramp-hold-release", "sinusoid"] = "ramp-hold-release"
+    ramp: Duration = 1.0
+    hold: Duration = 6.0
+    release: Duration = 1.0
+    frequency: Annotated[float, Quantity("Hz", 1e-3, 1e3)] = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tool:
+    """Blunt tool: where it touches, which way it pushes (inwards by default), how hard."""
+
+    place: Place = field(default_factory=lambda: Place(side="anterior", at=(0.3, 0.5)))
+    direction: tuple[Component, Component, Component] | None = None
+    radius: Length = 0.025
+    force: Annotated[float, Quantity("N", 1e-9, 1e3)] = 0.5
+    history: History = field(default_factory=History)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tissue:
+    """The liver as the reference sees it; the fuzzy estimates are judged against its modulus."""
+
+    youngs_modulus: Modulus = 9.5e3
+    poisson_ratio: Annotated[float, Quantity("", 0.0, 0.499)] = 0.45
+    density: Annotated[float, Quantity("kg/m^3", 500.0, 2000.0)] = 1054.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Patient:
+    """Elastography reading per aetiology [Pa]; one that is not given is that of a normal liver."""
+
+    hcv: Reading | None = None
+    hbv: Reading | None = None
+    ald: Reading | None = None
+    cld: Reading | None = None
+    nafld: Reading | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fuzzy:
+    """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt."""
+
+    systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
+    samples: Annotated[int, Quantity("", 11, 100_001)] = 101
+    footprint: Annotated[float, Quantity("", 0.0, 0.5)] = 0.08
+    sugeno_aggregation: Literal["sum", "max"] = "sum"
+    consequent: Literal["max", "mean"] = "max"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lattice:
+    """Mass-spring lattice: spacing, share of axial stiffness in flexion and in body diagonals."""
+
+    spacing: Length = 0.01
+    flexion: Annotated[float, Quantity("", 0.0, 0.9)] = 0.2
+    body_diagonals: Share = 0.0
+    volume_term: bool = False
+    step_fraction: Annotated[float, Quantity("", 1e-4, 10.0)] = 0.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """Damping ratio zeta of eq. (2), and the spacing at which k, m and Table II are taken."""
+
+    ratio: Annotated[float, Quantity("", 0.0, 100.0)] = 0.9
+    reference_spacing: Length = 5.5e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Basafa:
+    """Table II: constants of eqs. (5)-(9) at `damping.reference_spacing`."""
+
+    k1: Annotated[float, Quantity("N", 1e-9, 1e6)] = 0.05
+    k2: Annotated[float, Quantity("N", 0.0, 1e9)] = 10.0
+    x_c: Annotated[float, Quantity("", 1e-6, 10.0)] = 0.2
+    gamma_0: Annotated[float, Quantity("N*s/m", 0.0, 1e6)] = 2.0
+    gamma_1: Annotated[float, Quantity("N*s/m^2", 0.0, 1e9)] = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """Finite-element reference: size of its elements (edge of the mesh lattice)."""
+
+    element_size: Length = 0.017
+
+
+@dataclass(frozen=True, kw_only=True)
+class Time:
+    """Simulated time and number of equally spaced samples, both ends included."""
+
+    duration: Annotated[float, Quantity("s", 1e-6, 3600.0)] = 10.0
+    samples: Annotated[int, Quantity("", 16, 20_001)] = 201
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system."""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic's name; nested ones inherit
+
+    title: str = ""
+    models: tuple[ModelName, ...] = ("fem", "basafa", "msm")
+    organ: Organ = field(default_factory=Organ)
+    support: Support = field(default_factory=Support)
+    tool: Tool = field(default_factory=Tool)
+    tissue: Tissue = field(default_factory=Tissue)
+    patient: Patient = field(default_factory=Patient)
+    fuzzy: Fuzzy = field(default_factory=Fuzzy)
+    lattice: Lattice = field(default_factory=Lattice)
+    damping: Damping = field(default_factory=Damping)
+    basafa: Basafa = field(default_factory=Basafa)
+    reference: Reference = field(default_factory=Reference)
+    time: Time = field(default_factory=Time)
+    control_points: dict[str, Place] = field(default_factory=dict)
+    renders: bool = True

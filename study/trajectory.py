@@ -1,0 +1,56 @@
+"""What a model is asked to record, and what it gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """When and where a model is looked at.
+
+    `times` [s] (samples,), equally spaced from zero; `factors` (samples,): load factor at them;
+    `probes` [m] (probes, 3); `frames`: samples at which the whole field is kept; `volume_points`
+    [m] (q, 3) and `surface_points` [m] (s, 3): where it is kept.
+    """
+
+    times: Floats
+    probes: Floats
+    frames: tuple[int, ...]
+    volume_points: Floats
+    surface_points: Floats
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Motion of one model.
+
+    `displacement` [m] and `velocity` [m/s], shape (samples, probes, 3); `volume_field` [m], shape
+    (frames, q, 3); `surface_field` [m], shape (frames, s, 3). A model that diverges keeps NaN from
+    there on and says when and, if it has nodes, at which node's rest position [m].
+    """
+
+    displacement: Floats
+    velocity: Floats
+    volume_field: Floats
+    surface_field: Floats
+    status: Literal["finished", "diverged"] = "finished"
+    diverged_at: float | None = None
+    diverged_near: Floats | None = None
+
+
+def empty_trajectory(observation: Observation) -> Trajectory:
+    """Arrays of the right shape, filled with NaN, for a model to write into."""
+    samples, frames = len(observation.times), len(observation.frames)
+    return Trajectory(
+        np.full((samples, len(observation.probes), 3), np.nan),
+        np.full((samples, len(observation.probes), 3), np.nan),
+        np.full((frames, len(observation.volume_points), 3), np.nan),
+        np.full((frames, len(observation.surface_points), 3), np.nan),
+    )

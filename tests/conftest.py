@@ -1,0 +1,58 @@
+"""Shared fixtures: the small block that most tests run, built once."""
+
+from __future__ import annotations
+
+import os
+
+# Two BLAS threads spin against each other on small factors; must be set before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import pytest
+
+from study.progress import Silent
+from study.run.posed import Posed, pose
+from study.run.whole import run_study
+from study.scene import Scene
+from study.scene_file import read_scene
+
+SMALL = (
+    'organ.size=["60 mm", "40 mm", "30 mm"]',
+    "tool.radius=15 mm",
+    "tool.force=0.05 N",
+    "reference.element_size=12 mm",
+    "time.samples=51",
+)
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--update-scores",
+        action="store_true",
+        help="rewrite tests/data/scores.json from this run; review the difference",
+    )
+
+
+@pytest.fixture(scope="session")
+def small_scene() -> Scene:
+    return read_scene("block", SMALL)
+
+
+@pytest.fixture(scope="session")
+def small_posed(small_scene) -> Posed:
+    return pose(small_scene)
+
+
+@pytest.fixture(scope="session")
+def small_results(small_scene):
+    return run_study(small_scene, Silent())
+
+
+@pytest.fixture(scope="session")
+def paper_results():
+    return run_study(read_scene("paper"), Silent())
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2026)

@@ -1,0 +1,146 @@
+"""Scenes: what is read, what is refused, and with which words."""
+
+import time
+from dataclasses import replace
+
+import pytest
+
+from study.quantity import Quantity
+from study.scene_file import BUILT_IN, SceneError, read_scene, write_scene
+
+
+def written(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_resolved_scene_reads_back_unchanged(name, tmp_path):
+    scene = read_scene(name)
+    assert read_scene(written(tmp_path, write_scene(scene))) == scene
+
+
+def test_all_problems_are_reported_at_once_with_key_and_remedy(tmp_path):
+    text = """
+    frobs = 1
+    [tissue]
+    youngs_modulus = "-5 kPa"
+    posson_ratio = 0.3
+    [time]
+    duration = "1 mm"
+    samples = 30.5
+    [tool]
+    history = { kind = "stp" }
+    [control_points]
+    tip = { fracton = [1, 2, 3] }
+    """
+    with pytest.raises(SceneError) as caught:
+        read_scene(written(tmp_path, text))
+    message = str(caught.value)
+    for part in (
+        "7 problem(s)",
+        "frobs: unknown key",
+        "tissue.youngs_modulus: must lie between",
+        "tissue.posson_ratio: unknown key, did you mean 'poisson_ratio'?",
+        "time.duration: 'mm' is not a unit like s",
+        "time.samples: write a whole number",
+        "tool.history.kind: should be 'step'",
+        "control_points.tip.fracton: unknown key, did you mean 'fraction'?",
+    ):
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("9.5 kPa", 9.5e3), ("9500", None), ("1e3 N/m^2", 1e3), ("0.01 MPa", 1e4)],
+)
+def test_a_pressure_needs_its_unit(text, value):
+    pressure = Quantity("Pa", 100, 1e6)
+    if value is None:
+        with pytest.raises(ValueError, match="unit is missing"):
+            pressure.read(text)
+    else:
+        assert pressure.read(text) == value
+        assert pressure.read(pressure.text(value)) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["9**9**9 Pa", "1,5 kPa", "5 k Pa", "nan Pa", "1e400 Pa", "5 kpa", "5 mm", "10 degC", "", "Pa"],
+)
+def test_text_that_units_libraries_misread_is_refused_at_once(text):
+    start = time.perf_counter()
+    with pytest.raises(ValueError, match=r"unit|number|finite"):
+        Quantity("Pa", 100, 1e6).read(text)
+    assert time.perf_counter() - start < 5  # pint itself would hang on the first
+
+
+@pytest.mark.parametrize("value", [True, None, [1], {"a": 1}, 10**400, float("nan")])
+def test_values_that_are_no_numbers_are_refused(value):
+    with pytest.raises(ValueError, match=r"number|finite"):
+        Quantity("Pa", 100, 1e6).read(value)
+
+
+def test_a_reading_in_the_wrong_unit_is_refused():
+    """Negative control: 9.5 kPa written as 9.5 Pa must not pass for a liver."""
+    with pytest.raises(SceneError, match=r"patient\.hcv: must lie between"):
+        read_scene("paper", ["patient.hcv=9.5 Pa"])
+
+
+def test_overrides_take_bare_text_quoted_text_and_numbers():
+    for text in ("2 N", '"2 N"', "2"):
+        assert read_scene("liver", [f"tool.force={text}"]).tool.force == 2.0
+
+
+@pytest.mark.parametrize("override", ["tool.force", "=1", "title.x=3", "tool..force=1"])
+def test_a_malformed_override_is_refused(override):
+    with pytest.raises(SceneError, match="--set"):
+        read_scene("liver", [override])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x = " + "[" * 5000, "x = " + "9" * 900, "a = 1\na = 2", "x = 1e400 nonsense", "\ud800"],
+)
+def test_hostile_toml_is_refused_with_a_message(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    with pytest.raises(SceneError, match=r"scene\.toml"):
+        read_scene(str(path))
+
+
+def test_huge_files_and_lines_are_refused_before_parsing(tmp_path):
+    for text in ("a" * 2000 + " = 1", "x = 1\n" * 20_000):
+        with pytest.raises(SceneError, match=r"longer|larger"):
+            read_scene(written(tmp_path, text))
+
+
+def test_a_point_refuses_what_it_cannot_use():
+    with pytest.raises(SceneError) as caught:
+        read_scene("paper", ["lattice.spacing=5 mm", 'models=["fem"]'])
+    assert "lattice: has no effect on a single point" in str(caught.value)
+    assert "fem needs an organ with a mesh" in str(caught.value)
+
+
+def test_an_unknown_name_suggests_a_near_one():
+    with pytest.raises(SceneError, match="did you mean 'liver'"):
+        read_scene("livr")
+
+
+def test_a_mesh_path_is_relative_to_the_scene_that_names_it(tmp_path):
+    scene = read_scene(written(tmp_path, '[organ]\nmesh = "a/b.stl"\nunit = "mm"'))
+    assert scene.organ.mesh == str(tmp_path / "a/b.stl")
+
+
+def test_the_volume_term_is_refused_while_the_engine_has_none():
+    assert read_scene("liver", ["lattice.volume_term=false"]) == read_scene("liver")
+    with pytest.raises(SceneError, match="no volume term yet"):
+        read_scene("liver", ["lattice.volume_term=true"])
+
+
+def test_scenes_are_frozen():
+    scene = read_scene("liver")
+    assert replace(scene, title="other") != scene
+    with pytest.raises(AttributeError):
+        scene.title = "other"
