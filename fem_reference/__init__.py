@@ -1,0 +1,1 @@
+"""Linear-elastic finite-element reference: quadratic tetrahedra on scikit-fem, implicit steps."""
