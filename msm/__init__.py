@@ -1,0 +1,1 @@
+"""Mass-spring models: the fuzzy-tuned lattice, the Basafa benchmark, the single control point."""

@@ -1,0 +1,213 @@
+"""The mass-spring lattice as a model of the study: a body under the tool, from rest."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse.linalg import cg, eigsh
+
+from msm import lattice as cells
+from msm.damping import Damping
+from msm.kernel import Network, advance
+from msm.laws import Law, initial_stiffness, largest_stiffness
+from msm.springs import Springs, connect, stiffness_matrix
+from study.contact import Foundation, ToolPatch
+from study.mesh.quadrature import SurfaceRule
+from study.organ.occupancy import Body
+from study.trajectory import Observation, Trajectory, empty_trajectory
+
+Floats = NDArray[np.float64]
+
+STATIC_TOLERANCE = 1e-10
+
+FAR = 1.0
+"""A displacement of more than this many organ sizes is divergence, however finite."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A lattice over an organ with its springs, support and load, whatever the springs' law.
+
+    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    """
+
+    lattice: cells.CellLattice
+    springs: Springs
+    mass: Floats
+    foundation: csr_array
+    load: Floats
+
+
+@dataclass(frozen=True)
+class Run:
+    """Trajectory with what it took; `wall` [s] is the marching alone, without compilation."""
+
+    trajectory: Trajectory
+    time_step: float
+    critical_time_step: float
+    steps: int
+    wall: float
+
+
+def assemble(
+    body: Body,
+    surface: SurfaceRule,
+    density: float,
+    spacing: float,
+    foundation: Foundation,
+    tool: ToolPatch,
+    flexion: float = 0.0,
+    body_diagonals: float = 0.0,
+) -> Assembly:
+    """Lattice over the body. ValueError if it is empty, not held, or not touched by the tool."""
+    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
+    lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
+    lattice = cells.build(body, lower, upper, spacing)
+    held = foundation.density(surface.points, surface.normals) * surface.weights
+    pushed = tool.profile(surface.points, surface.normals) * surface.weights
+    if not held.any():
+        raise ValueError("the support holds no surface; enlarge support.depth")
+    if not pushed.any():
+        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
+    weights, _ = cells.interpolation(lattice, surface.points)
+    support = csr_array(weights.T @ diags_array(held) @ weights)
+    nodal = weights.T @ (pushed * tool.force / pushed.sum())
+    return Assembly(
+        lattice,
+        connect(lattice, flexion, body_diagonals),
+        density * cells.node_volumes(lattice),
+        support,
+        np.outer(nodal, tool.direction),
+    )
+
+
+def critical_time_step(assembly: Assembly, law: Law) -> float:
+    """Largest stable step [s] of the undamped lattice, 2 / omega_max, at the law's largest slope.
+
+    Implicit damping and the support only lengthen it. It is the limit at rest: springs pressed to
+    half their length are stiffer across than along and may fail below it.
+    """
+    count = len(assembly.mass)
+    stiffness = stiffness_matrix(assembly.springs, count, largest_stiffness(law))
+    scale = diags_array(np.repeat(1.0 / np.sqrt(assembly.mass), 3))
+    start = np.random.default_rng(0).standard_normal(3 * count)
+    operator = csc_array(scale @ stiffness @ scale)
+    omega_squared = eigsh(operator, k=1, which="LA", v0=start, return_eigenvectors=False)
+    return float(2.0 / np.sqrt(omega_squared[0]))
+
+
+def static_displacement(assembly: Assembly, law: Law) -> Floats:
+    """Displacement [m] (n, 3) at rest under the full load, springs linearised at rest."""
+    count = len(assembly.mass)
+    springs = stiffness_matrix(assembly.springs, count, initial_stiffness(law))
+    stiffness = csr_array(springs + kron(assembly.foundation, eye_array(3)))
+    # Factors of a 3-D lattice fill in: at 20 000 nodes they take gigabytes. The lattice is well
+    # conditioned but for a stiff support, which the diagonal takes care of.
+    found, failed = cg(
+        stiffness,
+        assembly.load.ravel(),
+        rtol=STATIC_TOLERANCE,
+        maxiter=20 * count,
+        M=diags_array(1.0 / stiffness.diagonal()),
+    )
+    if failed:
+        raise ValueError("the lattice finds no rest: the support does not hold it")
+    return np.asarray(found.reshape(-1, 3))
+
+
+def run(
+    assembly: Assembly,
+    law: Law,
+    damping: Damping,
+    factor: Callable[[Floats], Floats],
+    observation: Observation,
+    step_fraction: float,
+    on_progress: Callable[[float], None] = lambda _: None,
+) -> Run:
+    """Motion from rest with steps of at most `step_fraction` of the critical one."""
+    critical = critical_time_step(assembly, law)
+    interval = float(observation.times[1] - observation.times[0])
+    per_sample = int(np.ceil(interval / (step_fraction * critical) - 1e-9))
+    dt = interval / per_sample
+    net = _network(assembly, damping)
+    advance(law, net, np.zeros(0), dt, *np.zeros((2, *net.load.shape)))  # compiles, or loads
+    started = time.perf_counter()
+    trajectory = _march(net, law, factor, observation, assembly, per_sample, on_progress)
+    wall = time.perf_counter() - started
+    return Run(trajectory, dt, critical, per_sample * (len(observation.times) - 1), wall)
+
+
+def _network(assembly: Assembly, damping: Damping) -> Network:
+    foundation, springs = assembly.foundation, assembly.springs
+    length = springs.rest_length
+    return Network(
+        ends=np.ascontiguousarray(springs.ends, dtype=np.int32),
+        rest=np.ascontiguousarray(springs.rest),
+        length=length,
+        scale=springs.weight * length,
+        mass=assembly.mass,
+        gamma_0=damping.gamma_0 * assembly.mass,
+        gamma_1=damping.gamma_1 * assembly.mass,
+        added=np.asarray(abs(foundation).sum(axis=1)).ravel(),
+        row=foundation.indptr.astype(np.int32),
+        column=foundation.indices.astype(np.int32),
+        value=foundation.data,
+        load=np.ascontiguousarray(assembly.load),
+    )
+
+
+def _march(
+    net: Network,
+    law: Law,
+    factor: Callable[[Floats], Floats],
+    observation: Observation,
+    assembly: Assembly,
+    per_sample: int,
+    on_progress: Callable[[float], None],
+) -> Trajectory:
+    u, v = np.zeros_like(net.load), np.zeros_like(net.load)
+    recorder = _Recorder(assembly.lattice, observation)
+    limit = FAR * float(np.ptp(assembly.lattice.nodes, axis=0).max())
+    times = observation.times
+    dt = float(times[1] - times[0]) / per_sample
+    recorder.record(0, u, v)
+    for sample in range(1, len(times)):
+        # The load at the end of each step, as the position it drives.
+        ends = times[sample - 1] + dt * np.arange(1, per_sample + 1)
+        advance(law, net, factor(ends), dt, u, v)
+        size = np.abs(u).max(axis=1)
+        if not (size < limit).all():
+            worst = int(np.argmax(np.where(np.isnan(size), np.inf, size)))
+            return replace(
+                recorder.trajectory,
+                status="diverged",
+                diverged_at=float(times[sample]),
+                diverged_near=assembly.lattice.nodes[worst],
+            )
+        recorder.record(sample, u, v)
+        on_progress(sample / (len(times) - 1))
+    return recorder.trajectory
+
+
+class _Recorder:
+    """Writes what is observed into the arrays of a trajectory."""
+
+    def __init__(self, lattice: cells.CellLattice, observation: Observation) -> None:
+        self.frames = {sample: i for i, sample in enumerate(observation.frames)}
+        self.trajectory = empty_trajectory(observation)
+        self.at_probes, _ = cells.interpolation(lattice, observation.probes)
+        self.in_volume, _ = cells.interpolation(lattice, observation.volume_points)
+        self.on_surface, _ = cells.interpolation(lattice, observation.surface_points)
+
+    def record(self, sample: int, u: Floats, v: Floats) -> None:
+        """Keep the motion at one sample."""
+        self.trajectory.displacement[sample] = self.at_probes @ u
+        self.trajectory.velocity[sample] = self.at_probes @ v
+        if sample in self.frames:
+            self.trajectory.volume_field[self.frames[sample]] = self.in_volume @ u
+            self.trajectory.surface_field[self.frames[sample]] = self.on_surface @ u

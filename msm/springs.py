@@ -1,0 +1,126 @@
+"""Springs of a cubic lattice, calibrated to Young's modulus whatever the mix of families.
+
+Structural springs run along cell edges, shear springs along face diagonals and, as a share, body
+diagonals, flexion springs from a node to its second neighbour along an axis. With
+k_ref = 0.4 E h [N/m] and weights relative to it, the bulk lattice has
+
+    C44 = (k_face + 4/3 k_body) / h = k_ref / h,    C12 = C44,    C11 = 3 C44,
+
+that is E = 2.5 k_ref / h and, as for every lattice of central springs, nu = 1/4 (Golec et al. 2020,
+doi 10.1007/s00371-019-01663-0). Each cell adds its share of its springs times its fill fraction, so
+boundary springs carry only what exists; and each flexion spring takes from the two structural
+springs under it exactly the stiffness it adds in uniform strain, at free surfaces too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array
+
+from msm.lattice import CORNERS, CellLattice
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+POISSON_RATIO = 0.25
+"""Of every central-spring lattice."""
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Ends (s, 2), rest vectors [m] (s, 3) from the first end, stiffness relative to k_ref (s,)."""
+
+    ends: Ints
+    rest: Floats
+    weight: Floats
+
+    @property
+    def rest_length(self) -> Floats:
+        """Rest lengths [m] (s,)."""
+        return np.asarray(np.linalg.norm(self.rest, axis=1))
+
+
+def reference_stiffness(youngs_modulus: float, spacing: float) -> float:
+    """k_ref = 0.4 E h [N/m], the edge stiffness of the plain edge and face-diagonal lattice."""
+    return 0.4 * youngs_modulus * spacing
+
+
+def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 0.0) -> Springs:
+    """Springs of the lattice.
+
+    `flexion`: share of the axial stiffness in flexion springs; `body_diagonals`: share of the shear
+    stiffness in body diagonals. Both lie in [0, 1].
+    """
+    axial = 1.0 + body_diagonals
+    structural = _cell_springs(lattice, 1, axial / 4.0)
+    face = _cell_springs(lattice, 2, (1.0 - body_diagonals) / 2.0)
+    body = _cell_springs(lattice, 3, 0.75 * body_diagonals)
+    families = [structural, face, body]
+    if flexion > 0.0:
+        families[0], second = _with_flexion(lattice, structural, flexion)
+        families.append(second)
+    ends = np.concatenate([ends for ends, _ in families])
+    weight = np.concatenate([weight for _, weight in families])
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    order = order[weight[order] > 0.0]
+    ends = ends[order]
+    return Springs(ends, lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]], weight[order])
+
+
+def _cell_springs(lattice: CellLattice, changes: int, share: float) -> tuple[Ints, Floats]:
+    """Springs between corners that differ in `changes` coordinates, shares of cells added up."""
+    pairs = np.array(
+        [
+            (a, b)
+            for a, b in combinations(range(8), 2)
+            if np.abs(CORNERS[a] - CORNERS[b]).sum() == changes
+        ]
+    )
+    all_ends = np.sort(lattice.cells[:, pairs].reshape(-1, 2), axis=1)
+    ends, spring = np.unique(all_ends, axis=0, return_inverse=True)
+    weight = np.bincount(spring.ravel(), weights=np.repeat(lattice.fill * share, len(pairs)))
+    return ends, weight.astype(np.float64)
+
+
+def _with_flexion(
+    lattice: CellLattice, structural: tuple[Ints, Floats], flexion: float
+) -> tuple[tuple[Ints, Floats], tuple[Ints, Floats]]:
+    """Structural springs relieved by the flexion springs over them, and those flexion springs.
+
+    A flexion spring k_f of length 2 h stores 2 k_f h^2 strain^2, as does 2 k_f added to each of its
+    two edges; with k_f a quarter of the share of the weaker edge, no edge becomes negative.
+    """
+    ends, weight = structural
+    axis = np.abs(lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]).argmax(axis=1)
+    leaving = np.full((len(lattice.nodes), 3), -1)
+    leaving[ends[:, 0], axis] = np.arange(len(ends))
+    first = np.arange(len(ends))
+    second = leaving[ends[:, 1], axis]
+    first, second = first[second >= 0], second[second >= 0]
+    k_f = 0.25 * flexion * np.minimum(weight[first], weight[second])
+    relieved = weight.copy()
+    np.subtract.at(relieved, first, 2.0 * k_f)
+    np.subtract.at(relieved, second, 2.0 * k_f)
+    spanning = np.stack([ends[first, 0], ends[second, 1]], axis=1)
+    return (ends, relieved), (spanning, k_f)
+
+
+def stiffness_matrix(springs: Springs, node_count: int, k_ref: float) -> csc_array:
+    """Stiffness [N/m] (3 n, 3 n) of the springs at rest, unknowns node by node."""
+    direction = springs.rest / springs.rest_length[:, None]
+    block = (k_ref * springs.weight)[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    i, j = springs.ends.T
+    rows, columns, data = [], [], []
+    for a, b, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)):
+        r, c = np.broadcast_arrays(
+            3 * a[:, None, None] + np.arange(3)[:, None], 3 * b[:, None, None] + np.arange(3)
+        )
+        rows.append(r.ravel())
+        columns.append(c.ravel())
+        data.append((sign * block).ravel())
+    entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+    return csc_array(coo_array(entries, shape=(3 * node_count, 3 * node_count)))
