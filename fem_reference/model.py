@@ -89,7 +89,7 @@ class _Recorder:
     """Writes what is observed into the arrays of a trajectory."""
 
     def __init__(self, body: Body, observation: Observation) -> None:
-        self.frames = {sample: i for i, sample in enumerate(observation.frames)}
+        self.frames = observation.frames
         self.trajectory = empty_trajectory(observation)
         self.at_probes = evaluation(body, observation.probes)
         self.in_volume = evaluation(body, observation.volume_points)
@@ -99,7 +99,7 @@ class _Recorder:
         """Keep the motion at one sample."""
         self.trajectory.displacement[sample] = (self.at_probes @ u).reshape(-1, 3)
         self.trajectory.velocity[sample] = (self.at_probes @ v).reshape(-1, 3)
-        if sample in self.frames:
-            frame = self.frames[sample]
-            self.trajectory.volume_field[frame] = (self.in_volume @ u).reshape(-1, 3)
-            self.trajectory.surface_field[frame] = (self.on_surface @ u).reshape(-1, 3)
+        for i, frame in enumerate(self.frames):  # the peak may be the last sample too
+            if frame == sample:
+                self.trajectory.volume_field[i] = (self.in_volume @ u).reshape(-1, 3)
+                self.trajectory.surface_field[i] = (self.on_surface @ u).reshape(-1, 3)

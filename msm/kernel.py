@@ -1,12 +1,13 @@
 """The hot loop: symplectic Euler with all nodal damping implicit.
 
     f = factor(t) load - springs(u_n) - S u_n
-    v_(n+1) = (v_n + dt f / m) / (1 + dt c(u_n) / m + dt^2 s / m)
+    v_(n+1) = (v_n + dt f / m) / (1 + dt c(u_n) / m)
     u_(n+1) = u_n + dt v_(n+1)
 
 c = gamma_0 + gamma_1 |u| is the nodal damping of eq. (9) (of eq. (2) with gamma_1 = 0). S is the
-elastic foundation, s the sum of the sizes of its rows: the added inertia dt^2 s outweighs S, so a
-stiff support never shortens the step, and at rest it vanishes. First order in dt.
+elastic foundation, explicit like the springs: an implicit diagonal in its place would be stable at
+any stiffness, but would hold back motions of cut cells that S itself does not hold. First order in
+dt.
 
 Division by zero follows IEEE (`error_model`): a spring pressed to a point gives NaN, which the
 caller reports as divergence, and not an exception.
@@ -14,13 +15,15 @@ caller reports as divergence, and not an exception.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
-from msm.laws import tension
+from msm.laws import TENSIONS, tension
 
 Floats = NDArray[np.float64]
 ORDER = 1
@@ -30,7 +33,7 @@ class Network(NamedTuple):
     """Arrays of the kernel: springs, nodes, foundation.
 
     `ends` (s, 2) int32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight times rest
-    length; `mass` [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], `added` [N/m], each (n,);
+    length; `mass` [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,);
     `row`, `column`, `value` [N/m]: compressed rows of the foundation; `load` [N] (n, 3).
     """
 
@@ -41,11 +44,16 @@ class Network(NamedTuple):
     mass: Floats
     gamma_0: Floats
     gamma_1: Floats
-    added: Floats
     row: NDArray[np.int32]
     column: NDArray[np.int32]
     value: Floats
     load: Floats
+
+
+@overload(tension)
+def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001
+    """Choose the tension by the type of the law, when the kernel is compiled."""
+    return TENSIONS.get(getattr(law, "instance_class", type(None)))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -96,7 +104,7 @@ def move(net: Network, dt: float, force: Floats, u: Floats, v: Floats) -> None:
         away = np.sqrt(u[i, 0] ** 2 + u[i, 1] ** 2 + u[i, 2] ** 2)
         c = net.gamma_0[i] + net.gamma_1[i] * away  # Eq. (9)
         share = dt / net.mass[i]
-        hold = 1.0 + share * (c + dt * net.added[i])
+        hold = 1.0 + share * c
         for d in range(3):
             v[i, d] = (v[i, d] + share * force[i, d]) / hold
             u[i, d] += dt * v[i, d]

@@ -91,6 +91,14 @@ def node_volumes(lattice: CellLattice) -> Floats:
     return volumes.astype(np.float64)
 
 
+def inverted_cells(lattice: CellLattice, displacement: Floats) -> int:
+    """How many cells are turned inside out by a displacement [m] (n, 3): J <= 0 at the centre."""
+    corner = displacement[lattice.cells]
+    toward = (2.0 * CORNERS - 1.0) / (4.0 * lattice.spacing)
+    gradient = np.einsum("cad,ae->cde", corner, toward)
+    return int((np.linalg.det(np.eye(3) + gradient) <= 0.0).sum())
+
+
 def interpolation(lattice: CellLattice, points: Floats) -> tuple[csr_array, int]:
     """Trilinear weights (q, n) at points [m] (q, 3), and how many points lie outside all cells.
 

@@ -2,17 +2,13 @@
 
 A spring of rest length L_0, weight w (its stiffness relative to k_ref) and strain
 X = (L - L_0) / L_0 pulls with w L_0 `tension(law, X)`. A law is a named tuple with a tension
-function, joined to it by an overload, so that the kernel is compiled once for each law with nothing
-left to decide inside. A new law is one more such pair.
+function, joined in TENSIONS; the kernel compiles each pair into a loop of its own with nothing left
+to decide inside. A new law is one more pair and its two slopes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
-
-from numba import types
-from numba.extending import overload
 
 
 class Hooke(NamedTuple):
@@ -36,7 +32,7 @@ class Basafa(NamedTuple):
 Law = Hooke | Basafa
 
 
-# numba wants the annotations of these to be those of the overload below, hence Any.
+# The kernel compiles these two and wants the annotations of its own overload, hence Any.
 def _hooke(law: Any, strain: Any) -> Any:
     return law.k * strain
 
@@ -50,17 +46,12 @@ def _basafa(law: Any, strain: Any) -> Any:
     return (a + b * (size - law.x_c)) * (1.0 if strain > 0.0 else -1.0)
 
 
+TENSIONS = {Hooke: _hooke, Basafa: _basafa}
+
+
 def tension(law: Law, strain: float) -> float:
     """Tension [N/m] of a law at a strain; times weight and rest length it is a force [N]."""
-    value = _hooke(law, strain) if isinstance(law, Hooke) else _basafa(law, strain)
-    return float(value)
-
-
-@overload(tension)
-def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001
-    if not isinstance(law, types.BaseNamedTuple):
-        return None
-    return {Hooke: _hooke, Basafa: _basafa}.get(law.instance_class)
+    return float(TENSIONS[type(law)](law, strain))
 
 
 def initial_stiffness(law: Law) -> float:

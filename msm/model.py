@@ -24,6 +24,7 @@ from study.trajectory import Observation, Trajectory, empty_trajectory
 Floats = NDArray[np.float64]
 
 STATIC_TOLERANCE = 1e-10
+MAX_STEPS = 300_000
 
 FAR = 1.0
 """A displacement of more than this many organ sizes is divergence, however finite."""
@@ -45,13 +46,19 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Run:
-    """Trajectory with what it took; `wall` [s] is the marching alone, without compilation."""
+    """Trajectory with what it took; `wall` [s] is the marching alone, without compilation.
+
+    `largest_strain`: largest absolute strain of a spring, `inverted_cells`: largest number of cells
+    turned inside out, both over the samples.
+    """
 
     trajectory: Trajectory
     time_step: float
     critical_time_step: float
     steps: int
     wall: float
+    largest_strain: float
+    inverted_cells: int
 
 
 def assemble(
@@ -89,11 +96,11 @@ def assemble(
 def critical_time_step(assembly: Assembly, law: Law) -> float:
     """Largest stable step [s] of the undamped lattice, 2 / omega_max, at the law's largest slope.
 
-    Implicit damping and the support only lengthen it. It is the limit at rest: springs pressed to
-    half their length are stiffer across than along and may fail below it.
+    Implicit damping only lengthens it. It is the limit at rest: springs pressed to half their
+    length are stiffer across than along and may fail below it.
     """
+    stiffness = _stiffness(assembly, largest_stiffness(law))
     count = len(assembly.mass)
-    stiffness = stiffness_matrix(assembly.springs, count, largest_stiffness(law))
     scale = diags_array(np.repeat(1.0 / np.sqrt(assembly.mass), 3))
     start = np.random.default_rng(0).standard_normal(3 * count)
     operator = csc_array(scale @ stiffness @ scale)
@@ -103,21 +110,25 @@ def critical_time_step(assembly: Assembly, law: Law) -> float:
 
 def static_displacement(assembly: Assembly, law: Law) -> Floats:
     """Displacement [m] (n, 3) at rest under the full load, springs linearised at rest."""
-    count = len(assembly.mass)
-    springs = stiffness_matrix(assembly.springs, count, initial_stiffness(law))
-    stiffness = csr_array(springs + kron(assembly.foundation, eye_array(3)))
+    stiffness = _stiffness(assembly, initial_stiffness(law))
     # Factors of a 3-D lattice fill in: at 20 000 nodes they take gigabytes. The lattice is well
     # conditioned but for a stiff support, which the diagonal takes care of.
     found, failed = cg(
         stiffness,
         assembly.load.ravel(),
         rtol=STATIC_TOLERANCE,
-        maxiter=20 * count,
+        maxiter=20 * len(assembly.mass),
         M=diags_array(1.0 / stiffness.diagonal()),
     )
     if failed:
         raise ValueError("the lattice finds no rest: the support does not hold it")
     return np.asarray(found.reshape(-1, 3))
+
+
+def _stiffness(assembly: Assembly, k_ref: float) -> csr_array:
+    """Stiffness [N/m] (3 n, 3 n) of springs and support at rest."""
+    springs = stiffness_matrix(assembly.springs, len(assembly.mass), k_ref)
+    return csr_array(springs + kron(assembly.foundation, eye_array(3)))
 
 
 def run(
@@ -127,19 +138,30 @@ def run(
     factor: Callable[[Floats], Floats],
     observation: Observation,
     step_fraction: float,
+    refinement: int = 1,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Run:
-    """Motion from rest with steps of at most `step_fraction` of the critical one."""
+    """Motion from rest with steps of at most `step_fraction` of the critical one.
+
+    `refinement` divides those steps, whatever their length. ValueError if there would be too many.
+    """
     critical = critical_time_step(assembly, law)
     interval = float(observation.times[1] - observation.times[0])
-    per_sample = int(np.ceil(interval / (step_fraction * critical) - 1e-9))
+    per_sample = refinement * int(np.ceil(interval / (step_fraction * critical) - 1e-9))
+    if per_sample * len(observation.times) > MAX_STEPS:
+        raise ValueError(
+            f"the lattice needs {per_sample * len(observation.times):.2g} steps of at most "
+            f"{step_fraction * critical:.2g} s, the limit is {MAX_STEPS:.0e}: reduce "
+            "time.duration or support.stiffness, or enlarge lattice.spacing"
+        )
     dt = interval / per_sample
     net = _network(assembly, damping)
     advance(law, net, np.zeros(0), dt, *np.zeros((2, *net.load.shape)))  # compiles, or loads
     started = time.perf_counter()
-    trajectory = _march(net, law, factor, observation, assembly, per_sample, on_progress)
+    trajectory, strain = _march(net, law, factor, observation, assembly, per_sample, on_progress)
     wall = time.perf_counter() - started
-    return Run(trajectory, dt, critical, per_sample * (len(observation.times) - 1), wall)
+    steps = per_sample * (len(observation.times) - 1)
+    return Run(trajectory, dt, critical, steps, wall, *strain)
 
 
 def _network(assembly: Assembly, damping: Damping) -> Network:
@@ -153,7 +175,6 @@ def _network(assembly: Assembly, damping: Damping) -> Network:
         mass=assembly.mass,
         gamma_0=damping.gamma_0 * assembly.mass,
         gamma_1=damping.gamma_1 * assembly.mass,
-        added=np.asarray(abs(foundation).sum(axis=1)).ravel(),
         row=foundation.indptr.astype(np.int32),
         column=foundation.indices.astype(np.int32),
         value=foundation.data,
@@ -169,8 +190,9 @@ def _march(
     assembly: Assembly,
     per_sample: int,
     on_progress: Callable[[float], None],
-) -> Trajectory:
+) -> tuple[Trajectory, tuple[float, int]]:
     u, v = np.zeros_like(net.load), np.zeros_like(net.load)
+    largest, inverted = 0.0, 0
     recorder = _Recorder(assembly.lattice, observation)
     limit = FAR * float(np.ptp(assembly.lattice.nodes, axis=0).max())
     times = observation.times
@@ -183,22 +205,31 @@ def _march(
         size = np.abs(u).max(axis=1)
         if not (size < limit).all():
             worst = int(np.argmax(np.where(np.isnan(size), np.inf, size)))
-            return replace(
+            diverged = replace(
                 recorder.trajectory,
                 status="diverged",
                 diverged_at=float(times[sample]),
                 diverged_near=assembly.lattice.nodes[worst],
             )
+            return diverged, (largest, inverted)
         recorder.record(sample, u, v)
+        largest = max(largest, _largest_strain(net, u))
+        inverted = max(inverted, cells.inverted_cells(assembly.lattice, u))
         on_progress(sample / (len(times) - 1))
-    return recorder.trajectory
+    return recorder.trajectory, (largest, inverted)
+
+
+def _largest_strain(net: Network, u: Floats) -> float:
+    """Largest absolute strain of the springs."""
+    stretched = net.rest + u[net.ends[:, 1]] - u[net.ends[:, 0]]
+    return float(np.abs(np.linalg.norm(stretched, axis=1) / net.length - 1.0).max())
 
 
 class _Recorder:
     """Writes what is observed into the arrays of a trajectory."""
 
     def __init__(self, lattice: cells.CellLattice, observation: Observation) -> None:
-        self.frames = {sample: i for i, sample in enumerate(observation.frames)}
+        self.frames = observation.frames
         self.trajectory = empty_trajectory(observation)
         self.at_probes, _ = cells.interpolation(lattice, observation.probes)
         self.in_volume, _ = cells.interpolation(lattice, observation.volume_points)
@@ -208,6 +239,7 @@ class _Recorder:
         """Keep the motion at one sample."""
         self.trajectory.displacement[sample] = self.at_probes @ u
         self.trajectory.velocity[sample] = self.at_probes @ v
-        if sample in self.frames:
-            self.trajectory.volume_field[self.frames[sample]] = self.in_volume @ u
-            self.trajectory.surface_field[self.frames[sample]] = self.on_surface @ u
+        for i, frame in enumerate(self.frames):  # the peak may be the last sample too
+            if frame == sample:
+                self.trajectory.volume_field[i] = self.in_volume @ u
+                self.trajectory.surface_field[i] = self.on_surface @ u

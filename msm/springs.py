@@ -26,9 +26,6 @@ from msm.lattice import CORNERS, CellLattice
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-POISSON_RATIO = 0.25
-"""Of every central-spring lattice."""
-
 
 @dataclass(frozen=True)
 class Springs:
@@ -42,11 +39,6 @@ class Springs:
     def rest_length(self) -> Floats:
         """Rest lengths [m] (s,)."""
         return np.asarray(np.linalg.norm(self.rest, axis=1))
-
-
-def reference_stiffness(youngs_modulus: float, spacing: float) -> float:
-    """k_ref = 0.4 E h [N/m], the edge stiffness of the plain edge and face-diagonal lattice."""
-    return 0.4 * youngs_modulus * spacing
 
 
 def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 0.0) -> Springs:

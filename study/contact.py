@@ -53,6 +53,6 @@ class ToolPatch:
         offset = points - self.centre
         along = offset @ self.direction
         across = np.maximum((offset**2).sum(axis=-1) - along**2, 0.0) / self.radius**2
-        near = (across < 1.0) & (np.abs(along) < 2.0 * self.radius)
+        near = (across < 1.0) & (np.abs(along) < self.radius)
         facing = np.clip(-(normals @ self.direction), 0.0, None)
         return np.asarray(np.where(near, (1.0 - across) ** 2 * facing, 0.0))

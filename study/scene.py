@@ -155,9 +155,10 @@ class Basafa:
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Finite-element reference: size of its elements (edge of the mesh lattice)."""
+    """Finite-element reference: size of its elements (edge of the mesh lattice), time steps."""
 
     element_size: Length = 0.017
+    steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 import tomllib
 from collections.abc import Iterator, Sequence
 from importlib import resources
@@ -49,6 +50,7 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     _resolve_mesh(table, base)
     for override in overrides:
         _apply(table, override)
+    _resolve_mesh(table, Path.cwd())
     return validate(table, name)
 
 
@@ -123,7 +125,7 @@ def _resolve_mesh(table: dict[str, Any], base: Path) -> None:
     """Make a mesh path relative to the scene file that names it."""
     organ = table.get("organ")
     if isinstance(organ, dict) and isinstance(organ.get("mesh"), str):
-        organ["mesh"] = str(base / organ["mesh"])
+        organ["mesh"] = str((base / organ["mesh"]).absolute())
 
 
 def _apply(table: dict[str, Any], override: str) -> None:
@@ -197,28 +199,41 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield "fuzzy.systems: a system is named twice"
     if scene.lattice.volume_term:
         yield "lattice.volume_term: the spring lattice has no volume term yet; set it to false"
-    if scene.tool.direction is not None and not any(scene.tool.direction):
-        yield "tool.direction: a zero vector has no direction"
     if scene.organ.mesh is None and scene.organ.unit is not None:
         yield "organ.unit: has no effect without organ.mesh; remove it"
     for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
-    if (
-        scene.tool.history.kind == "ramp-hold-release"
-        and scene.tool.history.ramp == 0.0
-        and scene.tool.history.hold == 0.0
-    ):
-        yield "tool.history: ramp and hold are both zero; nothing is ever loaded"
+    yield from _tool_contradictions(scene)
     if scene.organ.shape == "point" and scene.organ.mesh is None:
         yield from _point_contradictions(scene, table)
     elif scene.organ.mass is not None:
         yield "organ.mass: only a point has a mass of its own; use tissue.density"
 
 
+def _tool_contradictions(scene: Scene) -> Iterator[str]:
+    if scene.tool.direction is not None and not any(scene.tool.direction):
+        yield "tool.direction: a zero vector has no direction"
+    if (
+        scene.tool.history.kind == "ramp-hold-release"
+        and scene.tool.history.ramp == 0.0
+        and scene.tool.history.hold == 0.0
+    ):
+        yield "tool.history: ramp and hold are both zero; nothing is ever loaded"
+    history, time = scene.tool.history, scene.time
+    if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
+        needed = math.ceil(8 * history.frequency * time.duration)
+        yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+
+
 def _point_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
     if "fem" in scene.models:
         yield "models: fem needs an organ with a mesh; a point has none"
+    if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
+        yield (
+            "organ.mass: cannot follow from eq. (2) without damping; give it, or set "
+            "damping.ratio and basafa.gamma_0 above zero"
+        )
     for key in _MESH_ONLY:
         if _has(table, key):
             yield f"{'.'.join(key)}: has no effect on a single point; remove it"

@@ -21,7 +21,8 @@ SMALL = (
     "tool.radius=15 mm",
     "tool.force=0.05 N",
     "reference.element_size=12 mm",
-    "time.samples=51",
+    "time.samples=101",
+    "reference.steps_per_sample=2",
 )
 
 

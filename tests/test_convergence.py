@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fem_reference.model import build, static_field
+from msm.calibration import reference_stiffness
 from msm.lattice import interpolation
 from msm.laws import Hooke
 from msm.model import assemble, static_displacement
-from msm.springs import reference_stiffness
 from study.contact import Foundation, ToolPatch
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary

@@ -5,14 +5,20 @@ from __future__ import annotations
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import oriented
 
 
+def cell_counts(size: tuple[float, float, float], element_size: float) -> NDArray[np.int64]:
+    """Cells along each axis, none longer than `element_size` [m]."""
+    return np.maximum(1, np.ceil(np.array(size) / element_size - 1e-9).astype(np.int64))
+
+
 def block_mesh(size: tuple[float, float, float], element_size: float) -> TetrahedralMesh:
     """Block [0, size] [m] of cells no longer than `element_size`, each cut into six (Kuhn)."""
-    counts = np.maximum(1, np.ceil(np.array(size) / element_size - 1e-9).astype(int))
+    counts = cell_counts(size, element_size)
     axes = [np.linspace(0.0, s, n + 1) for s, n in zip(size, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(counts + 1)

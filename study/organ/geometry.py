@@ -10,13 +10,14 @@ import numpy as np
 from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.tetrahedra import boundary, mean_edge, refined, volumes
 from study.organ import liver
-from study.organ.block import block_mesh
+from study.organ.block import block_mesh, cell_counts
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import Body, ImplicitBody, MeshBody
 from study.scene import Organ
 
 COARSENING = 4.0 / 3.0
 """Element size of the coarser mesh, which shows the reference's discretisation error."""
+LEAST_COARSENING = 1.2
 REFINE_ABOVE = 1.3
 """A user's mesh is refined while its mean edge exceeds this many element sizes."""
 MAX_TETRAHEDRA = 60_000
@@ -28,8 +29,9 @@ TETRAHEDRA_PER_CUBE = 12
 class Geometry:
     """`mesh` for the finite elements and all integrals; `coarser`, one for its error, if any.
 
-    `surface`: boundary of `mesh`; `body`: the exact shape if it is known, else the mesh; `volume`
-    [m^3] of `mesh`; `notes`: what was found, repaired or assumed.
+    `coarsening`: ratio of their element sizes; `surface`: boundary of `mesh`; `body`: the exact
+    shape if it is known, else the mesh; `volume` [m^3] of `mesh`; `notes`: what was found, repaired
+    or assumed.
     """
 
     mesh: TetrahedralMesh
@@ -37,6 +39,7 @@ class Geometry:
     surface: SurfaceMesh
     body: Body
     volume: float
+    coarsening: float
     notes: tuple[str, ...] = ()
 
 
@@ -50,10 +53,17 @@ def build(organ: Organ, element_size: float) -> Geometry:
     volume = float(np.prod(organ.size)) if organ.shape == "block" else organ.volume
     _check_count(volume, element_size)
     if organ.shape == "block":
-        mesh = block_mesh(organ.size, element_size)
-        coarser = block_mesh(organ.size, COARSENING * element_size)
-        return _geometry(mesh, coarser, MeshBody(mesh))
+        return _block(organ.size, element_size)
     return _liver(organ.volume, element_size)
+
+
+def _block(size: tuple[float, float, float], element_size: float) -> Geometry:
+    """A block; its coarser mesh must be coarser along each axis, or it would tell nothing."""
+    mesh = block_mesh(size, element_size)
+    fine, coarse = (cell_counts(size, h) for h in (element_size, COARSENING * element_size))
+    ratio = float((fine / coarse).min())
+    coarser = block_mesh(size, COARSENING * element_size) if ratio >= LEAST_COARSENING else None
+    return _geometry(mesh, coarser, MeshBody(mesh), coarsening=ratio)
 
 
 def _check_count(volume: float, element_size: float) -> None:
@@ -87,10 +97,11 @@ def _from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
     loaded, report = load_mesh(path, unit)
     notes = list(report.notes)
     if isinstance(loaded, SurfaceMesh):
-        mesh, more = tetrahedralise(loaded, element_size)
-        coarser, _ = tetrahedralise(loaded, COARSENING * element_size)
-        return _geometry(mesh, coarser, MeshBody(mesh), (*notes, *more))
-    mesh, coarser = loaded, None
+        filled, more = tetrahedralise(loaded, element_size)
+        coarsely, _ = tetrahedralise(loaded, COARSENING * element_size)
+        return _geometry(filled, coarsely, MeshBody(filled), (*notes, *more))
+    mesh: TetrahedralMesh = loaded
+    coarser: TetrahedralMesh | None = None
     while (
         mean_edge(mesh) > REFINE_ABOVE * element_size and 8 * len(mesh.tetrahedra) < MAX_TETRAHEDRA
     ):
@@ -99,7 +110,7 @@ def _from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
             f"Tetrahedra refined to {len(mesh.tetrahedra)} (mean edge {mean_edge(mesh) * 1e3:.1f} "
             "mm) so that quadratic elements follow the load."
         )
-    return _geometry(mesh, coarser, MeshBody(mesh), tuple(notes))
+    return _geometry(mesh, coarser, MeshBody(mesh), tuple(notes), coarsening=2.0)
 
 
 def _geometry(
@@ -107,5 +118,7 @@ def _geometry(
     coarser: TetrahedralMesh | None,
     body: Body,
     notes: tuple[str, ...] = (),
+    coarsening: float = COARSENING,
 ) -> Geometry:
-    return Geometry(mesh, coarser, boundary(mesh), body, float(volumes(mesh).sum()), notes)
+    volume = float(volumes(mesh).sum())
+    return Geometry(mesh, coarser, boundary(mesh), body, volume, coarsening, notes)

@@ -1,0 +1,63 @@
+"""Describe a scene or a mesh file before anything is run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from study.run.whole import is_point
+from study.scene import Scene
+from study.scene_file import read_scene
+
+if TYPE_CHECKING:
+    from study.run.posed import Posed
+
+
+def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
+    """Lines on a scene: organ, loads, models and their steps. ValueError as of a run."""
+    scene = read_scene(name, overrides)
+    lines = [scene.title or name, f"models: {', '.join(scene.models)}"]
+    if is_point(scene):
+        from study.run.point import mass
+
+        return [*lines, f"one control mass point of {mass(scene):.4g} kg"]
+    from study.run.organ import dimensionless
+    from study.run.posed import pose
+
+    posed = pose(scene)
+    lines += [f"note: {note}" for note in posed.geometry.notes]
+    lines += [f"{key} = {value:.4g}" for key, value in dimensionless(scene, posed).items()]
+    tetrahedra = len(posed.geometry.mesh.tetrahedra)
+    lines.append(f"finite-element mesh: {tetrahedra} tetrahedra")
+    if set(scene.models) & {"basafa", "msm"}:
+        lines += _lattice_lines(scene, posed)
+    return lines
+
+
+def _lattice_lines(scene: Scene, posed: Posed) -> list[str]:
+    from msm.model import critical_time_step
+    from study.run.estimates import estimates
+    from study.run.lattices import assemble, contenders
+
+    assembly = assemble(scene, posed)
+    lines = [f"lattice: {len(assembly.mass)} nodes, {len(assembly.springs.weight)} springs"]
+    for contender in contenders(scene, estimates(scene)):
+        step = critical_time_step(assembly, contender.law)
+        lines.append(
+            f"{contender.name}: modulus {contender.modulus / 1e3:.2f} kPa, critical step "
+            f"{1e3 * step:.3g} ms, damping {contender.damping.gamma_0:.4g} 1/s"
+        )
+    return lines
+
+
+def describe_mesh(path: Path, unit: str | None) -> list[str]:
+    """Lines on a mesh file: what it holds, what was repaired, its quality."""
+    from study.mesh.load import load_mesh
+
+    _, report = load_mesh(path, unit)
+    extent = " x ".join(f"{1e3 * length:.1f}" for length in report.extent)
+    return [
+        f"{path.name}: {report.kind}, unit {report.unit}, {1e3 * report.volume:.3f} L, {extent} mm",
+        *(f"note: {note}" for note in report.notes),
+    ]

@@ -1,0 +1,69 @@
+"""What made a result: versions, commit, platform."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shutil
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = (
+    "liver-study",
+    "matplotlib",
+    "meshio",
+    "numba",
+    "numpy",
+    "pytetwild",
+    "pyvista",
+    "scikit-fem",
+    "scipy",
+    "similaritymeasures",
+    "typst",
+)
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def provenance(scene: str, mesh: str | None) -> dict[str, Any]:
+    """Versions, commit, platform, and hashes of the scene and of its mesh file.
+
+    The study draws no random numbers: `seed` is null.
+    """
+    return {
+        "versions": {"python": platform.python_version()} | {p: _version(p) for p in PACKAGES},
+        "commit": _commit(),
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "seed": None,
+        "scene_sha256": hashlib.sha256(scene.encode()).hexdigest(),
+        "mesh_sha256": hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None,
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """Commit of the checkout this runs from, marked if it has changes; None elsewhere."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        return None
+    command = [git, "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=40"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    return done.stdout.strip() or None
+
+
+def _processor() -> str | None:
+    """Name of the processor as Linux tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or None
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0]} ({len(names)} threads)" if names else None

@@ -1,0 +1,164 @@
+"""The results folder: what a study found, written aside and moved into place at once.
+
+scene.toml      the scene in full          curves.csv      motion at the control points
+results.json    numbers, provenance        bands.csv       type-2 interval carried through
+similarity.csv  score of each pair         errors.csv      differences of the whole field
+fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SCHEMA_VERSION = 1
+MARK = "results.json"
+TABLES: dict[str, tuple[str, ...]] = {
+    "curves": ("model", "probe", "time_s", "displacement_m", "velocity_m_per_s"),
+    "bands": (
+        "model",
+        "probe",
+        "time_s",
+        "displacement_at_lower_m",
+        "displacement_at_upper_m",
+        "velocity_at_lower_m_per_s",
+        "velocity_at_upper_m_per_s",
+    ),
+    "similarity": ("model", "reference", "probe", "curve", "measure", "score"),
+    "errors": ("model", "reference", "quantity", "value"),
+}
+TEXT_COLUMNS = {"model", "probe", "reference", "curve", "measure", "quantity"}
+FILES = {MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", *(f"{t}.csv" for t in TABLES)}
+Row = tuple[str | float, ...]
+
+
+class ResultsError(ValueError):
+    """A folder that cannot be read or written; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """Content of a results folder.
+
+    `scene`: its TOML text; `numbers`: results.json; `tables`: rows by table name as in TABLES;
+    `arrays`: arrays to draw, by file stem and name.
+    """
+
+    scene: str
+    numbers: dict[str, Any]
+    tables: dict[str, list[Row]]
+    arrays: dict[str, dict[str, NDArray[Any]]]
+
+
+def write(results: Results, folder: Path) -> None:
+    """Write the files of a results folder into an empty folder; see `replacing`."""
+    (folder / "scene.toml").write_text(results.scene, encoding="utf-8")
+    text = json.dumps(results.numbers, indent=1, allow_nan=False)
+    (folder / MARK).write_text(text + "\n", encoding="utf-8")
+    for name, header in TABLES.items():
+        _write_table(folder / f"{name}.csv", header, results.tables.get(name, []))
+    for stem, arrays in results.arrays.items():
+        np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
+
+
+def read(folder: Path) -> Results:
+    """Read a results folder. ResultsError if it is none, or of another version."""
+    try:
+        numbers = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        scene = (folder / "scene.toml").read_text(encoding="utf-8")
+        tables = {name: list(_read_table(folder / f"{name}.csv", name)) for name in TABLES}
+        arrays = {path.stem: _read_arrays(path) for path in sorted(folder.glob("*.npz"))}
+    except FileNotFoundError as error:
+        missing = Path(error.filename).name
+        raise ResultsError(
+            f"{folder}: no results here ({missing} is missing); make some with liver-study run"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{folder}: damaged results: {error}") from None
+    version = numbers.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise ResultsError(
+            f"{folder}: results of schema {version}, this program reads {SCHEMA_VERSION}; "
+            "run the scene again"
+        )
+    return Results(scene, numbers, tables, arrays)
+
+
+def _check_target(folder: Path) -> None:
+    """ResultsError unless the folder is absent, empty, or holds earlier results alone."""
+    if folder == Path.cwd():
+        raise ResultsError(f"{folder}: is the current folder; give --out another")
+    if folder.exists() and not folder.is_dir():
+        raise ResultsError(f"{folder}: is a file; give --out a folder")
+    if not folder.is_dir():
+        return
+    present = {path.name for path in folder.iterdir()}
+    foreign = sorted(present - FILES)
+    if foreign or (present and MARK not in present):
+        name = foreign[0] if foreign else sorted(present)[0]
+        raise ResultsError(f"{folder}: holds {name}, which no run wrote; give --out another folder")
+
+
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A folder beside `folder` that takes its place when the block ends without an exception.
+
+    ResultsError before the block if `folder` holds anything else or cannot be written.
+    """
+    folder = folder.resolve()
+    _check_target(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise ResultsError(f"{folder}: cannot be written ({error.strerror})") from None
+    try:
+        partial = aside / "new"
+        partial.mkdir()
+        yield partial
+        if folder.exists():
+            folder.replace(aside / "old")
+        partial.replace(folder)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _write_table(path: Path, header: Sequence[str], rows: Iterable[Row]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows([_cell(value) for value in row] for row in rows)
+
+
+def _cell(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.12g}"
+
+
+def _read_table(path: Path, name: str) -> Iterator[Row]:
+    with path.open(newline="", encoding="utf-8") as file:
+        reader = csv.reader(file)
+        header = tuple(next(reader, ()))
+        if header != TABLES[name]:
+            raise ValueError(f"{path.name} has columns {', '.join(header)}")
+        for row in reader:
+            yield tuple(
+                text if column in TEXT_COLUMNS else float(text)
+                for column, text in zip(header, row, strict=True)
+            )
+
+
+def _read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    with np.load(path, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}

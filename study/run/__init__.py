@@ -1,0 +1,1 @@
+"""Wiring: from a scene through every model it names to results."""

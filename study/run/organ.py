@@ -1,0 +1,53 @@
+"""Run every model that a scene with a mesh names; import only those."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.progress import Progress
+from study.run.outcome import Outcome
+from study.run.posed import Posed
+from study.scene import Scene
+
+if TYPE_CHECKING:
+    from fuzzy.stiffness import Estimate
+
+GRAVITY = 9.81
+
+
+def run_organ(
+    scene: Scene, posed: Posed, estimates: dict[str, Estimate], progress: Progress
+) -> Outcome:
+    """Run the finite elements, the benchmark and one lattice per estimate."""
+    from study.run.lattices import node_damping, run_lattices
+
+    outcome = Outcome(notes=list(posed.geometry.notes))
+    outcome.extra["dimensionless"] = dimensionless(scene, posed)
+    if "fem" in scene.models:
+        from study.run.reference import run_reference
+
+        rate = node_damping(scene, scene.tissue.youngs_modulus).gamma_0
+        body = run_reference(scene, posed, rate, outcome, progress)
+        if "msm" in scene.models:
+            from study.run.limits import lattice_limits
+
+            lattice_limits(scene, posed, body, outcome, progress)
+    if set(scene.models) & {"basafa", "msm"}:
+        run_lattices(scene, posed, estimates, outcome, progress)
+    return outcome
+
+
+def dimensionless(scene: Scene, posed: Posed) -> dict[str, float]:
+    """Numbers that show a mistaken unit before anything is run."""
+    extent = float(np.ptp(posed.geometry.surface.points, axis=0).max())
+    modulus, radius = scene.tissue.youngs_modulus, scene.tool.radius
+    return {
+        "extent_m": extent,
+        "volume_m3": posed.geometry.volume,
+        "sag_rho_g_l_over_e": scene.tissue.density * GRAVITY * extent / modulus,
+        "tool_pressure_over_e": scene.tool.force / (np.pi * radius**2) / modulus,
+        "tool_radius_over_spacing": radius / scene.lattice.spacing,
+        "tool_radius_over_element_size": radius / scene.reference.element_size,
+    }

@@ -1,0 +1,116 @@
+"""The whole study of a scene."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fuzzy import stiffness
+from study.progress import Progress
+from study.provenance import provenance
+from study.results import SCHEMA_VERSION, Results
+from study.run import estimates as fuzzy_side
+from study.run.assumptions import assumptions
+from study.run.comparison import Lens, band_rows, curve_rows, error_rows, similarity_rows
+from study.run.outcome import Outcome
+from study.scene import Scene
+from study.scene_file import resolved, write_scene
+
+STRAIN_LIMIT = 0.05
+"""Above it the report warns that the linear reference is stretched."""
+
+
+def is_point(scene: Scene) -> bool:
+    """Whether the scene is a single control mass point."""
+    return scene.organ.shape == "point" and scene.organ.mesh is None
+
+
+def run_study(scene: Scene, progress: Progress) -> Results:
+    """Run all that the scene names and gather the results.
+
+    Raises ValueError for an organ, support or tool that cannot be used.
+    """
+    started = time.perf_counter()
+    found = fuzzy_side.estimates(scene) if "msm" in scene.models else {}
+    arrays: dict[str, dict[str, NDArray[Any]]] = {}
+    if found:
+        arrays["fuzzy"] = fuzzy_side.drawings(scene)
+    if is_point(scene):
+        from study.run import point
+
+        lens, outcome = point.lens(scene), point.run_point(scene, found, progress)
+    else:
+        from study.run.organ import run_organ
+        from study.run.posed import pose
+
+        with progress.stage("organ"):
+            posed = pose(scene)
+        lens, outcome = posed.lens, run_organ(scene, posed, found, progress)
+        arrays["fields"] = {
+            "points": posed.geometry.surface.points,
+            "triangles": posed.geometry.surface.triangles,
+            "tool": np.stack([posed.tool.centre, posed.tool.direction]),
+            "probes": posed.observation.probes,
+        } | {name: run.surface_field for name, run in outcome.runs.items()}
+    with progress.stage("similarity"):
+        tables = _tables(lens, outcome)
+    text = write_scene(scene)
+    numbers: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "title": scene.title,
+        "scene": resolved(scene),
+        "stiffness": fuzzy_side.as_numbers(found, scene.tissue.youngs_modulus),
+        "rule_count": stiffness.rule_count(fuzzy_side.settings(scene)) if found else None,
+        "probes": list(lens.probes),
+        "models": outcome.models,
+        "checks": outcome.checks,
+        "warnings": _warnings(outcome),
+        "assumptions": assumptions(scene, outcome),
+        "notes": outcome.notes,
+        "study_wall_s": time.perf_counter() - started,
+        "provenance": provenance(text, scene.organ.mesh),
+    }
+    return Results(text, numbers | outcome.extra, tables, arrays)
+
+
+def _tables(lens: Lens, outcome: Outcome) -> dict[str, Any]:
+    bands = [row for name, ends in outcome.bounds.items() for row in band_rows(lens, name, ends)]
+    has_field = lens.volumes.size > 0
+    collapsed = {record["name"] for record in outcome.models if record.get("inverted_cells")}
+    sound = {name: run for name, run in outcome.runs.items() if name not in collapsed}
+    return {
+        "curves": list(curve_rows(lens, outcome.runs)),
+        "bands": bands,
+        "similarity": list(similarity_rows(lens, sound, outcome.notes)),
+        "errors": list(error_rows(lens, sound)) if has_field else [],
+    }
+
+
+def _warnings(outcome: Outcome) -> list[str]:
+    warnings = []
+    for record in outcome.models:
+        strain = record.get("largest_strain")
+        if strain is not None and strain > STRAIN_LIMIT:
+            warnings.append(
+                f"The largest strain of the linear reference is {100 * strain:.1f} %; above "
+                f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted. Reduce tool.force or "
+                "enlarge tool.radius."
+            )
+        if record["status"] == "diverged":
+            warnings.append(
+                f"{record['name']} diverged at {record['diverged_at_s']:g} s: it has no scores. "
+                "Reduce lattice.step_fraction or the load."
+            )
+        if record.get("inverted_cells"):
+            warnings.append(
+                f"{record['inverted_cells']} cells of {record['name']} turned inside out: springs "
+                "do not resist that, so it has no scores. Reduce tool.force."
+            )
+    failed = [c for c in outcome.checks if not c["passed"]]
+    warnings += [
+        f"Check failed: {c['name']} is {c['value']:.2g}, its limit {c['limit']:g}." for c in failed
+    ]
+    return warnings

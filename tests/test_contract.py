@@ -1,0 +1,196 @@
+"""What every model of a study promises, and what the results say of it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from study.progress import Silent
+from study.results import TABLES, Results, ResultsError, read, replacing
+from study.results import write as write_files
+from study.run.comparison import best_factor, relative_l2
+from study.run.whole import run_study
+
+MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2"]
+
+
+def write(results: Results, folder):
+    with replacing(folder) as partial:
+        write_files(results, partial)
+
+
+def rows(results, table):
+    return [dict(zip(TABLES[table], row, strict=True)) for row in results.tables[table]]
+
+
+@pytest.fixture(params=MODELS)
+def curve(request, small_results):
+    found = [r for r in rows(small_results, "curves") if r["model"] == request.param]
+    return {key: np.array([r[key] for r in found]) for key in TABLES["curves"][2:]}
+
+
+def test_each_model_gives_finite_curves_from_rest_at_every_sample(curve, small_scene):
+    count = small_scene.time.samples * len(small_scene.control_points)
+    assert len(curve["time_s"]) == count
+    assert curve["displacement_m"][0] == curve["velocity_m_per_s"][0] == 0.0
+    assert all(np.isfinite(values).all() for values in curve.values())
+
+
+def test_each_model_is_pushed_the_way_the_tool_pushes(curve, small_scene):
+    first_probe = curve["displacement_m"][: small_scene.time.samples]
+    assert first_probe.max() > 1e-5
+    assert first_probe.min() > -0.02 * first_probe.max()
+
+
+def test_velocity_is_the_rate_of_displacement(curve, small_scene):
+    n = small_scene.time.samples
+    t, u, v = (curve[key][:n] for key in ("time_s", "displacement_m", "velocity_m_per_s"))
+    travelled = np.trapezoid(v, t)
+    # The trapezoidal rule over the sampled kinks of the ramp.
+    assert travelled == pytest.approx(u[-1] - u[0], abs=0.08 * np.ptp(u))
+
+
+def test_results_name_every_model_and_number(small_results):
+    numbers = small_results.numbers
+    assert [m["name"] for m in numbers["models"]] == MODELS
+    assert numbers["rule_count"] == 247
+    for record in numbers["models"]:
+        for key in ("nodes", "time_step_s", "critical_time_step_s", "steps", "wall_s"):
+            assert key in record
+        assert ("springs" in record) != ("elements" in record)
+        assert record["status"] == "finished"
+        assert record["time_step_error"] < 0.01
+    assert numbers["stiffness"].keys() == {"mamdani", "sugeno", "interval-type-2"}
+    low, high = numbers["stiffness"]["interval-type-2"]["interval_pa"]
+    assert low < numbers["stiffness"]["interval-type-2"]["estimate_pa"] < high
+    assert all(check["passed"] for check in numbers["checks"])
+    assert {"versions", "commit", "platform", "seed"} <= numbers["provenance"].keys()
+    json.dumps(numbers, allow_nan=False)
+
+
+def test_every_pair_has_every_score_in_the_unit_interval(small_results):
+    scores = rows(small_results, "similarity")
+    pairs = {(r["model"], r["reference"]) for r in scores}
+    assert pairs == {(m, "fem") for m in MODELS[1:]} | {(m, "basafa") for m in MODELS[2:]}
+    assert {r["curve"] for r in scores} == {"displacement", "velocity", "phase-plane"}
+    assert len(scores) == len(pairs) * 2 * 7
+    assert all(0 <= r["score"] <= 1 for r in scores)
+
+
+def test_field_errors_are_those_of_the_whole_organ(small_results):
+    quantities = {r["quantity"] for r in rows(small_results, "errors")}
+    assert {"field-relative-l2-peak", "field-relative-l2-final"} <= quantities
+
+
+def test_the_type_2_band_holds_its_own_curve(small_results):
+    """The stiffness lies between the bounds, so at the peak the displacement does."""
+    band = [r for r in rows(small_results, "bands") if r["probe"] == "tool"]
+    curve = [
+        r["displacement_m"]
+        for r in rows(small_results, "curves")
+        if r["model"] == "msm-interval-type-2" and r["probe"] == "tool"
+    ]
+    peak = int(np.argmax(curve))
+    assert band[peak]["displacement_at_upper_m"] < curve[peak]
+    assert curve[peak] < band[peak]["displacement_at_lower_m"]
+
+
+def test_the_limits_of_the_lattice_are_told(small_results):
+    limits = small_results.numbers["lattice_limits"]
+    assert limits["relative_l2_at_best_factor"] <= limits["relative_l2"]
+    assert limits["relative_l2_at_quarter"] < limits["relative_l2"]
+
+
+def test_runs_repeat_exactly(small_scene, small_results):
+    again = run_study(dataclasses.replace(small_scene, models=("basafa", "msm")), Silent())
+    first = [r for r in small_results.tables["curves"] if r[0] != "fem"]
+    assert again.tables["curves"] == first
+
+
+def test_only_the_named_models_run(small_scene):
+    only = run_study(dataclasses.replace(small_scene, models=("basafa",)), Silent())
+    assert [m["name"] for m in only.numbers["models"]] == ["basafa"]
+    assert only.numbers["stiffness"] == {}
+    assert not only.tables["similarity"]
+
+
+def test_the_paper_s_point_needs_no_mesh(paper_results):
+    numbers = paper_results.numbers
+    assert [m["name"] for m in numbers["models"]] == MODELS[1:]
+    assert numbers["control_point"]["mass_kg"] == pytest.approx(0.1358, abs=1e-4)
+    assert numbers["models"][0]["damping_ratio"] == pytest.approx(0.9)
+    assert "fields" not in paper_results.arrays
+
+
+def test_best_factor_and_difference_of_scaled_fields(rng):
+    field, volumes = rng.standard_normal((50, 3)), rng.uniform(1, 2, 50)
+    assert best_factor(0.5 * field, field, volumes) == pytest.approx(2.0)
+    assert relative_l2(1.1 * field, field, volumes) == pytest.approx(0.1)
+
+
+def test_results_read_back_as_written(small_results, tmp_path):
+    write(small_results, tmp_path / "out")
+    again = read(tmp_path / "out")
+    assert again.numbers == small_results.numbers
+    assert again.scene == small_results.scene
+    assert len(again.tables["curves"]) == len(small_results.tables["curves"])
+    for stem, arrays in small_results.arrays.items():
+        for name, array in arrays.items():
+            assert np.array_equal(again.arrays[stem][name], array)
+
+
+def test_a_failure_while_writing_leaves_nothing_and_keeps_the_old(paper_results, tmp_path):
+    target = tmp_path / "out"
+    write(paper_results, target)
+    before = (target / "results.json").read_bytes()
+
+    def interrupted():
+        with replacing(target) as partial:
+            write_files(paper_results, partial)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert (target / "results.json").read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_folder_with_other_files_is_not_touched(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(ResultsError, match="another folder"), replacing(tmp_path):
+        pass
+    assert (tmp_path / "thesis.tex").exists()
+
+
+@pytest.mark.parametrize("damage", ["missing", "json", "version", "columns"])
+def test_damaged_results_are_refused_with_a_reason(paper_results, tmp_path, damage):
+    target = tmp_path / "out"
+    write(paper_results, target)
+    if damage == "missing":
+        (target / "curves.csv").unlink()
+    elif damage == "json":
+        (target / "results.json").write_text("{")
+    elif damage == "version":
+        numbers = paper_results.numbers | {"schema_version": 99}
+        (target / "results.json").write_text(json.dumps(numbers))
+    else:
+        (target / "curves.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(ResultsError):
+        read(target)
+
+
+def test_a_folder_of_results_with_a_foreign_file_is_not_replaced(paper_results, tmp_path):
+    target = tmp_path / "out"
+    write(paper_results, target)
+    (target / "thesis.tex").write_text("years of work")
+    with pytest.raises(ResultsError, match=r"thesis\.tex"):
+        write(paper_results, target)
+    assert (target / "thesis.tex").exists()
+
+
+def test_names_that_look_like_numbers_stay_names(small_scene, tmp_path):
+    places = {"1": small_scene.control_points["tool"], "nan": small_scene.control_points["corner"]}
+    scene = dataclasses.replace(small_scene, models=("basafa",), control_points=places)
+    write(run_study(scene, Silent()), tmp_path / "out")
+    assert {row[1] for row in read(tmp_path / "out").tables["curves"]} == {"1", "nan"}
