@@ -1,0 +1,1 @@
+"""From a results folder to a PDF: figures, tables and their document. Nothing is simulated here."""

@@ -1,0 +1,76 @@
+"""The sheet that figures are drawn on: one style, and SVG that is the same byte by byte."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TEXT_WIDTH = 6.69
+"""Width of the report's text [inch]."""
+RASTER_DPI = 200
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "liver-study",
+    "text.parse_math": False,  # names come from users
+    "font.size": 7.5,
+    "axes.titlesize": 7.5,
+    "axes.labelsize": 7.5,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "legend.fontsize": 7.5,
+    "axes.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "legend.frameon": False,
+    "image.cmap": "viridis",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The report's style while a figure is drawn and saved.
+
+    A name in a script that the font lacks is drawn as boxes, without a warning.
+    """
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        yield
+
+
+def sheet(height: float, width: float = TEXT_WIDTH) -> Figure:
+    """An empty figure; sizes in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=RASTER_DPI, layout="constrained")
+
+
+def svg(figure: Figure) -> bytes:
+    """The figure as SVG without a date.
+
+    `print_svg` rather than `savefig`, which would draw all of it twice.
+    """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    buffer = io.BytesIO()
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    return buffer.getvalue()
+
+
+def blank(axes: Axes) -> None:
+    """Hide the frame, ticks and grid of axes that hold a picture."""
+    axes.set_axis_off()
+    axes.set_aspect("equal")

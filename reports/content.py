@@ -1,0 +1,75 @@
+"""Everything that the template prints, as text; it types no number itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reports import summary, tables
+from reports.digits import fixed, percent, short, words
+from reports.motion_figures import shown_probes
+from reports.paper import TABLE_III_SPREAD
+from reports.ranking import columns, tool_probe
+from study.results import Results
+
+SCENE_COLUMNS = 3
+
+
+def document(results: Results) -> dict[str, Any]:
+    """The document's text by place; a list is empty where a scene lacks the matter."""
+    numbers = results.numbers
+    return {
+        "title": words(numbers.get("title") or "Untitled scene"),
+        "running_title": short(numbers.get("title") or "Untitled scene", 80),
+        "warnings": [words(text) for text in numbers["warnings"]],
+        "glance": summary.glance(results),
+        "summary": summary.sentences(results),
+        "has_reference": any(record["name"] == "fem" for record in numbers["models"]),
+        "is_built_in_liver": _is_built_in_liver(numbers["scene"]),
+        "scene": tables.balanced(_scene(results), SCENE_COLUMNS),
+        "estimates": tables.estimate_rows(results),
+        "estimate_notes": tables.estimate_notes(results),
+        "rule_count": str(numbers.get("rule_count") or ""),
+        "probes_left_out": len(numbers["probes"]) - len(shown_probes(results)),
+        "has_band": bool(results.tables["bands"]),
+        "similarity": tables.similarity_tables(results),
+        "measure_count": len(columns(results)),
+        "tool_probe": words(tool_probe(results) or ""),
+        "verdicts": tables.verdict_rows(results),
+        "paper": tables.paper_rows(results),
+        "paper_spread": fixed(TABLE_III_SPREAD, 4),
+        "formulas": tables.formula_rows(),
+        "errors": tables.error_rows(results),
+        "limits": _limits(numbers.get("lattice_limits")),
+        "models": tables.model_rows(results),
+        "numerics": tables.numerics_rows(results),
+        "checks": tables.check_rows(results),
+        "assumptions": [words(text) for text in numbers["assumptions"]],
+        "notes": [words(text) for text in numbers["notes"]],
+        "provenance": tables.provenance_rows(results),
+    }
+
+
+def _scene(results: Results) -> list[dict[str, Any]]:
+    """Groups of the scene's values, and the numbers that follow from them."""
+    rows = tables.dimensionless_rows(results)
+    derived = [{"name": "size and dimensionless numbers", "rows": rows}] if rows else []
+    return tables.scene_groups(results) + derived
+
+
+def _is_built_in_liver(scene: dict[str, Any]) -> bool:
+    organ = scene.get("organ", {})
+    return organ.get("shape") == "liver" and organ.get("mesh") is None
+
+
+def _limits(found: dict[str, float] | None) -> dict[str, str] | None:
+    """What the spring lattice cannot do, printed."""
+    if not found:
+        return None
+    return {
+        "spacing": f"{fixed(1e3 * found['spacing_m'], 1)} mm",
+        "poisson_ratio": f"{found['poisson_ratio']:g}",
+        "at_quarter": percent(found["relative_l2_at_quarter"]),
+        "whole": percent(found["relative_l2"]),
+        "factor": fixed(found["best_factor"], 3),
+        "left": percent(found["relative_l2_at_best_factor"]),
+    }

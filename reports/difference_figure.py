@@ -1,0 +1,60 @@
+"""How much of the field's difference from the finite elements has which cause."""
+
+from __future__ import annotations
+
+from reports import canvas
+from reports.appearance import look
+from reports.digits import fixed
+from reports.summary import field_errors
+from study.results import Results
+
+BAR_HEIGHT = 0.19
+FRAME_HEIGHT = 0.55
+LIMIT_COLOURS = ("#bbbbbb", "#888888", "#555555")
+
+Bar = tuple[str, float, float | None, str]
+"""Label, difference, what the best factor leaves of it (or None), colour."""
+
+
+def bars(results: Results) -> list[Bar]:
+    """The lattice with the exact modulus at rest, then every model at the peak."""
+    found: list[Bar] = []
+    limits = results.numbers.get("lattice_limits")
+    if limits:
+        nu, left = limits["poisson_ratio"], limits["relative_l2_at_best_factor"]
+        quarter = limits["relative_l2_at_quarter"]
+        found = [
+            ("exact modulus, at rest, ν = 0.25", quarter, None, LIMIT_COLOURS[0]),
+            (f"exact modulus, at rest, ν = {nu:g}", limits["relative_l2"], left, LIMIT_COLOURS[1]),
+        ]
+    for (model, reference), values in field_errors(results).items():
+        if reference == "fem":
+            whole = values["field-relative-l2-peak"]
+            left = values["field-relative-l2-peak-at-best-factor"]
+            found.append((f"{look(model).label}, at the peak", whole, left, look(model).colour))
+    return found
+
+
+def difference_figure(results: Results) -> bytes | None:
+    """Bars of the relative L2 difference in per cent, or None if nothing was compared."""
+    found = bars(results)
+    if not found:
+        return None
+    with canvas.style():
+        figure = canvas.sheet(FRAME_HEIGHT + BAR_HEIGHT * len(found))
+        axes = figure.subplots()
+        for i, (_, whole, left, colour) in enumerate(found):
+            axes.barh(i, 100 * whole, height=0.62, color=colour, alpha=0.8)
+            text = f"{fixed(100 * whole, 1)} %"
+            if left is not None:
+                axes.plot([100 * left] * 2, [i - 0.31, i + 0.31], color="black", linewidth=1.6)
+                text += f"   (at best factor {fixed(100 * left, 1)} %)"
+            axes.annotate(
+                text, (100 * whole, i), (4, 0), textcoords="offset points", va="center", fontsize=7
+            )
+        axes.set_yticks(range(len(found)), [bar[0] for bar in found])
+        axes.invert_yaxis()
+        axes.set(xlabel="relative L2 difference from the finite elements [%]")
+        axes.set_xlim(0.0, 1.45 * 100 * max(bar[1] for bar in found))
+        axes.grid(visible=False, axis="y")
+        return canvas.svg(figure)

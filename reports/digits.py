@@ -1,0 +1,79 @@
+"""How numbers and names are printed."""
+
+from __future__ import annotations
+
+import math
+import re
+
+DASH = "–"
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LONGEST_WORD = 20
+QUANTITY = re.compile(r"(-?\d[\d.]*(?:e[+-]?\d+)?)(?: (.+))?")
+LARGER_UNITS = {"Pa": (1e3, 1e-3, "kPa"), "Pa/m": (1e6, 1e-6, "MPa/m")}
+SMALLER_UNITS = {"m": (1e3, "mm"), "m^3": (1e3, "L")}
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals. ValueError if it is not finite."""
+    text = f"{_finite(value):.{decimals}f}"
+    return text.replace("-", "−") if float(text) else text.lstrip("-")
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, as a power of ten if it is small or large.
+
+    Raises ValueError if it is not finite.
+    """
+    if _finite(value) == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if -3 <= power <= 5:
+        return fixed(float(f"{value:.{digits - 1}e}"), max(0, digits - 1 - power))
+    return f"{fixed(float(mantissa), digits - 1)}·10{str(power).translate(SUPERSCRIPTS)}"
+
+
+def percent(share: float, digits: int = 3) -> str:
+    """A share of one as a percentage, to a tenth at the finest."""
+    value = 100.0 * _finite(share)
+    return f"{fixed(value, 1) if abs(value) >= 0.1 ** (digits - 2) else significant(value, 2)} %"
+
+
+def spread(values: list[str]) -> str:
+    """The first and the last of some printed numbers: "a to b", or one if they print alike."""
+    first, last = values[0], values[-1]
+    return first if first == last else f"{first} to {last}"
+
+
+def quantity(text: str) -> str:
+    """A scene's SI quantity as a reader would write it: "9500.0 Pa" becomes "9.5 kPa"."""
+    found = QUANTITY.fullmatch(text)
+    if found is None:
+        return text
+    value, unit = float(found[1]), found[2] or ""
+    threshold, factor, larger = LARGER_UNITS.get(unit, (math.inf, 1.0, unit))
+    if abs(value) >= threshold:
+        value, unit = factor * value, larger
+    elif unit in SMALLER_UNITS and 0 < abs(value) < 0.5:
+        factor, unit = SMALLER_UNITS[unit]
+        value *= factor
+    unit = unit.replace("*", "·").replace("^2", "²").replace("^3", "³")
+    return f"{value:.6g} {unit}".strip()
+
+
+def words(text: str) -> str:
+    """Text without control characters, whose long words may be broken at the end of a line."""
+    clean = "".join(c if c.isprintable() else " " for c in text)
+    return re.sub(rf"\S{{{LONGEST_WORD}}}(?=\S)", lambda found: found[0] + "\u200b", clean)
+
+
+def short(text: str, length: int = 32) -> str:
+    """The beginning of a name, fit for a title of a panel."""
+    clean = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return clean if len(clean) <= length else clean[: length - 1] + "…"
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a number that a report can print")
+    return value

@@ -1,0 +1,107 @@
+"""Make report.pdf of a results folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from concurrent.futures import Future, ThreadPoolExecutor
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from reports.content import document
+from reports.difference_figure import difference_figure
+from reports.field_figures import Views, explain, field_figures, job, views
+from reports.fuzzy_figures import sets_figure, surfaces_figure
+from reports.motion_figures import motion_figures
+from reports.renders import Pictures, render
+from study.results import Results, ResultsError, read
+
+NAME = "report.pdf"
+TEMPLATE = "template.typ"
+Figures = dict[str, list[bytes]]
+Drawing = dict[str, str] | None
+
+
+def make_report(folder: Path) -> None:
+    """Write report.pdf into a results folder; the same results give the same bytes.
+
+    Raises ResultsError for a folder without results, or one that cannot be written.
+    """
+    results = read(folder)
+    figures, drawing = draw(results)
+    _replace(folder / NAME, compile_pdf(document(results) | {"drawing": drawing}, figures))
+
+
+def draw(results: Results) -> tuple[Figures, Drawing]:
+    """SVG figures by place in the document, and what the caption of the organ's pictures says.
+
+    VTK renders in its own process while matplotlib draws the rest.
+    """
+    seen = views(results)
+    with ThreadPoolExecutor(1) as pool:
+        pictures = None if seen is None else pool.submit(render, job(seen))
+        figures = _plots(results)
+    if seen is None or pictures is None:
+        return figures, None
+    return _with_pictures(figures, seen, pictures)
+
+
+def _plots(results: Results) -> Figures:
+    figures: Figures = {"motion": list(motion_figures(results))}
+    if "fuzzy" in results.arrays:
+        figures["sets"] = [sets_figure(results)]
+        figures["surfaces"] = [surfaces_figure(results)]
+    differences = difference_figure(results)
+    if differences is not None:
+        figures["differences"] = [differences]
+    return figures
+
+
+def _with_pictures(
+    figures: Figures, seen: Views, pictures: Future[Pictures]
+) -> tuple[Figures, Drawing]:
+    found = pictures.result()
+    drawn = figures | {"fields": field_figures(seen, found)}
+    return drawn, explain(seen) | {"renderer": found.renderer}
+
+
+def compile_pdf(content: dict[str, Any], figures: Figures) -> bytes:
+    """PDF of the template filled with text and figures.
+
+    Raises ValueError for a number that is not finite, RuntimeError for a template that does not
+    compile, for example because it refers to a label that is missing.
+    """
+    import typst
+
+    names = {place: [f"{place}-{i}.svg" for i in range(len(svg))] for place, svg in figures.items()}
+    text = json.dumps(content | {"figures": names}, allow_nan=False)
+    with tempfile.TemporaryDirectory(prefix="liver-study-") as name:
+        root = Path(name)
+        (root / "content.json").write_text(text, encoding="utf-8")
+        (root / TEMPLATE).write_bytes(template())
+        for place, drawn in figures.items():
+            for file, svg in zip(names[place], drawn, strict=True):
+                (root / file).write_bytes(svg)
+        return bytes(typst.compile(str(root / TEMPLATE), root=name, ignore_system_fonts=True))
+
+
+def template() -> bytes:
+    """The document's typst source."""
+    return resources.files("reports").joinpath(TEMPLATE).read_bytes()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Put a file in its place at once, so that an interrupted run leaves the earlier one."""
+    try:
+        handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            Path(aside).chmod(0o644)
+            Path(aside).replace(path)
+        finally:
+            Path(aside).unlink(missing_ok=True)
+    except OSError as error:
+        raise ResultsError(f"{path}: cannot be written ({error.strerror})") from None
