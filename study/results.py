@@ -105,7 +105,7 @@ def _check_target(folder: Path) -> None:
     if not folder.is_dir():
         return
     present = {path.name for path in folder.iterdir()}
-    foreign = sorted(present - FILES)
+    foreign = sorted(n for n in present - FILES if not n.startswith(".report.pdf"))
     if foreign or (present and MARK not in present):
         name = foreign[0] if foreign else sorted(present)[0]
         raise ResultsError(f"{folder}: holds {name}, which no run wrote; give --out another folder")

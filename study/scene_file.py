@@ -84,10 +84,28 @@ def write_scene(scene: Scene) -> str:
 def resolved(scene: Scene) -> dict[str, Any]:
     """Plain table of every value in use, quantities as text with unit."""
     table = _plain(scene)
+    for key in _unused(scene):
+        _remove(table, key)
     if scene.organ.shape == "point" and scene.organ.mesh is None:
         for key in _MESH_ONLY:
             _remove(table, key)
     return table
+
+
+def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
+    """Keys that mean nothing for the shape and the history in use."""
+    if scene.organ.mesh is not None or scene.organ.shape != "block":
+        yield "organ", "size"
+    if scene.organ.mesh is not None or scene.organ.shape != "liver":
+        yield "organ", "volume"
+    for key, kind in (
+        ("ramp", "ramp-hold-release"),
+        ("hold", "ramp-hold-release"),
+        ("release", "ramp-hold-release"),
+        ("frequency", "sinusoid"),
+    ):
+        if scene.tool.history.kind != kind:
+            yield "tool", "history", key
 
 
 def _load(name: str) -> tuple[dict[str, Any], Path]:

@@ -67,6 +67,7 @@ def run_study(scene: Scene, progress: Progress) -> Results:
         "probes": list(lens.probes),
         "models": outcome.models,
         "checks": outcome.checks,
+        "strain_limit": STRAIN_LIMIT,
         "warnings": _warnings(outcome),
         "assumptions": assumptions(scene, outcome),
         "notes": outcome.notes,

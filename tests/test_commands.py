@@ -1,0 +1,158 @@
+"""The command line, as a person uses it."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from study.results import TABLES
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def study(*arguments, cwd=None, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "study", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        **options,
+    )
+
+
+@pytest.fixture(scope="module")
+def paper_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "paper"
+    done = study("run", "paper", "--out", str(folder))
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_run_writes_every_file_of_the_interface(paper_folder):
+    names = {path.name for path in paper_folder.iterdir()}
+    assert names >= {"scene.toml", "results.json", "report.pdf"} | {f"{t}.csv" for t in TABLES}
+    for table, header in TABLES.items():
+        with (paper_folder / f"{table}.csv").open(newline="") as file:
+            assert tuple(next(csv.reader(file))) == header
+    assert (paper_folder / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_run_of_the_resolved_scene_gives_the_same_scores(paper_folder, tmp_path):
+    done = study(
+        "run", str(paper_folder / "scene.toml"), "--out", str(tmp_path / "again"), "--no-report"
+    )
+    assert done.returncode == 0, done.stderr
+    for table in ("similarity", "curves"):
+        first = (paper_folder / f"{table}.csv").read_text()
+        assert (tmp_path / "again" / f"{table}.csv").read_text() == first
+    assert not (tmp_path / "again" / "report.pdf").exists()
+
+
+def test_the_report_is_made_again_byte_for_byte(paper_folder):
+    before = (paper_folder / "report.pdf").read_bytes()
+    done = study("report", str(paper_folder))
+    assert done.returncode == 0, done.stderr
+    assert (paper_folder / "report.pdf").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "livr"], "did you mean 'liver'"),
+        (["run", "paper", "--set", "tool.froce=1 N"], "did you mean 'force'"),
+        (["run", "paper", "--set", "tool.force=1 kg"], "not a unit like N"),
+        (["run", "block", "--set", "organ.mesh=nowhere.stl"], "nowhere.stl"),
+        (["run", "block", "--set", "reference.element_size=1 mm"], "reference.element_size"),
+        (["report", "nowhere"], "liver-study run"),
+        (["check", "nowhere.toml"], "neither a file nor a built-in"),
+        (["estimate", "--hcv", "nan"], "hcv"),
+        (["estimate", "--hcv", "9500"], "hcv"),
+    ],
+)
+def test_bad_input_ends_with_code_2_one_message_and_nothing_written(arguments, words, tmp_path):
+    done = study(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_an_unknown_option_ends_with_code_2(tmp_path):
+    assert study("run", "paper", "--ouch", cwd=tmp_path).returncode == 2
+
+
+def test_a_mesh_file_that_is_broken_is_refused_by_name(tmp_path):
+    (tmp_path / "broken.stl").write_text("solid nothing")
+    done = study("check", "broken.stl", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "broken.stl" in done.stderr
+
+
+def test_check_tells_what_would_be_run(tmp_path):
+    done = study("check", "block", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "msm-mamdani" in done.stdout
+    assert "critical step" in done.stdout
+    assert not list(tmp_path.iterdir())
+
+
+def test_scenes_are_listed_with_their_titles():
+    done = study("scenes")
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["liver", "block", "paper"]
+
+
+def test_estimate_speaks_kpa_to_people_and_si_to_programs():
+    shown = study("estimate", "--hcv", "9.5").stdout
+    numbers = json.loads(study("estimate", "--hcv", "9.5", "--json").stdout)
+    assert "kPa" in shown
+    value = numbers["mamdani"]["estimate_pa"]
+    assert f"{value / 1e3:.2f}" in shown
+    assert len(numbers["interval-type-2"]["interval_pa"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "forbidden"),
+    [
+        (["--help"], ["numpy", "scipy", "pint", "pydantic", "matplotlib", "pyvista", "skfem"]),
+        (["estimate", "--hcv", "9"], ["vtk", "skfem", "matplotlib", "pint", "numba", "scipy"]),
+    ],
+)
+def test_quick_commands_import_nothing_heavy(arguments, forbidden):
+    code = (
+        "import sys\nfrom study.commands import app\n"
+        f"try:\n    app({arguments!r})\nexcept SystemExit:\n    pass\n"
+        "print('LOADED', *sorted({m.split('.')[0] for m in sys.modules}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    loaded = done.stdout.rpartition("LOADED")[2].split()
+    assert not set(forbidden) & set(loaded)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing_behind(number, tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "study", "run", "block", "--out", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    assert process.stderr is not None
+    for line in process.stderr:  # once the first stage is done the run is under way
+        if line.startswith("organ"):
+            break
+    time.sleep(0.2)
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert not list(tmp_path.iterdir())
