@@ -94,6 +94,8 @@ def resolved(scene: Scene) -> dict[str, Any]:
 
 def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     """Keys that mean nothing for the shape and the history in use."""
+    if scene.organ.mesh is not None:
+        yield "organ", "shape"
     if scene.organ.mesh is not None or scene.organ.shape != "block":
         yield "organ", "size"
     if scene.organ.mesh is not None or scene.organ.shape != "liver":

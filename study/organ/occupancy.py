@@ -62,9 +62,10 @@ def _rasterise(
     tolerance = -1e-12
     first = np.empty(3, np.int64)
     last = np.empty(3, np.int64)
+    rows = np.empty((3, 3))
     for t in range(tetrahedra.shape[0]):
         corner = points[tetrahedra[t]]
-        inverse = np.linalg.inv((corner[1:] - corner[0]).T)
+        _barycentric_rows(corner, rows)
         for axis in range(3):
             low = (corner[:, axis].min() - origin[axis]) / step[axis]
             high = (corner[:, axis].max() - origin[axis]) / step[axis]
@@ -76,8 +77,26 @@ def _rasterise(
                     dx = origin[0] + i * step[0] - corner[0, 0]
                     dy = origin[1] + j * step[1] - corner[0, 1]
                     dz = origin[2] + k * step[2] - corner[0, 2]
-                    a = inverse[0, 0] * dx + inverse[0, 1] * dy + inverse[0, 2] * dz
-                    b = inverse[1, 0] * dx + inverse[1, 1] * dy + inverse[1, 2] * dz
-                    c = inverse[2, 0] * dx + inverse[2, 1] * dy + inverse[2, 2] * dz
+                    a = rows[0, 0] * dx + rows[0, 1] * dy + rows[0, 2] * dz
+                    b = rows[1, 0] * dx + rows[1, 1] * dy + rows[1, 2] * dz
+                    c = rows[2, 0] * dx + rows[2, 1] * dy + rows[2, 2] * dz
                     if min(a, b, c, 1.0 - a - b - c) >= tolerance:
                         inside[i, j, k] = True
+
+
+@numba.njit(cache=True)
+def _barycentric_rows(corner: Floats, rows: Floats) -> None:
+    """Rows of the inverse of the edge matrix, written out: LAPACK would take seconds to compile."""
+    for r in range(3):
+        p, q = corner[1 + (r + 1) % 3], corner[1 + (r + 2) % 3]
+        for d in range(3):
+            e, f = (d + 1) % 3, (d + 2) % 3
+            rows[r, d] = (p[e] - corner[0, e]) * (q[f] - corner[0, f]) - (p[f] - corner[0, f]) * (
+                q[e] - corner[0, e]
+            )
+    six_volumes = 0.0
+    for d in range(3):
+        six_volumes += rows[0, d] * (corner[1, d] - corner[0, d])
+    for r in range(3):
+        for d in range(3):
+            rows[r, d] /= six_volumes
