@@ -51,7 +51,7 @@ class Network(NamedTuple):
 
 
 @overload(tension)
-def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001
+def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001 - typed by law alone
     """Choose the tension by the type of the law, when the kernel is compiled."""
     return TENSIONS.get(getattr(law, "instance_class", type(None)))
 

@@ -26,7 +26,7 @@ class Silent:
     """Says nothing."""
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[Advance]:  # noqa: ARG002 - as Progress
+    def stage(self, name: str) -> Iterator[Advance]:  # noqa: ARG002 - the name is for those that speak
         """See Progress."""
         yield lambda _: None
 
@@ -39,7 +39,7 @@ class Lines:
         """See Progress."""
         start = time.perf_counter()
         yield lambda _: None
-        print(f"{name}: {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
+        print(f"{name}: {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 
 class Bars:

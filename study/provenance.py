@@ -55,7 +55,7 @@ def _commit() -> str | None:
     if git is None or not (ROOT / ".git").exists():
         return None
     command = [git, "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=40"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - git, fixed words
     return done.stdout.strip() or None
 
 

@@ -54,7 +54,7 @@ class Quantity:
 
     def _read_count(self, value: object) -> int:
         if not isinstance(value, int) or isinstance(value, bool):
-            raise ValueError("write a whole number")  # noqa: TRY004 - see _bare
+            raise ValueError("write a whole number")  # noqa: TRY004 - pydantic takes ValueErrors only
         return int(self.read(value))
 
 

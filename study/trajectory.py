@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 class Observation:
     """When and where a model is looked at.
 
-    `times` [s] (samples,), equally spaced from zero; `factors` (samples,): load factor at them;
+    `times` [s] (samples,), equally spaced from zero;
     `probes` [m] (probes, 3); `frames`: samples at which the whole field is kept; `volume_points`
     [m] (q, 3) and `surface_points` [m] (s, 3): where it is kept.
     """

@@ -89,7 +89,7 @@ def _filled(surface: SurfaceMesh, element_size: float) -> Draft:
                 quiet=True,
                 vtk_ordering=True,
             )
-    except Exception as error:
+    except Exception as error:  # a compiled library with errors of its own kinds
         raise MeshError(f"fTetWild could not fill the surface: {error}") from error
     if not len(tetrahedra):
         raise MeshError("fTetWild found nothing inside the surface: is it closed?")

@@ -89,13 +89,12 @@ def assemble(scene: Scene, posed: Posed) -> Assembly:
 def run_lattices(
     scene: Scene,
     posed: Posed,
+    assembly: Assembly,
     estimates: dict[str, Estimate],
     outcome: Outcome,
     progress: Progress,
 ) -> None:
     """Run every lattice model, and type-2's at both ends of its interval, into the outcome."""
-    with progress.stage("lattice"):
-        assembly = assemble(scene, posed)
     _check_mass(scene, posed, assembly, outcome)
     for contender in contenders(scene, estimates):
         _run(scene, posed, assembly, contender, outcome, progress)
@@ -105,6 +104,16 @@ def run_lattices(
             outcome.bounds[f"msm-{system}"] = (
                 _bound(scene, posed, assembly, ends[0], "lower", progress),
                 _bound(scene, posed, assembly, ends[1], "upper", progress),
+            )
+            _note_lost_bounds(system, outcome)
+
+
+def _note_lost_bounds(system: str, outcome: Outcome) -> None:
+    for side, run in zip(("lower", "upper"), outcome.bounds[f"msm-{system}"], strict=True):
+        if run.status == "diverged":
+            outcome.notes.append(
+                f"The run of msm-{system} at the {side} bound of its interval diverged at "
+                f"{run.diverged_at:g} s: its band ends there."
             )
 
 

@@ -10,16 +10,21 @@ from msm import model as lattice_model
 from msm.calibration import POISSON_RATIO, reference_stiffness
 from msm.lattice import interpolation
 from msm.laws import Hooke
+from msm.model import Assembly
 from study.progress import Progress
 from study.run.comparison import best_factor, relative_l2
-from study.run.lattices import assemble
 from study.run.outcome import Outcome
 from study.run.posed import Posed
 from study.scene import Scene
 
 
 def lattice_limits(
-    scene: Scene, posed: Posed, body: Body, outcome: Outcome, progress: Progress
+    scene: Scene,
+    posed: Posed,
+    body: Body,
+    assembly: Assembly,
+    outcome: Outcome,
+    progress: Progress,
 ) -> None:
     """Compare lattice and reference at rest, both with the reference modulus.
 
@@ -29,7 +34,6 @@ def lattice_limits(
     """
     points, volumes = posed.volume_rule.points, posed.volume_rule.weights
     with progress.stage("limits of the lattice at rest"):
-        assembly = assemble(scene, posed)
         law = Hooke(reference_stiffness(scene.tissue.youngs_modulus, scene.lattice.spacing))
         nodal = lattice_model.static_displacement(assembly, law)
         field = interpolation(assembly.lattice, points)[0] @ nodal

@@ -21,10 +21,14 @@ def run_organ(
     scene: Scene, posed: Posed, estimates: dict[str, Estimate], progress: Progress
 ) -> Outcome:
     """Run the finite elements, the benchmark and one lattice per estimate."""
-    from study.run.lattices import node_damping, run_lattices
+    from study.run.lattices import assemble, node_damping, run_lattices
 
     outcome = Outcome(notes=list(posed.geometry.notes))
     outcome.extra["dimensionless"] = dimensionless(scene, posed)
+    has_lattice = bool(set(scene.models) & {"basafa", "msm"})
+    if has_lattice:
+        with progress.stage("lattice"):
+            assembly = assemble(scene, posed)
     if "fem" in scene.models:
         from study.run.reference import run_reference
 
@@ -33,9 +37,9 @@ def run_organ(
         if "msm" in scene.models:
             from study.run.limits import lattice_limits
 
-            lattice_limits(scene, posed, body, outcome, progress)
-    if set(scene.models) & {"basafa", "msm"}:
-        run_lattices(scene, posed, estimates, outcome, progress)
+            lattice_limits(scene, posed, body, assembly, outcome, progress)
+    if has_lattice:
+        run_lattices(scene, posed, assembly, estimates, outcome, progress)
     return outcome
 
 

@@ -44,13 +44,14 @@ def run_reference(
         "largest_strain": found.largest_strain,
     }
     outcome.models.append(record)
-    _add_errors(scene, posed, damping_rate, outcome, record, progress)
+    _add_errors(scene, posed, body, damping_rate, outcome, record, progress)
     return body
 
 
 def _add_errors(
     scene: Scene,
     posed: Posed,
+    body: Body,
     damping_rate: float,
     outcome: Outcome,
     record: dict[str, Any],
@@ -63,12 +64,13 @@ def _add_errors(
             "The finite-element reference has no coarser mesh of this organ to compare with: its "
             "discretisation error is not estimated."
         )
-    mesh = geometry.coarser or geometry.mesh
-    with progress.stage("fem: for its error") as advance:
-        body = fem.build(mesh, scene.tissue, posed.foundation, posed.tool)
-        arguments = (body, damping_rate, posed.factor, posed.observation)
-        steps = scene.reference.steps_per_sample
-        whole = fem.run(*arguments, steps, on_progress=advance).trajectory
+    whole, steps = outcome.runs["fem"], scene.reference.steps_per_sample
+    if geometry.coarser is not None:
+        with progress.stage("fem: coarser mesh") as advance:
+            body = fem.build(geometry.coarser, scene.tissue, posed.foundation, posed.tool)
+            arguments = (body, damping_rate, posed.factor, posed.observation)
+            whole = fem.run(*arguments, steps, on_progress=advance).trajectory
+    arguments = (body, damping_rate, posed.factor, posed.observation)
     with progress.stage("fem: halved steps") as advance:
         half = fem.run(*arguments, 2 * steps, on_progress=advance).trajectory
     outcome.add_time_step_errors(record, posed.probes, whole, half, ORDER)
