@@ -1,25 +1,19 @@
-"""Mamdani inference: min implication, max aggregation, centroid on a grid."""
+"""Mamdani inference: the rules clip the output sets, their union is reduced to its centroid."""
 
 import numpy as np
 
+from fuzzy import exact
+from fuzzy.quadrature import Output, Sampling, centroid, sampled
 from fuzzy.sets import Array, membership
-from fuzzy.system import System, grid, heights, memberships, require_firing, union
+from fuzzy.system import System, firing_strengths, memberships, merged, union
 
 
-def centroid(y: Array, mu: Array) -> Array:
-    """Centre of gravity sum(y mu) / sum(mu) of mu (..., M) sampled at y (M,), shape (...).
-
-    The sum rule of MATLAB's `evalfis`. Raises ValueError where mu is 0 at every sample.
-    """
-    area = mu.sum(axis=-1)
-    if np.any(area <= 0):
-        raise ValueError("the aggregated set is 0 at every sample: raise the number of samples")
-    return np.asarray((mu * y).sum(axis=-1) / area)
-
-
-def evaluate(system: System, X: Array, samples: int) -> Array:
-    """Crisp output (N,) for the readings X (N, inputs), in the output's unit."""
-    fired = heights(system, X, membership)
-    require_firing(system, X, fired)
-    y = grid(system.output, samples)
-    return centroid(y, union(fired, memberships(system.output, y, membership)))
+def evaluate(system: System, X: Array, sampling: Sampling, samples: int) -> Output:
+    """Centroid (N,) for the readings X (N, inputs), in the output's unit."""
+    fired = merged(system, firing_strengths(system, X, membership))
+    if sampling == "exact":
+        values = [exact.centroid(system, heights, membership) for heights in fired.T]
+        return Output(np.array(values), None, fired.max(axis=0))
+    quadrature = sampled(system.output, samples, sampling)
+    mu = memberships(system.output, quadrature.y, membership)
+    return Output(centroid(quadrature, union(fired, mu, system.operators)), None, fired.max(axis=0))

@@ -1,109 +1,313 @@
-"""Fuzzy sets: a membership function and the uncertainty of its position.
+"""Fuzzy sets: a membership function and its footprint of uncertainty.
 
-An uncertain mean moves the whole function by at most `spread` either way. The upper and the lower
-membership are the largest and the smallest value met on the way. Every function here rises to a
-peak and falls after it, so both have closed forms for all kinds alike.
+Kinds and the order of their parameters are those of MATLAB's `.fis` files, which Octave and
+scikit-fuzzy share: a Gaussian is (sd, centre).
+
+A footprint says how far the function may lie from where it is drawn. The upper and the lower
+membership are the largest and the smallest value met on the way; every function with a footprint
+rises to its core, where it is 1, and falls after it, so both have closed forms for all kinds alike.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Kind = Literal["gaussian", "left-shoulder", "right-shoulder", "triangle", "trapezoid"]
+Parameters = tuple[float, ...]
+Kind = Literal[
+    "gaussmf",
+    "gauss2mf",
+    "trimf",
+    "trapmf",
+    "gbellmf",
+    "sigmf",
+    "dsigmf",
+    "psigmf",
+    "zmf",
+    "smf",
+    "pimf",
+    "constant",
+    "linear",
+]
+FUNCTION_KINDS: tuple[Kind, ...] = ("constant", "linear")
+"""Consequents of Sugeno systems: numbers, not sets."""
 
-PARAMETER_COUNT = {
-    "gaussian": 2,
-    "left-shoulder": 2,
-    "right-shoulder": 2,
-    "triangle": 3,
-    "trapezoid": 4,
-}
+
+@dataclass(frozen=True)
+class Footprint:
+    """How far a membership function may lie from its principal form; zero is a type-1 set.
+
+    `mean`: half-width of the uncertain position, in the variable's unit. `spread`: half-width of
+    the uncertain width of its flanks over that width, below 1. `scale` and `lag` lower the lower
+    membership to scale (mu - lag) / (1 - lag), 0 where mu < lag: it starts to rise where the upper
+    one reaches the lag, as MATLAB describes its LowerScale and LowerLag; the form between is ours.
+    """
+
+    mean: float = 0.0
+    spread: float = 0.0
+    scale: float = 1.0
+    lag: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.mean < np.inf:
+            raise ValueError(f"footprint mean {self.mean}: give a half-width of 0 or more")
+        if not 0 <= self.spread < 1:
+            raise ValueError(f"footprint spread {self.spread}: give a fraction from 0 to below 1")
+        if not 0 < self.scale <= 1:
+            raise ValueError(f"footprint scale {self.scale}: give a number above 0, at most 1")
+        if not 0 <= self.lag < 1:
+            raise ValueError(f"footprint lag {self.lag}: give a number from 0 to below 1")
+
+
+TYPE_1 = Footprint()
 
 
 @dataclass(frozen=True)
 class FuzzySet:
-    """A named set on one variable, in the variable's unit.
+    """A named set on one variable, in the variable's unit; `parameters` in the order of FORMS.
 
-    `parameters` are (centre, sd) of a Gaussian or a shoulder, or the corners, left to right, of a
-    triangle or a trapezoid. A left shoulder is 1 below its centre, a right shoulder 1 above.
-    `spread` is the half-width of the uncertain position; 0 is a type-1 set.
+    A `constant` or `linear` one is a consequent of a Sugeno system: linear takes one coefficient
+    per input and then the constant.
     """
 
     name: str
     kind: Kind
-    parameters: tuple[float, ...]
-    spread: float = 0.0
+    parameters: Parameters
+    footprint: Footprint = TYPE_1
 
     def __post_init__(self) -> None:
-        if self.kind not in PARAMETER_COUNT:
-            raise ValueError(f"set {self.name!r}: kind {self.kind!r}; use {[*PARAMETER_COUNT]}")
-        expected = PARAMETER_COUNT[self.kind]
-        if len(self.parameters) != expected:
-            raise ValueError(
-                f"set {self.name!r}: {self.kind} takes {expected} parameters, "
-                f"got {len(self.parameters)}"
-            )
-        if not _shaped(self.kind, self.parameters):
-            raise ValueError(
-                f"set {self.name!r}: parameters {self.parameters} do not form a {self.kind}; "
-                "give a positive sd, or corners that rise and fall over a positive width"
-            )
-        if not 0 <= self.spread < np.inf:
-            raise ValueError(f"set {self.name!r}: spread {self.spread} must be 0 or more")
+        kinds = (*FORMS, *FUNCTION_KINDS)
+        if self.kind not in kinds:
+            raise ValueError(f"set {self.name!r}: kind {self.kind!r}; use {', '.join(kinds)}")
+        _check_parameters(self)
+        _check_footprint(self)
 
 
-def _shaped(kind: Kind, parameters: tuple[float, ...]) -> bool:
-    if not np.isfinite(parameters).all():
-        return False
-    if kind in ("triangle", "trapezoid"):
-        return parameters[0] < parameters[1] <= parameters[-2] < parameters[-1]
-    return parameters[1] > 0
+def _check_parameters(one: FuzzySet) -> None:
+    if not np.isfinite(one.parameters).all():
+        raise ValueError(f"set {one.name!r}: parameters {one.parameters}: give finite numbers")
+    if one.kind in FUNCTION_KINDS:
+        if one.kind == "constant" and len(one.parameters) != 1:
+            raise ValueError(f"set {one.name!r}: a constant takes 1 parameter")
+        return
+    form = FORMS[one.kind]
+    names = form.parameters.split()
+    if len(one.parameters) != len(names):
+        raise ValueError(
+            f"set {one.name!r}: {one.kind} takes {len(names)} parameters ({', '.join(names)}), "
+            f"got {len(one.parameters)}"
+        )
+    if not form.valid(one.parameters):
+        raise ValueError(
+            f"set {one.name!r}: parameters {one.parameters} do not form a {one.kind}; "
+            "give positive widths, slopes other than 0, and corners in rising order"
+        )
 
 
-def gaussian(x: Array, centre: float, sd: float) -> Array:
-    """exp(-(x - centre)^2 / 2 sd^2), MATLAB's `gaussmf`."""
+def _check_footprint(one: FuzzySet) -> None:
+    if one.footprint == TYPE_1:
+        return
+    if one.kind in FUNCTION_KINDS:
+        raise ValueError(f"set {one.name!r}: a {one.kind} consequent takes no footprint")
+    moved, widened = one.footprint.mean > 0, one.footprint.spread > 0
+    if one.kind in ("dsigmf", "psigmf") and (moved or widened):
+        raise ValueError(
+            f"set {one.name!r}: a {one.kind} has no core to move or widen; use scale and lag"
+        )
+    if one.kind == "sigmf" and widened:
+        raise ValueError(
+            f"set {one.name!r}: a sigmf has no core to widen about; use mean, or scale and lag"
+        )
+
+
+def gaussian(x: Array, sd: float, centre: float) -> Array:
+    """exp(-(x - centre)^2 / 2 sd^2)."""
     return np.asarray(np.exp(-0.5 * ((x - centre) / sd) ** 2))
 
 
-def trapezoid(x: Array, a: float, b: float, c: float, d: float) -> Array:
-    """Rises over [a, b], 1 over [b, c], falls over [c, d]."""
-    return np.clip(np.minimum((x - a) / (b - a), (d - x) / (d - c)), 0.0, 1.0)
+def _ramp(x: Array, foot: float, top: float) -> Array:
+    """0 before foot and 1 after top, either way round; a step that is 1 at foot = top."""
+    if foot == top:
+        return np.ones_like(x)
+    return np.clip((x - foot) / (top - foot), 0.0, 1.0)
 
 
-def peak(fuzzy_set: FuzzySet) -> float:
-    """A position where the membership is 1."""
-    corners = fuzzy_set.kind in ("triangle", "trapezoid")
-    return fuzzy_set.parameters[1 if corners else 0]
+def _trapezoid(x: Array, a: float, b: float, c: float, d: float) -> Array:
+    inside = (x >= a) & (x <= d)
+    return np.where(inside, np.minimum(_ramp(x, a, b), _ramp(x, d, c)), 0.0)
 
 
-def membership(fuzzy_set: FuzzySet, x: Array) -> Array:
-    """Type-1 membership of x, any shape, with the set in its central position."""
-    p = fuzzy_set.parameters
-    match fuzzy_set.kind:
-        case "gaussian":
-            return gaussian(x, *p)
-        case "left-shoulder":
-            return gaussian(np.maximum(x, p[0]), *p)
-        case "right-shoulder":
-            return gaussian(np.minimum(x, p[0]), *p)
-        case "triangle":
-            return trapezoid(x, p[0], p[1], p[1], p[2])
-        case "trapezoid":
-            return trapezoid(x, *p)
+def _sigmoid(x: Array, slope: float, centre: float) -> Array:
+    # Neither overflows far from the centre nor loses digits in its tail, as 1 / (1 + exp) would.
+    return np.asarray(np.exp(-np.logaddexp(0.0, -slope * (x - centre))))
 
 
-def upper_membership(fuzzy_set: FuzzySet, x: Array) -> Array:
-    """Largest membership of x over all positions of the set."""
-    # Moving the set by s is moving x by -s; the best x within reach is the one nearest the peak.
-    spread = fuzzy_set.spread
-    return membership(fuzzy_set, np.clip(peak(fuzzy_set), x - spread, x + spread))
+def _spline(x: Array, foot: float, top: float) -> Array:
+    """Two parabolas from 0 at foot to 1 at top, either way round."""
+    t = _ramp(x, foot, top)
+    return np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
 
 
-def lower_membership(fuzzy_set: FuzzySet, x: Array) -> Array:
-    """Smallest membership of x over all positions of the set."""
+def _two_sided(x: Array, p: Parameters) -> Array:
+    return gaussian(np.minimum(x, p[1]), p[0], p[1]) * gaussian(np.maximum(x, p[3]), p[2], p[3])
+
+
+def _bell(x: Array, half_width: float, slope: float, centre: float) -> Array:
+    with np.errstate(over="ignore"):  # 1 / inf is the 0 that it should be
+        return 1.0 / (1.0 + np.abs((x - centre) / half_width) ** (2.0 * slope))
+
+
+def _rising(p: Parameters) -> bool:
+    return p[0] < p[-1] and list(p) == sorted(p)
+
+
+class Form(NamedTuple):
+    """One kind: names of its parameters, when they are valid, the function, ends of its core."""
+
+    parameters: str
+    valid: Callable[[Parameters], bool]
+    function: Callable[[Array, Parameters], Array]
+    core: Callable[[Parameters], tuple[float, float]] | None
+
+
+FORMS: dict[str, Form] = {
+    "gaussmf": Form(
+        "sd centre",
+        lambda p: p[0] > 0,
+        lambda x, p: gaussian(x, *p),
+        lambda p: (p[1], p[1]),
+    ),
+    "gauss2mf": Form(
+        "sd_left centre_left sd_right centre_right",
+        lambda p: p[0] > 0 and p[2] > 0 and p[1] <= p[3],
+        _two_sided,
+        lambda p: (p[1], p[3]),
+    ),
+    "trimf": Form(
+        "foot_left peak foot_right",
+        _rising,
+        lambda x, p: _trapezoid(x, p[0], p[1], p[1], p[2]),
+        lambda p: (p[1], p[1]),
+    ),
+    "trapmf": Form(
+        "foot_left top_left top_right foot_right",
+        _rising,
+        lambda x, p: _trapezoid(x, *p),
+        lambda p: (p[1], p[2]),
+    ),
+    "gbellmf": Form(
+        "half_width slope centre",
+        lambda p: p[0] > 0 and p[1] > 0,
+        lambda x, p: _bell(x, *p),
+        lambda p: (p[2], p[2]),
+    ),
+    "sigmf": Form(
+        "slope centre",
+        lambda p: p[0] != 0,
+        lambda x, p: _sigmoid(x, *p),
+        lambda p: (np.inf, np.inf) if p[0] > 0 else (-np.inf, -np.inf),
+    ),
+    "dsigmf": Form(
+        "slope_1 centre_1 slope_2 centre_2",
+        lambda p: p[0] != 0 and p[2] != 0,
+        lambda x, p: np.abs(_sigmoid(x, p[0], p[1]) - _sigmoid(x, p[2], p[3])),
+        None,
+    ),
+    "psigmf": Form(
+        "slope_1 centre_1 slope_2 centre_2",
+        lambda p: p[0] != 0 and p[2] != 0,
+        lambda x, p: _sigmoid(x, p[0], p[1]) * _sigmoid(x, p[2], p[3]),
+        None,
+    ),
+    "zmf": Form(
+        "top foot",
+        lambda p: p[0] < p[1],
+        lambda x, p: _spline(x, p[1], p[0]),
+        lambda p: (-np.inf, p[0]),
+    ),
+    "smf": Form(
+        "foot top",
+        lambda p: p[0] < p[1],
+        lambda x, p: _spline(x, p[0], p[1]),
+        lambda p: (p[1], np.inf),
+    ),
+    "pimf": Form(
+        "foot_left top_left top_right foot_right",
+        _rising,
+        lambda x, p: np.minimum(_spline(x, p[0], p[1]), _spline(x, p[3], p[2])),
+        lambda p: (p[1], p[2]),
+    ),
+}
+"""Every kind of membership function, by its name in `.fis` files."""
+
+
+def core(one: FuzzySet) -> tuple[float, float]:
+    """Ends of the interval where the membership is 1; infinite where it is open."""
+    ends = FORMS[one.kind].core
+    if ends is None:
+        raise ValueError(f"set {one.name!r}: a {one.kind} has no core")
+    return ends(one.parameters)
+
+
+def corners(one: FuzzySet) -> tuple[float, ...]:
+    """Positions where the function, or a bound of its footprint, is not smooth."""
+    p, shift, widths = one.parameters, one.footprint.mean, one.footprint.spread
+    match one.kind:
+        case "trimf" | "trapmf" | "pimf" | "zmf" | "smf":
+            halves = (0.5 * (p[0] + p[1]), 0.5 * (p[-2] + p[-1]))
+            places = (*p, *(halves if one.kind in ("pimf", "zmf", "smf") else ()))
+        case "gauss2mf":
+            places = (p[1], p[3])
+        case "gaussmf" | "gbellmf":
+            places = (p[-1] if one.kind == "gbellmf" else p[1],)
+        case _:
+            places = ()
+    if not places or (shift == 0 and widths == 0):
+        return places
+    low, high = core(one)
+    stretched = (
+        q + factor * (x - q)
+        for x in places
+        for factor in (1.0 - widths, 1.0, 1.0 + widths)
+        for q in (min(max(x, low), high),)
+    )
+    middle = (0.5 * (low + high),) if np.isfinite([low, high]).all() else ()
+    return (*middle, *(x + s for x in stretched for s in (-shift, 0.0, shift)))
+
+
+def membership(one: FuzzySet, x: Array) -> Array:
+    """Type-1 membership of x, any shape, with the set in its principal form."""
+    if one.kind in FUNCTION_KINDS:
+        raise ValueError(f"set {one.name!r}: a {one.kind} consequent has no membership")
+    return np.asarray(FORMS[one.kind].function(x, one.parameters))
+
+
+def upper_membership(one: FuzzySet, x: Array) -> Array:
+    """Largest membership of x over the footprint."""
+    shift, widths = one.footprint.mean, one.footprint.spread
+    if shift == 0 and widths == 0:
+        return membership(one, x)
+    # Moving the set by s is moving x by -s: the best x within reach is the nearest to the core.
+    nearest = x + np.clip(np.clip(x, *core(one)) - x, -shift, shift)
+    return membership(one, _stretched(one, nearest, 1.0 + widths))
+
+
+def lower_membership(one: FuzzySet, x: Array) -> Array:
+    """Smallest membership of x over the footprint."""
+    shift, widths = one.footprint.mean, one.footprint.spread
     # A function that rises and then falls is smallest at an end of any interval.
-    spread = fuzzy_set.spread
-    return np.minimum(membership(fuzzy_set, x - spread), membership(fuzzy_set, x + spread))
+    moved = (membership(one, _stretched(one, x + s, 1.0 - widths)) for s in {-shift, shift})
+    least = np.minimum.reduce(list(moved))
+    scale, lag = one.footprint.scale, one.footprint.lag
+    return np.asarray(scale * np.maximum(least - lag, 0.0) / (1.0 - lag))
+
+
+def _stretched(one: FuzzySet, x: Array, factor: float) -> Array:
+    """Where the principal form is what one with flanks `factor` times as wide is at x."""
+    if factor == 1.0:
+        return x
+    nearest = np.clip(x, *core(one))
+    return nearest + (x - nearest) / factor

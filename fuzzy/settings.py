@@ -1,40 +1,58 @@
 """Settings of the stiffness estimate: every open reading of the paper that is a parameter."""
 
 from dataclasses import dataclass, field
-from typing import get_args
+from typing import Literal, get_args
 
-from fuzzy.knowledge import parameters
-from fuzzy.rules import Consequent, Duplicates, OddCell
-from fuzzy.system import Merge
+from fuzzy.inference import Options
+from fuzzy.knowledge import Placement, input_records
+from fuzzy.readings import reading_named
+from fuzzy.rules import Consequent
+from fuzzy.table1 import AETIOLOGIES
+
+FootprintKind = Literal["uncertain-mean", "uncertain-spread", "scaled"]
+Absent = Literal["normal", "silent"]
 
 CHOICES = {
-    "sugeno_aggregation": get_args(Merge),
-    "odd_cell": get_args(OddCell),
-    "duplicates": get_args(Duplicates),
     "consequent": get_args(Consequent),
+    "placement": get_args(Placement),
+    "footprint": get_args(FootprintKind),
+    "absent": get_args(Absent),
 }
+LARGEST_FACTOR = 3.0
+"""With it the widest relative footprint is 0.76; at 1 the lower membership would vanish."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How the rule base is read and evaluated.
+    """How the rule base is read, placed on the data and evaluated.
 
-    `samples` points carry the output universe (101 is MATLAB's default). `footprint` is the
-    half-width of every set's uncertain centre over that centre; 0 turns type-2 into type-1.
+    `reading` is a name of READINGS. `placement` puts the centres of HCV's and HBV's sets on the
+    mean of a stage or on the cut-off that diagnoses it. `footprint` is what is uncertain about
+    every set, by `footprint_factor` times the published spread; 0 turns type-2 into type-1.
+    `absent`: an aetiology without a reading has a normal liver's, or (`silent`) the rules that
+    name it are left out.
     """
 
-    samples: int = 101
-    footprint: float = field(default_factory=lambda: parameters()["footprint"])
-    sugeno_aggregation: Merge = "sum"
-    odd_cell: OddCell = "missing-triple"
-    duplicates: Duplicates = "keep"
+    reading: str = "R1"
     consequent: Consequent = "max"
+    placement: Placement = "stage-mean"
+    footprint: FootprintKind = "uncertain-mean"
+    footprint_factor: float = 1.0
+    absent: Absent = "normal"
+    options: Options = field(default_factory=Options)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.samples, int) or self.samples < 11:
-            raise ValueError(f"samples = {self.samples!r}: give a whole number of at least 11")
-        if not 0 <= self.footprint <= 0.5:
-            raise ValueError(f"footprint = {self.footprint!r}: give a fraction from 0 to 0.5")
         for key, allowed in CHOICES.items():
             if getattr(self, key) not in allowed:
                 raise ValueError(f"{key} = {getattr(self, key)!r}: use one of {', '.join(allowed)}")
+        if not 0 <= self.footprint_factor <= LARGEST_FACTOR:
+            raise ValueError(
+                f"footprint_factor = {self.footprint_factor!r}: give a number from 0 to "
+                f"{LARGEST_FACTOR:g}; 1 is the published spread"
+            )
+        counts = reading_named(self.reading).counts
+        for aetiology, count in zip(AETIOLOGIES, counts, strict=True):
+            try:
+                input_records(aetiology, count, self.placement)
+            except ValueError as error:
+                raise ValueError(f"reading = {self.reading!r}: {error}") from error

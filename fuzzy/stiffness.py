@@ -4,44 +4,42 @@ The face of the package. Elastography is published in kPa and the fuzzy systems 
 module alone converts.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 
-from fuzzy import interval_type2, mamdani, sugeno
-from fuzzy.assumptions import assumptions
+from fuzzy import exact
+from fuzzy.inference import SYSTEMS, Inferred, Options, SystemName, infer
 from fuzzy.knowledge import parameters
 from fuzzy.liver import liver_system
-from fuzzy.rules import AETIOLOGIES
 from fuzzy.sets import Array, lower_membership, membership, upper_membership
 from fuzzy.settings import Settings
-from fuzzy.system import System, grid, memberships
+from fuzzy.system import System, memberships
+from fuzzy.table1 import AETIOLOGIES
 
 __all__ = [
     "AETIOLOGIES",
     "NORMAL_LIVER",
+    "PA_PER_KPA",
     "SYSTEMS",
     "Curves",
     "Estimate",
+    "Options",
     "Settings",
-    "assumptions",
+    "SystemName",
     "estimate",
     "evaluate",
+    "liver_row",
     "membership_curves",
+    "patient_system",
     "rule_count",
     "surface",
 ]
 
-SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
-SYSTEMS: tuple[SystemName, ...] = get_args(SystemName)
-
+UNIT = "kPa"
 PA_PER_KPA = 1e3
 NORMAL_LIVER = parameters()["normal_liver"] * PA_PER_KPA  # [Pa]
-
-# The quadrature error is measured against a grid this many times finer.
-REFINEMENT = 20
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,9 @@ class Estimate:
     """Small-strain Young's modulus of the liver on the transient-elastography scale [Pa].
 
     `interval` is the range of centroids of interval type-2, None for the others.
-    `quadrature_error` is the distance to the same system on a 20 times finer output grid; it says
-    nothing about the data or the rules. `notes` tell what was done to the readings.
+    `quadrature_error` is the distance to the same system without sampling, or the tolerance of
+    exact sampling; it says nothing about the data or the rules. `notes` tell what was done to the
+    readings, `method` how the answer was computed.
     """
 
     system: str
@@ -58,6 +57,7 @@ class Estimate:
     interval: tuple[float, float] | None
     quadrature_error: float
     notes: tuple[str, ...]
+    method: str
 
 
 @dataclass(frozen=True)
@@ -76,37 +76,66 @@ def estimate(
 ) -> Estimate:
     """Stiffness [Pa] for elastography readings [Pa] by aetiology.
 
-    An aetiology without a reading takes NORMAL_LIVER; a reading outside the instrument's scale is
-    clamped to it; both leave a note. Raises ValueError for an unknown aetiology or system, and for
-    a reading that is not finite, not positive or so far off that its unit must be wrong.
+    An aetiology without a reading takes NORMAL_LIVER, or its rules are left out, as `absent` says;
+    either leaves a note, as does a reading outside the instrument's scale. Raises ValueError for an
+    unknown aetiology or system, and for a reading that is not finite, not positive, so far off that
+    its unit must be wrong, or refused by `out_of_range`.
     """
     settings = settings or Settings()
-    X = _row(readings)
-    value, interval = evaluate(X, system, settings)
-    fine, _ = evaluate(X, system, _refined(settings))
+    liver, row = patient_system(readings, settings), liver_row(readings)
+    found = infer(liver, row, system, settings.options, UNIT)
     return Estimate(
         system=system,
-        estimate=float(value[0]),
-        interval=None if interval is None else (float(interval[0, 0]), float(interval[0, 1])),
-        quadrature_error=abs(float(value[0] - fine[0])),
-        notes=(*_missing_notes(readings), *_clamp_notes(readings)),
+        estimate=float(found.value[0]) * PA_PER_KPA,
+        interval=_interval(found),
+        quadrature_error=_quadrature_error(liver, row, system, settings, found),
+        notes=(*_missing_notes(readings, settings), *found.notes),
+        method=found.method,
     )
 
 
-def evaluate(X: Array, system: str, settings: Settings | None = None) -> tuple[Array, Array | None]:
+def evaluate(
+    X: Array, system: str, settings: Settings | None = None, present: Collection[str] = AETIOLOGIES
+) -> tuple[Array, Array | None]:
     """Stiffness [Pa] (N,), and the interval (N, 2) of interval type-2, for readings X (N, 5) [Pa].
 
-    Columns follow AETIOLOGIES. Readings are checked and clamped as in `estimate`.
+    Columns follow AETIOLOGIES; with absent="silent" only those `present` take part. Readings are
+    checked as in `estimate`.
     """
     settings = settings or Settings()
-    kpa = _checked(X) / PA_PER_KPA
-    value, interval = _infer(_system(settings), kpa, system, settings)
-    return value * PA_PER_KPA, None if interval is None else interval * PA_PER_KPA
+    found = infer(
+        liver_system(settings, _present(present, settings)),
+        _plausible(np.asarray(X, dtype=np.float64)) / PA_PER_KPA,
+        system,
+        settings.options,
+        UNIT,
+    )
+    interval = None if found.interval is None else found.interval * PA_PER_KPA
+    return found.value * PA_PER_KPA, interval
 
 
 def rule_count(settings: Settings | None = None) -> int:
-    """Number of rules; 247 with the default reading of Table I."""
-    return len(_system(settings or Settings()).rules)
+    """Number of rules; 247 with the default reading of Table I and all aetiologies present."""
+    return len(liver_system(settings or Settings()).rules)
+
+
+def patient_system(readings: Mapping[str, float], settings: Settings) -> System:
+    """The fuzzy system, in kPa, that answers for these aetiologies."""
+    return liver_system(settings, _present(readings, settings))
+
+
+def _present(names: Collection[str], settings: Settings) -> tuple[str, ...]:
+    if settings.absent == "normal":
+        return AETIOLOGIES
+    return tuple(name for name in AETIOLOGIES if name in names)
+
+
+def liver_row(readings: Mapping[str, float]) -> Array:
+    """The readings [Pa] as one row (1, 5) in kPa, a normal liver where there is none."""
+    row = np.full((1, len(AETIOLOGIES)), NORMAL_LIVER)
+    for name, reading in readings.items():
+        row[0, _column(name)] = reading
+    return _plausible(row) / PA_PER_KPA
 
 
 def surface(
@@ -125,20 +154,21 @@ def surface(
     i, j = _column(x_name), _column(y_name)
     if i == j:
         raise ValueError(f"surface over {x_name!r} twice: name two different aetiologies")
+    base = base or {}
     low, high = _scale()
-    x, y = np.linspace([low, low], [high, high], points, axis=1)
-    X = np.tile(_row(base or {}), (points * points, 1))
+    x = y = np.geomspace(low, high, points)  # where the sets are, near the lower end
+    X = np.tile(liver_row(base) * PA_PER_KPA, (points * points, 1))
     X[:, i], X[:, j] = (axis.ravel() for axis in np.meshgrid(x, y))
-    z, _ = evaluate(X, system, settings)
+    z, _ = evaluate(X, system, settings, {*base, x_name, y_name})
     return x, y, z.reshape(points, points)
 
 
 def membership_curves(settings: Settings | None = None, points: int = 401) -> dict[str, Curves]:
     """Curves of every input and of the output, by variable name."""
-    liver = _system(settings or Settings())
+    liver = liver_system(settings or Settings())
     curves = {}
     for variable in (*liver.inputs, liver.output):
-        x = grid(variable, points)
+        x = np.linspace(variable.low, variable.high, points)
         curves[variable.name] = Curves(
             sets=tuple(fuzzy_set.name for fuzzy_set in variable.sets),
             x=x * PA_PER_KPA,
@@ -149,38 +179,20 @@ def membership_curves(settings: Settings | None = None, points: int = 401) -> di
     return curves
 
 
-def _system(settings: Settings) -> System:
-    return liver_system(
-        footprint=settings.footprint,
-        odd_cell=settings.odd_cell,
-        duplicates=settings.duplicates,
-        consequent=settings.consequent,
-    )
+def _interval(found: Inferred) -> tuple[float, float] | None:
+    if found.interval is None:
+        return None
+    low, high = found.interval[0] * PA_PER_KPA
+    return float(low), float(high)
 
 
-def _infer(liver: System, X: Array, system: str, settings: Settings) -> tuple[Array, Array | None]:
-    match system:
-        case "mamdani":
-            return mamdani.evaluate(liver, X, settings.samples), None
-        case "sugeno":
-            merge = settings.sugeno_aggregation
-            return sugeno.evaluate(liver, X, settings.samples, merge), None
-        case "interval-type-2":
-            return interval_type2.evaluate(liver, X, settings.samples)
-    raise ValueError(f"system {system!r}: use one of {', '.join(SYSTEMS)}")
-
-
-def _refined(settings: Settings) -> Settings:
-    """Each interval of the output grid cut in REFINEMENT, so that the coarse points remain."""
-    return replace(settings, samples=REFINEMENT * (settings.samples - 1) + 1)
-
-
-def _row(readings: Mapping[str, float]) -> Array:
-    """The readings as one row (1, 5) [Pa], a normal liver where there is none."""
-    row = np.full((1, len(AETIOLOGIES)), NORMAL_LIVER)
-    for name, reading in readings.items():
-        row[0, _column(name)] = reading
-    return row
+def _quadrature_error(
+    liver: System, row: Array, system: str, settings: Settings, found: Inferred
+) -> float:
+    if settings.options.sampling == "exact":
+        return exact.TOLERANCE * (liver.output.high - liver.output.low) * PA_PER_KPA
+    continuous = infer(liver, row, system, replace(settings.options, sampling="exact"), UNIT)
+    return abs(float(found.value[0] - continuous.value[0])) * PA_PER_KPA
 
 
 def _column(name: str) -> int:
@@ -194,15 +206,15 @@ def _scale() -> tuple[float, float]:
     return parameters()["input_low"] * PA_PER_KPA, parameters()["input_high"] * PA_PER_KPA
 
 
-def _checked(X: Array) -> Array:
-    """X [Pa] clamped to the instrument's scale, once every reading is found plausible."""
+def _plausible(X: Array) -> Array:
+    """X [Pa] once no reading is beyond any liver."""
     low, high = (parameters()[key] * PA_PER_KPA for key in ("plausible_low", "plausible_high"))
     # Written so that NaN, for which no comparison holds, counts as implausible.
     bad = np.argwhere(~((low <= X) & (high >= X)))
     if bad.size:
         row, column = bad[0]
         raise ValueError(_refusal(AETIOLOGIES[column], X[row, column]))
-    return np.clip(X, *_scale())
+    return X
 
 
 def _refusal(name: str, reading: float) -> str:
@@ -215,19 +227,9 @@ def _refusal(name: str, reading: float) -> str:
     )
 
 
-def _missing_notes(readings: Mapping[str, float]) -> list[str]:
-    return [
-        f"{name}: no reading; the normal liver's {NORMAL_LIVER / PA_PER_KPA:g} kPa taken"
-        for name in AETIOLOGIES
-        if name not in readings
-    ]
-
-
-def _clamp_notes(readings: Mapping[str, float]) -> list[str]:
-    low, high = _scale()
-    return [
-        f"{name}: reading {reading / PA_PER_KPA:g} kPa is outside the instrument's scale "
-        f"{low / PA_PER_KPA:g}-{high / PA_PER_KPA:g} kPa; clamped to it"
-        for name, reading in readings.items()
-        if not low <= reading <= high
-    ]
+def _missing_notes(readings: Mapping[str, float], settings: Settings) -> list[str]:
+    done = {
+        "normal": f"the normal liver's {NORMAL_LIVER / PA_PER_KPA:g} kPa taken",
+        "silent": "the rules that name it left out",
+    }[settings.absent]
+    return [f"{name}: no reading; {done}" for name in AETIOLOGIES if name not in readings]

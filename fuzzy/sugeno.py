@@ -1,27 +1,52 @@
-"""Sugeno inference with the constants MATLAB's `mam2sug` takes from a Mamdani system."""
+"""Sugeno inference: a weighted average of numbers instead of an area.
+
+A Mamdani system is converted as MATLAB does: every output set becomes the constant at the centroid
+of the whole set on the output's universe, and rules and operators stay.
+"""
 
 import numpy as np
 
-from fuzzy.mamdani import centroid
+from fuzzy import exact
+from fuzzy.quadrature import Output, Sampling, centroid, sampled
 from fuzzy.sets import Array, membership
-from fuzzy.system import Merge, System, grid, heights, memberships, require_firing
+from fuzzy.system import Merge, System, firing_strengths, memberships, merged
 
 
-def constants(system: System, samples: int) -> Array:
-    """Centroid of each whole output set on the output universe, shape (sets,).
+def consequents(system: System, sampling: Sampling, samples: int) -> Array:
+    """Coefficients (sets, inputs + 1) of each consequent, one per input and then the constant.
 
     A set cut by an end of the universe has its centroid off its centre.
     """
-    y = grid(system.output, samples)
-    return centroid(y, memberships(system.output, y, membership))
+    table = np.zeros((len(system.output.sets), len(system.inputs) + 1))
+    if not system.is_sugeno:
+        table[:, -1] = constants(system, sampling, samples)
+        return table
+    for k, one in enumerate(system.output.sets):
+        table[k, -len(one.parameters) :] = one.parameters
+    return table
 
 
-def evaluate(system: System, X: Array, samples: int, merge: Merge) -> Array:
-    """Weighted average (N,) of the constants for the readings X (N, inputs).
+def constants(system: System, sampling: Sampling, samples: int) -> Array:
+    """Centroid of each whole output set on the output's universe, shape (sets,)."""
+    if sampling == "exact":
+        whole = np.eye(len(system.output.sets))
+        return np.array([exact.centroid(system, heights, membership) for heights in whole])
+    quadrature = sampled(system.output, samples, sampling)
+    return centroid(quadrature, memberships(system.output, quadrature.y, membership))
+
+
+def evaluate(system: System, X: Array, sampling: Sampling, samples: int, merge: Merge) -> Output:
+    """Weighted average (N,) of the consequents for the readings X (N, inputs).
 
     merge="sum" weighs every rule, as MATLAB does, so that a repeated rule counts twice; "max"
-    weighs every output set once, by its strongest rule, as Mamdani's aggregation does.
+    weighs every output set once, by its strongest rule, as Mamdani's aggregation and Octave do.
     """
-    weights = heights(system, X, membership, merge)
-    require_firing(system, X, weights)
-    return np.asarray(constants(system, samples) @ weights / weights.sum(axis=0))
+    strengths = firing_strengths(system, X, membership)
+    weights = merged(system, strengths, merge)
+    table = consequents(system, sampling, samples)
+    answers = table[:, :-1] @ X.T + table[:, -1:]
+    total = weights.sum(axis=0)
+    value = np.divide(
+        (weights * answers).sum(axis=0), total, out=np.full_like(total, np.nan), where=total > 0
+    )
+    return Output(value, None, strengths.max(axis=0))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from reports import summary, tables
+from reports import fuzzy_tables, summary, tables
 from reports.digits import fixed, percent, short, words
 from reports.motion_figures import shown_probes
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
+from reports.rule_view import view_names
 from study.results import Results
 
 SCENE_COLUMNS = 3
@@ -27,6 +28,10 @@ def document(results: Results) -> dict[str, Any]:
         "is_built_in_liver": _is_built_in_liver(numbers["scene"]),
         "scene": tables.balanced(_scene(results), SCENE_COLUMNS),
         "estimates": tables.estimate_rows(results),
+        "stiffness_sets": fuzzy_tables.set_rows(results),
+        "unsourced_sets": [str(count) for count in fuzzy_tables.unsourced_count(results)],
+        "rule_views": view_names(results),
+        "sensitivity": fuzzy_tables.sensitivity_table(results),
         "estimate_notes": tables.estimate_notes(results),
         "rule_count": str(numbers.get("rule_count") or ""),
         "probes_left_out": len(numbers["probes"]) - len(shown_probes(results)),

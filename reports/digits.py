@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 import re
 
+Table = list[list[str]]
+"""Cells of a table, row by row."""
+
+PA_PER_KPA = 1e3
 DASH = "–"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LONGEST_WORD = 20

@@ -2,45 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports import canvas
-from reports.appearance import FUZZY_PREFIX, look, system_name
+from reports.appearance import FUZZY_PREFIX, SYSTEM_NAMES, look, system_name
 from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float64]
 
 KILO = 1e-3
-SET_COLOURS = ("#0072B2", "#E69F00", "#882255", "#009E73")
-SET_DASHES: tuple[Any, ...] = ("-", (0, (4, 1.2)), (0, (1.2, 1)), (0, (5, 1, 1, 1)))
+SET_LOOKS: tuple[tuple[str, Any], ...] = (
+    ("#009E73", (0, (5, 1, 1, 1))),
+    ("#0072B2", "-"),
+    ("#E69F00", (0, (4, 1.2))),
+    ("#882255", (0, (1.2, 1))),
+)
+SET_NAMES = {"F1": 0, "F2": 1, "F3": 2, "F4": 3, "mild": 1, "moderate": 2, "severe": 3}
+"""Look of a stage in every panel; an output set has that of the stage it starts with."""
 SURFACE_HEIGHT = 3.7
-PANEL_HEIGHT = 1.5
+PANEL_HEIGHT = 1.6
+TICKS = 4
 COLUMNS = 3
 AT_REST = 0.01
-LEGEND_ROOM = 1.5
+ROOM = 1.1
 OUTPUT = "stiffness"
+DEFAULT_INPUTS = ("hcv", "hbv")
 
 
-def variables(arrays: dict[str, NDArray[Any]]) -> list[str]:
+def variables(arrays: Arrays) -> list[str]:
     """Variables whose sets can be drawn, in order."""
     return [name.removesuffix(".sets") for name in arrays if name.endswith(".sets")]
 
 
-def systems(arrays: dict[str, NDArray[Any]]) -> list[str]:
+def systems(arrays: Arrays) -> list[str]:
     """Systems whose output surface can be drawn, in order."""
     names = [name.removeprefix("surface.") for name in arrays if name.startswith("surface.")]
     return [name for name in names if name not in ("x", "y")]
 
 
 def sets_figure(results: Results) -> bytes:
-    """Sets of every variable with their footprints, over kPa."""
-    arrays = results.arrays["fuzzy"]
+    """Sets of every variable with their footprints, and the estimates, over kPa."""
+    found = results.numbers["stiffness"]
+    estimates = {system: one["estimate_pa"] for system, one in found.items()}
+    return draw_sets(results.arrays["fuzzy"], estimates)
+
+
+def draw_sets(arrays: Arrays, estimates: Mapping[str, float]) -> bytes:
+    """The same as SVG, from the arrays and the estimate [Pa] of each system."""
     names = variables(arrays)
     rows = -(-len(names) // COLUMNS)
     with canvas.style():
@@ -52,46 +68,76 @@ def sets_figure(results: Results) -> bytes:
             axes.set_title("output: stiffness" if is_output else name.upper(), fontweight="bold")
             axes.set_xlabel("Young's modulus [kPa]" if is_output else "reading [kPa]")
             if is_output:
-                _mark_estimates(axes, results)
+                _mark_estimates(axes, estimates)
         for axes in grid[len(names) :]:
             axes.set_axis_off()
         for axes in grid[::COLUMNS]:
             axes.set_ylabel("membership")
+        figure.legend(handles=_legend(grid), loc="outside upper center", ncols=6)
         return canvas.svg(figure)
 
 
-def _draw_sets(axes: Axes, arrays: dict[str, NDArray[Any]], variable: str) -> None:
+def _draw_sets(axes: Axes, arrays: Arrays, variable: str) -> None:
     x = KILO * arrays[f"{variable}.x"]
     for i, name in enumerate(arrays[f"{variable}.sets"]):
-        colour, dashes = SET_COLOURS[i % 4], SET_DASHES[i % 4]
+        colour, dashes = SET_LOOKS[SET_NAMES.get(str(name), i) % len(SET_LOOKS)]
         lower, upper = arrays[f"{variable}.lower"][i], arrays[f"{variable}.upper"][i]
         axes.fill_between(x, lower, upper, color=colour, alpha=0.25, linewidth=0)
         line = {"color": colour, "linestyle": dashes, "linewidth": 1.1}
         axes.plot(x, arrays[f"{variable}.principal"][i], label=str(name), **line)
-    axes.set(xlim=(x[0], _last_change(x, arrays[f"{variable}.upper"])), ylim=(0.0, 1.05))
-    axes.legend(loc="center right", handlelength=2.4)
+    bounds = np.concatenate([arrays[f"{variable}.lower"], arrays[f"{variable}.upper"]])
+    axes.set(xlim=(x[0], _last_change(x, bounds)), ylim=(0.0, 1.05))
+
+
+def _legend(panels: Iterable[Any]) -> list[Any]:
+    """One entry per look; sets of one look are named together, mildest first, then the systems."""
+    entries: dict[tuple[str, str], Any] = {}
+    names: dict[tuple[str, str], list[str]] = {}
+    for axes in panels:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            key = (str(handle.get_color()), str(handle.get_linestyle()))
+            entries.setdefault(key, handle)
+            names.setdefault(key, []).append(name)
+    for key, handle in entries.items():
+        handle.set_label(", ".join(dict.fromkeys(names[key])))
+    return sorted(entries.values(), key=lambda handle: _rank(handle.get_label()))
+
+
+def _rank(label: str) -> tuple[bool, str]:
+    return label in SYSTEM_NAMES.values(), label
 
 
 def _last_change(x: Floats, memberships: Floats) -> float:
-    """Where the sets have come to rest, and room for the legend."""
+    """Where the sets have come to rest, and a little room."""
     moving = np.abs(memberships - memberships[:, -1:]).max(axis=0) > AT_REST
-    return float(min(x[-1], LEGEND_ROOM * x[moving].max(initial=x[0])))
+    return float(min(x[-1], ROOM * x[moving].max())) if moving.any() else float(x[-1])
 
 
-def _mark_estimates(axes: Axes, results: Results) -> None:
-    """Estimates as lines at the top of the output's panel."""
-    for system, found in results.numbers["stiffness"].items():
+def _mark_estimates(axes: Axes, estimates: Mapping[str, float]) -> None:
+    """Estimates as lines across the output's panel."""
+    for system, modulus in estimates.items():
         colour = look(f"{FUZZY_PREFIX}{system}").colour
-        axes.axvline(KILO * found["estimate_pa"], color=colour, linewidth=1.0, zorder=1.5)
+        line: dict[str, Any] = {"color": colour, "linewidth": 1.0, "zorder": 1.5}
+        axes.axvline(KILO * modulus, label=system_name(system), **line)
+
+
+def surface_inputs(results: Results) -> tuple[str, str]:
+    """The two inputs that the surfaces are drawn over."""
+    first, second = results.numbers.get("surface_inputs", DEFAULT_INPUTS)
+    return str(first), str(second)
 
 
 def surfaces_figure(results: Results) -> bytes:
     """Output of each system over two readings: as a surface, and in pseudo-colour."""
-    arrays = results.arrays["fuzzy"]
+    return draw_surfaces(results.arrays["fuzzy"], surface_inputs(results))
+
+
+def draw_surfaces(arrays: Arrays, inputs: tuple[str, str]) -> bytes:
+    """The same as SVG, from the arrays and the names of the two inputs."""
+    labels = [f"{name.upper()} [kPa]" for name in inputs]
     names = systems(arrays)
-    x, y = KILO * arrays["surface.x"], KILO * arrays["surface.y"]
-    surfaces = [KILO * arrays[f"surface.{name}"] for name in names]
-    scale = {"vmin": min(z.min() for z in surfaces), "vmax": max(z.max() for z in surfaces)}
+    x, y, surfaces = _changing(arrays, names)
+    scale = _scale(surfaces)
     with canvas.style():
         figure = canvas.sheet(SURFACE_HEIGHT)
         grid = figure.add_gridspec(2, len(names), height_ratios=(1.25, 1.0))
@@ -100,23 +146,46 @@ def surfaces_figure(results: Results) -> bytes:
             solid = figure.add_subplot(grid[0, i], projection="3d")
             solid.set_title(system_name(name), fontweight="bold", pad=0)
             _draw_solid(solid, x, y, z, scale)
+            _label_solid(solid, labels)
             flat.append(figure.add_subplot(grid[1, i]))
             image = flat[-1].pcolormesh(x, y, z, rasterized=True, shading="gouraud", **scale)
-            flat[-1].set(xlabel="HCV [kPa]", ylabel="HBV [kPa]" if i == 0 else "")
+            flat[-1].set(xlabel=labels[0], ylabel=labels[1] if i == 0 else "")
+            flat[-1].locator_params(nbins=TICKS)
             flat[-1].grid(visible=False)
         figure.colorbar(image, ax=flat, label="stiffness [kPa]")
         return canvas.svg(figure)
 
 
-def _draw_solid(axes: Any, x: Floats, y: Floats, z: Floats, scale: dict[str, float]) -> None:
+def _changing(arrays: Arrays, names: list[str]) -> tuple[Floats, Floats, list[Floats]]:
+    """The part of the surfaces, in kPa, beyond which they hardly change any more."""
+    x, y = KILO * arrays["surface.x"], KILO * arrays["surface.y"]
+    z = KILO * np.array([arrays[f"surface.{name}"] for name in names])
+    rows, columns = z.swapaxes(1, 2).reshape(-1, len(y)), z.reshape(-1, len(x))
+    scale = np.ptp(z) or 1.0
+    i = int(np.searchsorted(y, _last_change(y, rows / scale))) + 1
+    j = int(np.searchsorted(x, _last_change(x, columns / scale))) + 1
+    return x[:j], y[:i], list(z[:, :i, :j])
+
+
+def _scale(surfaces: list[Floats]) -> dict[str, Any]:
+    """Range of all surfaces, of some width also where they are flat."""
+    low, high = min(z.min() for z in surfaces), max(z.max() for z in surfaces)
+    return {"vmin": float(low), "vmax": float(high) if high > low else float(low) + 1.0}
+
+
+def _draw_solid(axes: Any, x: Floats, y: Floats, z: Floats, scale: dict[str, Any]) -> None:
     x_grid, y_grid = np.meshgrid(x, y)  # z[i, j] belongs to y[i], x[j]
     axes.plot_surface(
         x_grid, y_grid, z, cmap="viridis", rcount=41, ccount=41, rasterized=True, **scale
     )
     axes.set_zlim(scale["vmin"], scale["vmax"])
-    axes.set_xlabel("HCV [kPa]", labelpad=-6)
-    axes.set_ylabel("HBV [kPa]", labelpad=-6)
-    axes.set_zlabel("[kPa]", labelpad=-7)
+    axes.locator_params(nbins=TICKS)
     axes.tick_params(pad=-3, labelsize=5.5)
     axes.view_init(elev=28, azim=-128)
     axes.set_box_aspect(None, zoom=0.88)
+
+
+def _label_solid(axes: Any, labels: list[str]) -> None:
+    axes.set_xlabel(labels[0], labelpad=-6)
+    axes.set_ylabel(labels[1], labelpad=-6)
+    axes.set_zlabel("[kPa]", labelpad=-7)

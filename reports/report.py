@@ -16,6 +16,8 @@ from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
 from reports.renders import Pictures, render
+from reports.rule_view import rule_figures
+from reports.sensitivity_figure import sensitivity_figure
 from study.results import Results, ResultsError, read
 
 NAME = "report.pdf"
@@ -53,6 +55,10 @@ def _plots(results: Results) -> Figures:
     if "fuzzy" in results.arrays:
         figures["sets"] = [sets_figure(results)]
         figures["surfaces"] = [surfaces_figure(results)]
+        figures["rules"] = rule_figures(results)
+    sensitivity = sensitivity_figure(results)
+    if sensitivity is not None:
+        figures["sensitivity"] = [sensitivity]
     differences = difference_figure(results)
     if differences is not None:
         figures["differences"] = [differences]

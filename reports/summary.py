@@ -6,15 +6,21 @@ from collections.abc import Iterator
 from typing import Any
 
 from reports.appearance import look, reference_name, system_name, system_of
-from reports.digits import DASH, fixed, percent, quantity, significant, spread, words
+from reports.digits import (
+    DASH,
+    PA_PER_KPA,
+    fixed,
+    percent,
+    quantity,
+    significant,
+    spread,
+    words,
+)
+from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
 from reports.ranking import Verdict, references, tool_probe, verdicts
 from study.results import Results
 
-Table = list[list[str]]
-
-PA_PER_KPA = 1e3
-"""Up to it linear strain is trusted here."""
 GLANCE = (
     "model",
     "modulus [kPa]",
@@ -86,6 +92,7 @@ def sentences(results: Results) -> list[str]:
     """What this run found, in a few sentences."""
     return [
         *_estimates(results),
+        *sensitivity_sentences(results),
         *_fields(results),
         *_limits(results),
         *_rankings(results),

@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from reports.appearance import look, reference_name, system_name, system_of
-from reports.digits import DASH, fixed, percent, quantity, significant, words
+from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, quantity, significant, words
 from reports.paper import TABLE_III
 from reports.ranking import (
     Column,
@@ -19,7 +19,7 @@ from reports.ranking import (
     tool_probe,
     verdicts,
 )
-from reports.summary import PA_PER_KPA, Table, field_errors, status
+from reports.summary import field_errors, status
 from study.results import Results
 from study.similarity.score import FORMULAS
 

@@ -3,6 +3,7 @@
 scene.toml      the scene in full          curves.csv      motion at the control points
 results.json    numbers, provenance        bands.csv       type-2 interval carried through
 similarity.csv  score of each pair         errors.csv      differences of the whole field
+sensitivity.csv choices of the fuzzy side
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
 """
 
@@ -38,8 +39,21 @@ TABLES: dict[str, tuple[str, ...]] = {
     ),
     "similarity": ("model", "reference", "probe", "curve", "measure", "score"),
     "errors": ("model", "reference", "quantity", "value"),
+    "sensitivity": (
+        "choice",
+        "base",
+        "alternative",
+        "system",
+        "change_at_readings_pa",
+        "rms_change_pa",
+        "largest_change_pa",
+        "readings",
+    ),
 }
-TEXT_COLUMNS = {"model", "probe", "reference", "curve", "measure", "quantity"}
+TEXT_COLUMNS = {
+    *("model", "probe", "reference", "curve", "measure", "quantity"),
+    *("choice", "base", "alternative", "system"),
+}
 FILES = {MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", *(f"{t}.csv" for t in TABLES)}
 Row = tuple[str | float, ...]
 

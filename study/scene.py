@@ -23,6 +23,7 @@ Component = Annotated[float, Quantity("", -1.0, 1.0)]
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
 ModelName = Literal["fem", "basafa", "msm"]
+Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,13 +115,28 @@ class Patient:
 
 @dataclass(frozen=True, kw_only=True)
 class Fuzzy:
-    """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt."""
+    """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt.
+
+    `reading` of Table I by name, `consequent` of a combination, `placement` of the sets on
+    elastography data, `footprint` of uncertainty and its factor on the published spread, what an
+    `absent` reading does; then how the systems are evaluated. `surface`: the two readings of the
+    output surfaces. `sensitivity_readings`: readings over which each of these choices is varied.
+    """
 
     systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
-    samples: Annotated[int, Quantity("", 11, 100_001)] = 101
-    footprint: Annotated[float, Quantity("", 0.0, 0.5)] = 0.08
-    sugeno_aggregation: Literal["sum", "max"] = "sum"
+    reading: str = "R1"
     consequent: Literal["max", "mean"] = "max"
+    placement: Literal["stage-mean", "cut-off"] = "stage-mean"
+    footprint: Literal["uncertain-mean", "uncertain-spread", "scaled"] = "uncertain-mean"
+    footprint_factor: Annotated[float, Quantity("", 0.0, 3.0)] = 1.0
+    absent: Literal["normal", "silent"] = "normal"
+    sampling: Literal["matlab", "octave", "exact"] = "matlab"
+    samples: Annotated[int, Quantity("", 11, 100_001)] = 101
+    sugeno_aggregation: Literal["sum", "max"] = "sum"
+    reducer: Literal["karnik-mendel", "eiasc", "nie-tan"] = "karnik-mendel"
+    out_of_range: Literal["clamp", "raise", "matlab"] = "clamp"
+    surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
+    sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -217,6 +217,10 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield "fuzzy.systems: empty; name a system or leave msm out of models"
     if len(set(scene.fuzzy.systems)) < len(scene.fuzzy.systems):
         yield "fuzzy.systems: a system is named twice"
+    if len(set(scene.fuzzy.surface)) < len(scene.fuzzy.surface):
+        yield "fuzzy.surface: names one reading twice; name two different ones"
+    if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
+        yield "fuzzy.samples: has no effect with exact sampling; remove it"
     if scene.lattice.volume_term:
         yield "lattice.volume_term: the spring lattice has no volume term yet; set it to false"
     if scene.organ.mesh is None and scene.organ.unit is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzzy import stiffness
+from fuzzy.assumptions import assumptions as fuzzy_assumptions
 from study.run.estimates import settings
 from study.run.outcome import Outcome
 from study.scene import Scene
@@ -15,7 +15,7 @@ def assumptions(scene: Scene, outcome: Outcome) -> list[str]:
     found += _point(scene, point["mass_kg"]) if point else _organ(scene)
     if "msm" in scene.models:
         found += _springs(scene)
-        found += stiffness.assumptions(settings(scene))
+        found += fuzzy_assumptions(settings(scene))
     return [*found, *_similarity()]
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy import stiffness
 from study.progress import Progress
 from study.provenance import provenance
 from study.results import SCHEMA_VERSION, Results
@@ -34,10 +33,10 @@ def run_study(scene: Scene, progress: Progress) -> Results:
     Raises ValueError for an organ, support or tool that cannot be used.
     """
     started = time.perf_counter()
-    found = fuzzy_side.estimates(scene) if "msm" in scene.models else {}
-    arrays: dict[str, dict[str, NDArray[Any]]] = {}
-    if found:
-        arrays["fuzzy"] = fuzzy_side.drawings(scene)
+    with progress.stage("fuzzy systems"):
+        fuzzy = fuzzy_side.run_fuzzy(scene) if "msm" in scene.models else fuzzy_side.NONE
+    found = fuzzy.estimates
+    arrays: dict[str, dict[str, NDArray[Any]]] = {"fuzzy": fuzzy.arrays} if found else {}
     if is_point(scene):
         from study.run import point
 
@@ -56,21 +55,20 @@ def run_study(scene: Scene, progress: Progress) -> Results:
             "probes": posed.observation.probes,
         } | {name: run.surface_field for name, run in outcome.runs.items()}
     with progress.stage("similarity"):
-        tables = _tables(lens, outcome)
+        tables = _tables(lens, outcome) | {"sensitivity": fuzzy.sensitivity}
     text = write_scene(scene)
     numbers: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "title": scene.title,
         "scene": resolved(scene),
-        "stiffness": fuzzy_side.as_numbers(found, scene.tissue.youngs_modulus),
-        "rule_count": stiffness.rule_count(fuzzy_side.settings(scene)) if found else None,
+        **fuzzy.numbers,
         "probes": list(lens.probes),
         "models": outcome.models,
         "checks": outcome.checks,
         "strain_limit": STRAIN_LIMIT,
         "warnings": _warnings(outcome),
         "assumptions": assumptions(scene, outcome),
-        "notes": outcome.notes,
+        "notes": [*fuzzy.notes, *outcome.notes],
         "study_wall_s": time.perf_counter() - started,
         "provenance": provenance(text, scene.organ.mesh),
     }

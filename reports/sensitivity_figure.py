@@ -1,0 +1,138 @@
+"""How far each open choice moves the estimate, beside the differences between the systems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from reports import canvas
+from reports.appearance import FUZZY_PREFIX, look, system_name
+from reports.digits import words
+from reports.fuzzy_tables import (
+    SYSTEM,
+    Change,
+    between_systems,
+    changes,
+    heading,
+)
+from study.results import Results
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LINE_HEIGHT = 0.132
+FRAME_HEIGHT = 0.75
+GROUP_GAP = 0.55
+"""Between two choices, in lines."""
+SPREAD = 0.26
+"""Between the systems' marks on one line, in lines."""
+KILO = 1e-3
+LEAST = 1e-3
+"""Smallest change drawn to scale [kPa]."""
+MARKS = {"mamdani": "o", "sugeno": "s", "interval-type-2": "D"}
+
+Line = tuple[float, str, list[Change]]
+"""Position, label and changes of one alternative."""
+
+
+def sensitivity_figure(results: Results) -> bytes | None:
+    """Rms and largest change per alternative and system, or None if there are none."""
+    return draw_sensitivity(changes(results))
+
+
+def draw_sensitivity(found: Sequence[Change]) -> bytes | None:
+    """The same as SVG, from the rows."""
+    inner = [change for change in found if change.choice != SYSTEM]
+    if not inner:
+        return None
+    lines, heads = layout(inner)
+    bottom = lines[-1][0] + 0.8
+    with canvas.style():
+        figure = canvas.sheet(FRAME_HEIGHT + LINE_HEIGHT * bottom)
+        axes = figure.subplots()
+        axes.set(xscale="log", ylim=(bottom, -0.9), xlim=(LEAST / 1.35, 1.6 * _most(inner)))
+        _draw_band(axes, list(found))
+        for line in lines:
+            _draw_line(axes, line)
+        _label(axes, lines, heads)
+        figure.legend(handles=_legend(inner, axes), loc="outside upper center", ncols=6)
+        return canvas.svg(figure)
+
+
+def layout(found: Sequence[Change]) -> tuple[list[Line], list[tuple[float, str]]]:
+    """Lines of the alternatives from the top, and the head of each choice, with their positions."""
+    lines: list[Line] = []
+    heads: list[tuple[float, str]] = []
+    y = 0.0
+    for name, members in groupby(found, heading):
+        heads.append((y, name))
+        y += 1.0
+        for _, group in groupby(members, lambda change: change.alternative):
+            same = list(group)
+            lines.append((y, words(same[0].alternative), same))
+            y += 1.0
+        y += GROUP_GAP
+    return lines, heads
+
+
+def _most(found: Sequence[Change]) -> float:
+    return max(LEAST, *(KILO * change.largest for change in found))
+
+
+def _draw_band(axes: Axes, found: list[Change]) -> None:
+    span = between_systems(found)
+    if span is None:
+        return
+    low, high = (max(KILO * value, LEAST) for value in span)
+    label = "rms between two systems"
+    axes.axvspan(low, high, color="#999999", alpha=0.28, linewidth=0, label=label)
+
+
+def _draw_line(axes: Axes, line: Line) -> None:
+    """One mark per system at the rms, and a whisker to the largest change."""
+    y, _, same = line
+    order = list(MARKS)
+    for change in same:
+        place = order.index(change.system) - 1 if change.system in order else 0
+        colour = look(f"{FUZZY_PREFIX}{change.system}").colour
+        at = y + SPREAD * place
+        rms, largest = (max(KILO * value, LEAST) for value in (change.rms, change.largest))
+        if largest > LEAST:
+            axes.plot([rms, largest], [at, at], color=colour, linewidth=0.8)
+            axes.plot([largest], [at], color=colour, marker="|", markersize=4)
+        axes.plot([rms], [at], **_mark(change.system))
+
+
+def _mark(system: str) -> dict[str, Any]:
+    colour = look(f"{FUZZY_PREFIX}{system}").colour
+    return {
+        "color": colour,
+        "marker": MARKS.get(system, "o"),
+        "markersize": 3.4,
+        "markeredgecolor": "white",
+        "markeredgewidth": 0.3,
+        "linestyle": "",
+        "clip_on": False,
+    }
+
+
+def _label(axes: Axes, lines: list[Line], heads: list[tuple[float, str]]) -> None:
+    axes.set_yticks([y for y, _, _ in lines], [label for _, label, _ in lines])
+    axes.tick_params(axis="y", length=0, labelsize=6.5)
+    for y, name in heads:
+        place: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
+        axes.text(-0.01, y, name, ha="right", fontweight="bold", fontsize=7, **place)
+    ticks = [LEAST, 0.01, 0.1, 1.0, 10.0]
+    axes.set_xticks(ticks, [f"≤ {LEAST:g}", *(f"{tick:g}" for tick in ticks[1:])])
+    axes.set_xlabel("change of the estimate [kPa]: mark rms, whisker to the largest")
+    axes.grid(visible=False, axis="y")
+
+
+def _legend(found: Sequence[Change], axes: Axes) -> list[Any]:
+    """A mark per system, and the band."""
+    from matplotlib.lines import Line2D
+
+    systems = dict.fromkeys(change.system for change in found)
+    marks = [Line2D([], [], label=system_name(system), **_mark(system)) for system in systems]
+    return [*marks, *axes.get_legend_handles_labels()[0]]

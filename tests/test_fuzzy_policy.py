@@ -1,0 +1,184 @@
+"""Readings that no system can answer are treated alike by all three, and never silently."""
+
+import numpy as np
+import pytest
+
+from fuzzy.inference import COMPILED_FROM_ROWS, SYSTEMS, Options, infer
+from fuzzy.sets import FuzzySet
+from fuzzy.system import Rule, System, Term, Variable
+
+MIDDLE = 15.0
+
+
+def narrow():
+    """One set about 5 on a universe to 100, so that most of it is silent."""
+    x = Variable("hcv", 0, 100, (FuzzySet("mild", "gaussmf", (1.0, 5.0)),))
+    y = Variable("tip", 0, 30, (FuzzySet("low", "trimf", (0.0, 5.0, 10.0)),))
+    return System((x,), y, (Rule((Term(0, 0),), 0),))
+
+
+def ramp():
+    """A set that keeps firing beyond the universe, so that a reading there has an answer."""
+    x = Variable(
+        "hcv", 0, 10, (FuzzySet("a", "gaussmf", (4.0, 0.0)), FuzzySet("b", "gaussmf", (4.0, 10.0)))
+    )
+    sets = FuzzySet("low", "trimf", (0.0, 5.0, 10.0)), FuzzySet("high", "trimf", (10.0, 15.0, 30.0))
+    return System((x,), Variable("tip", 0, 30, sets), tuple(Rule((Term(0, k),), k) for k in (0, 1)))
+
+
+def answer(system, x, kind, **options):
+    return infer(system, np.array([[float(v)] for v in x]), kind, Options(**options), "kPa")
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+class TestPolicies:
+    @pytest.mark.parametrize("policy", ["clamp", "raise"])
+    def test_silence_is_no_answer(self, kind, policy):
+        with pytest.raises(ValueError, match=r"no rule fires for hcv = 40 \(row 2 of 2\): add a"):
+            answer(narrow(), [5, 40], kind, out_of_range=policy)
+
+    def test_matlab_answers_silence_with_the_middle_and_says_so(self, kind):
+        found = answer(narrow(), [5, 60], kind, out_of_range="matlab")
+        assert found.value[1] == MIDDLE
+        assert found.value[0] != MIDDLE
+        assert any("no more than the middle" in note for note in found.notes)
+        if found.interval is not None:
+            assert found.interval[1].tolist() == [0.0, 30.0]
+
+    def test_underflow_of_all_memberships_is_silence(self, kind):
+        with pytest.raises(ValueError, match="no rule fires"):
+            answer(narrow(), [99.0], kind)
+        assert answer(narrow(), [1e4], kind, out_of_range="matlab").value[0] == MIDDLE
+
+    def test_clamp_takes_the_end_of_the_universe_and_says_so(self, kind):
+        found, expected = answer(ramp(), [14, 3], kind), answer(ramp(), [10, 3], kind)
+        assert found.value.tolist() == expected.value.tolist()
+        assert found.notes == ("hcv: reading 14 kPa (row 1) is outside 0-10 kPa; clamped to it",)
+        assert expected.notes == ()
+
+    def test_raise_refuses_what_clamp_would_move(self, kind):
+        with pytest.raises(
+            ValueError, match=r"hcv: reading 14 kPa \(row 1 and 1 more\) is outside"
+        ):
+            answer(ramp(), [14, -2], kind, out_of_range="raise")
+
+    def test_matlab_takes_the_reading_as_it_is_and_says_so(self, kind):
+        found = answer(ramp(), [14], kind, out_of_range="matlab")
+        assert found.value != pytest.approx(answer(ramp(), [10], kind).value, rel=1e-6)
+        assert found.notes == ("hcv: reading 14 kPa is outside 0-10 kPa; taken as it is",)
+
+    @pytest.mark.parametrize("policy", ["clamp", "raise", "matlab"])
+    @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+    def test_no_number_is_refused_by_name(self, kind, policy, value):
+        with pytest.raises(ValueError, match=r"hcv = .* \(row 2\): give a finite reading"):
+            answer(narrow(), [5, value], kind, out_of_range=policy)
+
+    def test_wrong_width_is_refused(self, kind):
+        with pytest.raises(ValueError, match=r"shape \(1, 3\); give \(N, 1\)"):
+            infer(narrow(), np.ones((1, 3)), kind)
+
+    @pytest.mark.parametrize("count", [3000, COMPILED_FROM_ROWS])
+    def test_many_rows_meet_the_same_policy_as_few(self, kind, count):
+        rows = [5.0] * count
+        assert answer(narrow(), rows, kind).value == pytest.approx(
+            answer(narrow(), [5.0], kind).value[0], rel=1e-13
+        )
+        last = count + 1
+        with pytest.raises(ValueError, match=rf"hcv = 40 \(row {last} of {last}\)"):
+            answer(narrow(), [*rows, 40.0], kind)
+        found = answer(narrow(), [*rows, 60.0], kind, out_of_range="matlab")
+        assert found.value[-1] == MIDDLE
+        assert found.notes
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("samples", 10),
+        ("samples", 101.0),
+        ("sampling", "simpson"),
+        ("sugeno_aggregation", "mean"),
+        ("reducer", "karnik"),
+        ("out_of_range", "ignore"),
+    ],
+)
+def test_an_option_that_is_none_is_refused_by_name(key, value):
+    with pytest.raises(ValueError, match=f"^{key} = "):
+        Options(**{key: value})
+
+
+def test_a_sugeno_system_cannot_be_evaluated_as_mamdani():
+    x = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
+    y = Variable("y", 0, 1, (FuzzySet("one", "constant", (1.0,)),))
+    system = System((x,), y, (Rule((Term(0, 0),), 0),))
+    for kind in ("mamdani", "interval-type-2"):
+        with pytest.raises(ValueError, match="only be evaluated as sugeno"):
+            infer(system, [[0.5]], kind)
+    with pytest.raises(ValueError, match="system 'type-3': use one of mamdani"):
+        infer(system, [[0.5]], "type-3")
+
+
+def test_every_answer_states_how_it_was_computed():
+    stated = {
+        answer(ramp(), [3], kind, **options).method
+        for kind, options in (
+            ("mamdani", {}),
+            ("mamdani", {"samples": 201}),
+            ("mamdani", {"sampling": "octave"}),
+            ("mamdani", {"sampling": "exact"}),
+            ("sugeno", {}),
+            ("sugeno", {"sugeno_aggregation": "max"}),
+            ("interval-type-2", {}),
+            ("interval-type-2", {"reducer": "eiasc"}),
+            ("interval-type-2", {"reducer": "nie-tan"}),
+        )
+    }
+    assert len(stated) == 9
+    joins = "AND min, OR max, implication min, aggregation max"
+    assert f"Mamdani: {joins}, centroid by sums over 101 points" in stated
+
+
+# --- systems that are none ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        Rule((Term(1, 0),), 0),
+        Rule((Term(0, 3),), 0),
+        Rule((Term(0, 0),), 3),
+        Rule((), 0),
+        Rule((Term(-1, 0),), 0),
+    ],
+)
+def test_a_rule_out_of_the_system_is_refused(rule):
+    system = narrow()
+    with pytest.raises(ValueError, match=r"rule 2: .*does not have"):
+        System(system.inputs, system.output, (system.rules[0], rule))
+
+
+def test_incomplete_systems_are_refused():
+    system = narrow()
+    with pytest.raises(ValueError, match="no rules"):
+        System(system.inputs, system.output, ())
+    with pytest.raises(ValueError, match="no set"):
+        Variable("x", 0, 1, ())
+    with pytest.raises(ValueError, match="must be below"):
+        Variable("x", 1, 1, system.output.sets)
+    with pytest.raises(ValueError, match="share a name"):
+        Variable("x", 0, 1, system.output.sets * 2)
+    with pytest.raises(ValueError, match="name of its own"):
+        System(system.inputs * 2, system.output, system.rules)
+
+
+def test_constants_belong_to_outputs_only_and_all_of_them():
+    one = FuzzySet("one", "constant", (1.0,))
+    system = narrow()
+    with pytest.raises(ValueError, match=r"input 'x': set 'one' is constant"):
+        System((Variable("x", 0, 1, (one,)),), system.output, system.rules)
+    mixed = Variable("y", 0, 1, (one, *system.output.sets))
+    with pytest.raises(ValueError, match="mixes membership functions with constants"):
+        System(system.inputs, mixed, system.rules)
+    plane = Variable("y", 0, 1, (FuzzySet("p", "linear", (1.0, 2.0, 3.0)),))
+    with pytest.raises(ValueError, match="linear takes 2 parameters"):
+        System(system.inputs, plane, system.rules)
