@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import sys
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from cyclopts import App, Parameter
 
 if TYPE_CHECKING:
     from types import FrameType
 
-    from fuzzy.stiffness import Estimate
     from study.results import Results
 
 EXIT_FAILED_CHECK = 1
@@ -171,6 +170,65 @@ def report(folder: Path) -> None:
     print(folder / "report.pdf")
 
 
+@dataclass(frozen=True, kw_only=True)
+class LiverFlags:
+    """How the liver's rule base is read.
+
+    Parameters
+    ----------
+    reading
+        Reading of Table I, for example R1 or R4-pair.
+    consequent
+        Severity of a combination: max (the severest governs) or mean.
+    placement
+        Centres of the sets: stage-mean or cut-off.
+    footprint
+        What is uncertain of a type-2 set: uncertain-mean, uncertain-spread or scaled.
+    footprint_factor
+        Times the published spread; 0 makes type-2 type-1.
+    absent
+        Aetiology without a reading: normal (a normal liver's reading) or silent (no rules).
+    """
+
+    reading: str | None = None
+    consequent: str | None = None
+    placement: str | None = None
+    footprint: str | None = None
+    footprint_factor: float | None = None
+    absent: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InferenceFlags:
+    """How a fuzzy system is evaluated.
+
+    Parameters
+    ----------
+    sampling
+        Output curve: matlab (sums of samples), octave (trapezoidal rule) or exact.
+    samples
+        Number of samples, 101 by default.
+    sugeno_aggregation
+        Sugeno weighs every rule (sum, as MATLAB) or every output set (max).
+    reducer
+        Type-2: karnik-mendel, eiasc or nie-tan.
+    out_of_range
+        Reading outside its universe: clamp (and say so), raise, or matlab (take it as it is).
+    """
+
+    sampling: str | None = None
+    samples: int | None = None
+    sugeno_aggregation: str | None = None
+    reducer: str | None = None
+    out_of_range: str | None = None
+
+
+def _given(*flags: LiverFlags | InferenceFlags) -> dict[str, Any]:
+    """The flags that were given, by name."""
+    every = {key: value for group in flags for key, value in asdict(group).items()}
+    return {key: value for key, value in every.items() if value is not None}
+
+
 @app.command
 def estimate(
     *,
@@ -179,37 +237,86 @@ def estimate(
     ald: float | None = None,
     cld: float | None = None,
     nafld: float | None = None,
+    inputs: Path | None = None,
+    rule_base: Path | None = None,
+    out: Path | None = None,
+    system: list[str] | None = None,
+    explain: Annotated[bool, Parameter(negative=())] = False,
+    row: int | None = None,
+    figures: Path | None = None,
+    surface: tuple[str, str] | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    inference: Annotated[InferenceFlags, Parameter(name="*")] = InferenceFlags(),
+    liver: Annotated[LiverFlags, Parameter(name="*")] = LiverFlags(),
 ) -> None:
-    """Estimate liver stiffness from elastography readings by the three fuzzy systems.
+    """Estimate liver stiffness from elastography readings, or evaluate a table by any rule base.
 
     Parameters
     ----------
     hcv, hbv, ald, cld, nafld
-        Reading per aetiology [kPa]; that of a normal liver if it is not given.
+        Reading per aetiology [kPa]; one that is not given is that of a normal liver.
+    inputs
+        Table of readings (CSV, columns named as the inputs) instead of one patient.
+    rule_base
+        Fuzzy system to evaluate the table with (.fis or .json) instead of the liver's.
+    out
+        Table to write: that of --inputs with the column estimate, for type-2 also lower and upper.
+    system
+        mamdani, sugeno or interval-type-2; for one patient all three by default. May be repeated.
+    explain
+        Show the strongest rules, the sets, the output and the type-2 switch points.
+    row
+        Row of the table to explain, the first by default.
+    figures
+        Folder to draw sets, rules and output surfaces into, as SVG.
+    surface
+        The two readings of the output surfaces, hcv hbv by default.
     as_json
         Print JSON in SI units instead of a table.
     """
-    from fuzzy.stiffness import PA_PER_KPA, SYSTEMS
-    from fuzzy.stiffness import estimate as fuzzy_estimate
+    from study.estimation import Request, answer
 
     given = {"hcv": hcv, "hbv": hbv, "ald": ald, "cld": cld, "nafld": nafld}
-    readings = {name: PA_PER_KPA * value for name, value in given.items() if value is not None}
-    found = [fuzzy_estimate(readings, system) for system in SYSTEMS]
-    for note in sorted({note for one in found for note in one.notes}):
+    found = answer(
+        Request(
+            readings={name: value for name, value in given.items() if value is not None},
+            systems=system or (),
+            settings=_given(liver, inference),
+            rule_base=rule_base,
+            inputs=inputs,
+            out=out,
+            explain=explain,
+            row=row,
+            figures=figures,
+            surface=surface,
+            as_json=as_json,
+        )
+    )
+    for note in found.notes:
         print(f"note: {note}", file=sys.stderr)
-    if as_json:
-        print(json.dumps({one.system: _estimate_numbers(one) for one in found}, indent=1))
-        return
-    for one in found:
-        interval = [f"{bound / PA_PER_KPA:.2f}" for bound in one.interval or ()]
-        span = f"   [{', '.join(interval)}]" if interval else ""
-        print(f"{one.system:16s} {one.estimate / PA_PER_KPA:7.2f} kPa{span}")
+    print("\n".join(found.lines))
 
 
-def _estimate_numbers(found: Estimate) -> dict[str, object]:
-    numbers: dict[str, object] = {
-        "estimate_pa": found.estimate,
-        "quadrature_error_pa": found.quadrature_error,
-    }
-    return numbers | ({"interval_pa": list(found.interval)} if found.interval else {})
+@app.command
+def rules(
+    *,
+    rule_base: Path | None = None,
+    out: Path | None = None,
+    sugeno: Annotated[bool, Parameter(negative=())] = False,
+    liver: Annotated[LiverFlags, Parameter(name="*")] = LiverFlags(),
+) -> None:
+    """Audit a rule base (repeated, contradictory and idle rules, gaps), or write it to a file.
+
+    Parameters
+    ----------
+    rule_base
+        A .fis or .json file instead of the liver's rule base.
+    out
+        File to write the rule base to instead, .fis (type-1, MATLAB and Octave) or .json.
+    sugeno
+        Write it with constants in place of the output sets.
+    """
+    from study.estimation import rule_base_lines
+
+    lines = rule_base_lines(rule_base, _given(liver), out, sugeno=sugeno)
+    print("\n".join(lines))

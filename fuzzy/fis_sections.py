@@ -1,0 +1,187 @@
+"""The lines of a `.fis` file, its sections and their values, before anything is made of them."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+TYPE_2 = "belongs to a type-2 system, which is not read from .fis: give the system as JSON"
+
+_CODE = re.compile(r"(?:[^'%#]|'[^']*'?)*")  # a line up to its comment, if any
+_HEADER = re.compile(r"\[\s*([a-z]+)\s*(\d*)\s*\]", re.IGNORECASE)
+_KNOWN_HEADER = re.compile(r"system|rules|(in|out)put[1-9]\d*")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+_SET_KEY = re.compile(r"mf[1-9]\d*")
+_TYPE_2_KEY = re.compile(r"type.+|mf\d+[ul]")
+
+
+class FisError(ValueError):
+    """A `.fis` file that cannot be read or written; the message names file, line and remedy."""
+
+
+class Line(NamedTuple):
+    """A numbered line, or the value of the key that stands on it."""
+
+    file: str
+    number: int
+    text: str
+
+    def fault(self, what: str) -> FisError:
+        """The error of something wrong on this line."""
+        return FisError(f"{self.file}:{self.number}: {what}")
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Put file and line before what a set, a rule or a system says of its own values."""
+        try:
+            yield
+        except FisError:
+            raise
+        except ValueError as error:
+            raise self.fault(str(error)) from error
+
+    def unquoted(self) -> str:
+        """The text without its quotes, which may be missing."""
+        text = re.fullmatch(r"'([^']*)'|[^']*", self.text)
+        if not text:
+            raise self.fault(f"{self.text}: put the text between one pair of single quotes")
+        return text[0] if text[1] is None else text[1]
+
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers between brackets, parted by blanks or commas."""
+        inside = re.fullmatch(r"\[([^][]*)\]", self.text)
+        if not inside:
+            raise self.fault(f"{self.text}: write the numbers between one pair of [ ]")
+        return tuple(self.parsed(word) for word in words(inside[1]))
+
+    def parsed(self, word: str) -> float:
+        """A word of the line as a number."""
+        if not _NUMBER.fullmatch(word):
+            raise self.fault(f"{word!r} is no finite number; correct it")
+        return float(word)
+
+
+@dataclass(frozen=True)
+class Values:
+    """What follows the keys of a section, by key in lower case."""
+
+    head: Line
+    by_key: dict[str, Line]
+
+    def __contains__(self, key: str) -> bool:
+        return key.lower() in self.by_key
+
+    def __getitem__(self, key: str) -> Line:
+        if key not in self:
+            raise self.head.fault(f"the section has no {key}; add it")
+        return self.by_key[key.lower()]
+
+    def sets(self) -> list[Line]:
+        """Definitions of the sets, which are numbered from 1 in the order they stand."""
+        lines = [(key, line) for key, line in self.by_key.items() if _SET_KEY.fullmatch(key)]
+        for number, (key, line) in enumerate(lines, start=1):
+            if key != f"mf{number}":
+                raise line.fault(f"{key.upper()} where MF{number} is due; renumber the sets")
+        return [line for _, line in lines]
+
+    def check_count(self, key: str, found: int, what: str) -> None:
+        """FisError if a Num... key, which may be missing, disagrees with what the file holds."""
+        if key in self and self[key].text != str(found):
+            raise self[key].fault(
+                f"{key} is {self[key].text}, but there are {found} {what}; correct one of both"
+            )
+
+
+class Section(NamedTuple):
+    """The `[header]` of a section and the lines under it."""
+
+    head: Line
+    body: list[Line]
+
+    def values(self, keys: tuple[str, ...]) -> Values:
+        """Values of the keys and, where NumMFs is one of them, of MF1, MF2, ..."""
+        values: dict[str, Line] = {}
+        for line in self.body:
+            key, equals, value = (part.strip() for part in line.text.partition("="))
+            if not equals:
+                raise line.fault(f"{line.text!r} is no key=value; correct or remove it")
+            _check_key(line, key, keys)
+            if key.lower() in values:
+                raise line.fault(f"a second {key}; remove one of both")
+            values[key.lower()] = line._replace(text=value)
+        return Values(self.head, values)
+
+
+def _check_key(line: Line, key: str, keys: tuple[str, ...]) -> None:
+    name = key.lower()
+    if name in {known.lower() for known in keys}:
+        return
+    if _TYPE_2_KEY.fullmatch(name):
+        raise line.fault(f"{key} {TYPE_2}")
+    if not ("NumMFs" in keys and _SET_KEY.fullmatch(name)):
+        raise line.fault(f"{key!r} is no key of this section ({', '.join(keys)}); remove the line")
+
+
+def words(text: str) -> list[str]:
+    """Words parted by blanks or commas."""
+    return [word for word in re.split(r"[\s,]+", text) if word]
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The sections of a file by name in lower case, such as `input1`."""
+
+    file: str
+    by_name: dict[str, Section]
+
+    def __getitem__(self, name: str) -> Section:
+        if name not in self.by_name:
+            raise FisError(f"{self.file}: has no [{name.capitalize()}] section; add it")
+        return self.by_name[name]
+
+    def numbered(self, kind: str) -> list[Section]:
+        """The sections of a kind by their numbers, which run from 1 without a gap."""
+        count = sum(name.startswith(kind) for name in self.by_name)
+        return [self[f"{kind}{number}"] for number in range(1, max(count, 1) + 1)]
+
+
+def read_sections(path: Path) -> Sections:
+    """The sections of a file, without comments, empty lines and byte order mark."""
+    found: dict[str, Section] = {}
+    section = None
+    for line in _lines(path):
+        header = _HEADER.fullmatch(line.text)
+        if header:
+            name = "".join(header.groups()).lower()
+            _check_header(line, name, found)
+            section = found[name] = Section(line, [])
+        elif section is None:
+            raise line.fault("stands before any section; start the file with [System]")
+        else:
+            section.body.append(line)
+    return Sections(str(path), found)
+
+
+def _check_header(line: Line, name: str, found: dict[str, Section]) -> None:
+    if not _KNOWN_HEADER.fullmatch(name):
+        raise line.fault(f"{line.text} is no section of a .fis file; remove or correct it")
+    if name in found:
+        raise line.fault(f"a second {line.text}; remove one of both")
+
+
+def _lines(path: Path) -> Iterator[Line]:
+    for number, text in enumerate(_text(path).split("\n"), start=1):
+        code = _CODE.match(text)
+        if code and code[0].strip():
+            yield Line(str(path), number, code[0].strip())
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FisError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise FisError(f"{path}: is not UTF-8 text; save it in that encoding") from None

@@ -1,0 +1,234 @@
+"""Fuzzy estimates at the command line: of one patient, or of a table by any rule base."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fuzzy.inference import SYSTEMS, Options
+from fuzzy.liver import liver_system
+from fuzzy.settings import Settings
+from fuzzy.stiffness import (
+    PA_PER_KPA,
+    UNIT,
+    Estimate,
+    estimate,
+    liver_row,
+    patient_system,
+)
+from fuzzy.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What was asked on the command line.
+
+    `readings` [kPa] by aetiology; `systems` empty for all three; `settings` the given fields of
+    Settings and Options by name; `row` of the table to explain, from 1.
+    """
+
+    readings: Mapping[str, float] = field(default_factory=dict)
+    systems: Sequence[str] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    rule_base: Path | None = None
+    inputs: Path | None = None
+    out: Path | None = None
+    explain: bool = False
+    row: int | None = None
+    figures: Path | None = None
+    surface: tuple[str, str] | None = None
+    as_json: bool = False
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Lines for the terminal, and notes on what was done to the readings."""
+
+    lines: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def settings_of(given: Mapping[str, Any]) -> Settings:
+    """Settings with the given fields in place of the defaults. ValueError naming a wrong one."""
+    names = {one.name for one in fields(Options)}
+    options = Options(**{key: value for key, value in given.items() if key in names})
+    liver = {key: value for key, value in given.items() if key not in names}
+    return Settings(**liver, options=options)
+
+
+def answer(request: Request) -> Answer:
+    """Do what the request asks. ValueError for what does not fit together, with the remedy."""
+    for name in request.systems:
+        if name not in SYSTEMS:
+            raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
+    if request.inputs is not None:
+        return _table(request, request.inputs)
+    if request.rule_base is not None:
+        raise ValueError("--rule-base: give the readings as a table, --inputs FILE.csv")
+    for flag, given in (("--out", request.out), ("--row", request.row)):
+        if given is not None:
+            raise ValueError(
+                f"{flag}: only with a table of readings; give --inputs or leave it out"
+            )
+    return _patient(request)
+
+
+# --- one patient -------------------------------------------------------------------------------
+
+
+def _patient(request: Request) -> Answer:
+    settings = settings_of(request.settings)
+    readings = {name: PA_PER_KPA * value for name, value in request.readings.items()}
+    found = [estimate(readings, name, settings) for name in request.systems or SYSTEMS]
+    lines = [_as_json(found)] if request.as_json else [_line(one) for one in found]
+    if request.explain:
+        if request.as_json:
+            raise ValueError("--explain: is a text; leave out --json")
+        lines += _explained(request, patient_system(readings, settings), liver_row(readings)[0])
+    if request.figures is not None:
+        lines += _draw(request.figures, request, readings, settings)
+    elif request.surface is not None:
+        raise ValueError("--surface: only with --figures; give a folder or leave it out")
+    notes = dict.fromkeys(note for one in found for note in one.notes)
+    return Answer(tuple(lines), tuple(notes))
+
+
+def _line(found: Estimate) -> str:
+    bounds = [f"{bound / PA_PER_KPA:.2f}" for bound in found.interval or ()]
+    interval = f"   [{', '.join(bounds)}]" if bounds else ""
+    return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval}"
+
+
+def _as_json(found: Sequence[Estimate]) -> str:
+    return json.dumps({one.system: _numbers(one) for one in found}, indent=1)
+
+
+def _numbers(found: Estimate) -> dict[str, object]:
+    numbers: dict[str, object] = {
+        "estimate_pa": found.estimate,
+        "quadrature_error_pa": found.quadrature_error,
+        "method": found.method,
+        "notes": list(found.notes),
+    }
+    return numbers | ({"interval_pa": list(found.interval)} if found.interval else {})
+
+
+def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iterator[str]:
+    from fuzzy.explain import explain
+    from fuzzy.explanation_text import explanation_lines
+
+    unit = UNIT if request.rule_base is None else ""
+    options = settings_of(request.settings).options
+    for name in request.systems or SYSTEMS:
+        yield ""
+        yield from explanation_lines(explain(system, x, name, options, unit), unit)
+
+
+# --- a table -----------------------------------------------------------------------------------
+
+
+def _table(request: Request, inputs: Path) -> Answer:
+    from fuzzy.table import evaluate_table
+
+    _check_table(request)
+    system, unit = _rule_base(request.rule_base, request.settings)
+    options = settings_of(request.settings).options
+    lines: list[str] = []
+    notes: tuple[str, ...] = ()
+    if request.out is not None:
+        (kind,) = request.systems
+        notes = evaluate_table(system, inputs, request.out, kind, options, unit)
+        lines.append(str(request.out))
+    if request.explain:
+        lines += _explained(request, system, _table_row(inputs, request.row, system))
+    return Answer(tuple(lines), notes)
+
+
+def _check_table(request: Request) -> None:
+    if request.readings:
+        raise ValueError(f"--{next(iter(request.readings))}: the table gives the readings")
+    for flag, given in (("--json", request.as_json), ("--figures", request.figures)):
+        if given:
+            raise ValueError(f"{flag}: only for one patient; leave it out with --inputs")
+    if request.out is None and not request.explain:
+        raise ValueError("--inputs: name the table to write, --out FILE.csv")
+    if len(request.systems) != 1:
+        raise ValueError(f"--inputs: name one --system, of {', '.join(SYSTEMS)}")
+    if request.row is not None and not request.explain:
+        raise ValueError("--row: only with --explain; leave it out")
+
+
+def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str]:
+    """The system of a file, or the liver's; and the unit of its readings where it is known."""
+    if path is None:
+        return liver_system(settings_of(given)), UNIT
+    from fuzzy.rule_base import read_rule_base
+
+    options = {one.name for one in fields(Options)}
+    for key in given:
+        if key not in options:
+            flag = "--" + key.replace("_", "-")
+            raise ValueError(
+                f"{flag}: shapes the liver's rules only; leave it out with --rule-base"
+            )
+    return read_rule_base(path), ""
+
+
+def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.float64]:
+    from fuzzy.table import read_readings
+
+    X = read_readings(inputs, system)
+    number = 1 if row is None else row
+    if not 1 <= number <= len(X):
+        raise ValueError(f"--row {number}: the table has rows 1 to {len(X)}")
+    return np.asarray(X[number - 1])
+
+
+# --- figures and rule bases --------------------------------------------------------------------
+
+
+def _draw(
+    folder: Path, request: Request, readings: Mapping[str, float], settings: Settings
+) -> Iterator[str]:
+    """Write the figures into the folder; their paths."""
+    from reports.fuzzy_figures import draw_sets, draw_surfaces
+    from reports.rule_view import draw_rules
+    from study.run.estimates import drawings
+
+    systems, over = request.systems or SYSTEMS, request.surface or ("hcv", "hbv")
+    arrays = drawings(settings, systems, readings, over)
+    found = {name: estimate(readings, name, settings).estimate for name in systems}
+    pictures = {"sets": draw_sets(arrays, found), "surfaces": draw_surfaces(arrays, over)}
+    pictures |= {f"rules-{name}": draw_rules(arrays, name) for name in systems}
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, picture in pictures.items():
+        path = folder / f"{name}.svg"
+        path.write_bytes(picture)
+        yield str(path)
+
+
+def rule_base_lines(
+    path: Path | None, given: Mapping[str, Any], out: Path | None, *, sugeno: bool
+) -> Sequence[str]:
+    """Audit a rule base, the liver's if there is no `path`, or write it to `out`."""
+    from fuzzy.audit import audit, audit_lines
+    from fuzzy.conversion import sugeno_of, type_1_of
+    from fuzzy.rule_base import write_rule_base
+
+    system, _ = _rule_base(path, given)
+    if out is None:
+        if sugeno:
+            raise ValueError("--sugeno: only with --out; constants are no part of the audit")
+        return audit_lines(audit(system), system)
+    if sugeno:
+        system = sugeno_of(system)
+    elif out.suffix.lower() == ".fis":
+        system = type_1_of(system)  # a .fis file holds no footprints
+    write_rule_base(system, out)
+    return [str(out)]

@@ -1,0 +1,198 @@
+"""`liver-study estimate` and `rules`, as a person with a rule base of their own uses them."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fuzzy.conversion import type_1_of
+from fuzzy.inference import Options, infer
+from fuzzy.liver import liver_system
+from fuzzy.rule_base import read_rule_base, write_rule_base
+from fuzzy.sets import Footprint, FuzzySet
+from fuzzy.settings import Settings
+from fuzzy.system import Rule, System, Term, Variable
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def study(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "study", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+
+
+def tipper(footprint=0.0):
+    """MATLAB's tipper, whose answers its documentation prints."""
+    shift = Footprint(mean=footprint)
+    service = Variable(
+        "service",
+        0,
+        10,
+        tuple(
+            FuzzySet(name, "gaussmf", (1.5, c), shift)
+            for name, c in (("poor", 0.0), ("good", 5.0), ("excellent", 10.0))
+        ),
+    )
+    food = Variable(
+        "food",
+        0,
+        10,
+        (
+            FuzzySet("rancid", "trapmf", (-2.0, 0.0, 1.0, 3.0), shift),
+            FuzzySet("delicious", "trapmf", (7.0, 9.0, 10.0, 12.0), shift),
+        ),
+    )
+    tip = Variable(
+        "tip",
+        0,
+        30,
+        tuple(
+            FuzzySet(name, "trimf", (a, a + 5, a + 10), shift)
+            for name, a in (("cheap", 0.0), ("average", 10.0), ("generous", 20.0))
+        ),
+    )
+    rules = (
+        Rule((Term(0, 0), Term(1, 0)), 0, "or"),
+        Rule((Term(0, 1),), 1),
+        Rule((Term(0, 2), Term(1, 1)), 2, "or"),
+    )
+    return System((service, food), tip, rules, name="tipper")
+
+
+TABLE = "guest,food,service\nann,1,2\nbob,5,4\ncem,8,7\n"
+PRINTED = ["7.0169", "14.4585", "20.3414"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_rule_base(tipper(), tmp_path / "tipper.fis")
+    write_rule_base(tipper(0.5), tmp_path / "tipper.json")
+    (tmp_path / "in.csv").write_text(TABLE)
+    return tmp_path
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_table_by_a_rule_base_of_ones_own(folder):
+    done = study(
+        *("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv"),
+        *("--system", "mamdani", "--out", "out.csv"),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    found = rows(folder / "out.csv")
+    assert [row["guest"] for row in found] == ["ann", "bob", "cem"]
+    assert [f"{float(row['estimate']):.4f}" for row in found] == PRINTED
+    assert "lower" not in found[0]
+
+
+@pytest.mark.parametrize(
+    ("flags", "kind", "options"),
+    [
+        ([], "interval-type-2", {}),
+        (["--reducer", "nie-tan"], "interval-type-2", {"reducer": "nie-tan"}),
+        (["--sampling", "exact"], "mamdani", {"sampling": "exact"}),
+        (["--sugeno-aggregation", "max"], "sugeno", {"sugeno_aggregation": "max"}),
+    ],
+)
+def test_a_table_is_evaluated_as_the_flags_say(folder, flags, kind, options):
+    done = study(
+        *("estimate", "--rule-base", "tipper.json", "--inputs", "in.csv"),
+        *("--system", kind, "--out", "out.csv", *flags),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    X = np.array([[2.0, 1.0], [4.0, 5.0], [7.0, 8.0]])
+    expected = infer(tipper(0.5), X, kind, Options(**options))
+    found = rows(folder / "out.csv")
+    assert [float(row["estimate"]) for row in found] == expected.value.tolist()
+    if kind == "interval-type-2":
+        bounds = [[float(row["lower"]), float(row["upper"])] for row in found]
+        assert bounds == expected.interval.tolist()
+
+
+def test_a_reading_out_of_range_is_noted_with_its_line(folder):
+    (folder / "in.csv").write_text("food,service\n1,2\n11,2\n")
+    arguments = (
+        "estimate",
+        "--rule-base",
+        "tipper.fis",
+        "--inputs",
+        "in.csv",
+        "--system",
+        "sugeno",
+    )
+    done = study(*arguments, "--out", "out.csv", cwd=folder)
+    assert "food: reading 11 (line 3) is outside 0-10; clamped to it" in done.stderr
+    refused = study(*arguments, "--out", "no.csv", "--out-of-range", "raise", cwd=folder)
+    assert refused.returncode == 2
+    assert "line 3" in refused.stderr
+    assert not (folder / "no.csv").exists()
+
+
+def test_a_flag_of_the_liver_is_refused_beside_a_rule_base(folder):
+    done = study(
+        *("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv", "--system", "mamdani"),
+        *("--out", "out.csv", "--reading", "R2"),
+        cwd=folder,
+    )
+    assert done.returncode == 2
+    assert "--reading: shapes the liver's rules only" in done.stderr
+
+
+def test_explain_names_rules_sets_and_switch_points(tmp_path):
+    done = study("estimate", "--hcv", "9.5", "--explain", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "if hcv is F4 then severe" in done.stdout
+    assert "bounds switch at" in done.stdout
+    assert "share" in done.stdout
+
+
+def test_a_row_of_a_table_is_explained(folder):
+    arguments = ("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv", "--explain")
+    done = study(*arguments, "--system", "mamdani", "--row", "3", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "mamdani: 20.34" in done.stdout
+    assert study(*arguments, "--system", "mamdani", "--row", "4", cwd=folder).returncode == 2
+
+
+def test_rules_are_audited(tmp_path):
+    done = study("rules", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "12 of 247 rules repeat an earlier rule" in done.stdout
+    assert "236 of 247 rules change no answer" in done.stdout
+
+
+@pytest.mark.parametrize("suffix", ["fis", "json"])
+def test_the_liver_is_written_and_read_back(tmp_path, suffix):
+    done = study("rules", "--out", f"liver.{suffix}", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    liver, back = liver_system(Settings()), read_rule_base(tmp_path / f"liver.{suffix}")
+    if suffix == "json":
+        assert back == liver
+    else:
+        assert back == type_1_of(liver)
+
+
+def test_figures_are_drawn_over_any_two_readings(tmp_path):
+    done = study(
+        *("estimate", "--hcv", "9.5", "--figures", "out", "--surface", "ald", "nafld"),
+        *("--system", "mamdani"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"sets.svg", "surfaces.svg", "rules-mamdani.svg"}
