@@ -92,9 +92,10 @@ class Compiled:
         return Output(value, None, strength)
 
     @cached_property
-    def _plain(self) -> tuple[Any, ...]:
-        """The arguments as plain tuples, which reach the kernel sooner than named ones."""
-        return tuple(tuple(one) if isinstance(one, tuple) else one for one in self.arguments)
+    def _one(self) -> tuple[Callable[..., kernel.Single], kernel.Integers, Array]:
+        """The kernel of one row, and the arguments as it takes them."""
+        clamps = self.options.out_of_range == "clamp"
+        return ONE_ROW[self.kind], *kernel.pack(self.universes, clamps, *self.arguments)
 
     def one(self, x: Sequence[float] | Array) -> Answer:
         """The answer to one reading per input, in range as `options.out_of_range` says.
@@ -107,13 +108,12 @@ class Compiled:
             raise ValueError(
                 f"readings have shape {readings.shape}; give {len(self.universes)}, one per input"
             )
+        run, integers, floats = self._one
+        value, lower, upper, strength, outside = run(readings, integers, floats)
         policy = self.options.out_of_range
-        clamps = policy == "clamp"
-        run = ONE_ROW[self.kind]
-        value, lower, upper, strength, outside = run(readings, self.universes, clamps, *self._plain)
         allowed = outside == 0 or (outside > 0 and policy != "raise")
         if allowed and strength >= LEAST_STRENGTH:
-            return Answer(value, lower, upper, clamps and outside > 0, False)
+            return Answer(value, lower, upper, outside > 0 and policy == "clamp", False)
         return self._exceptional(x)
 
     def _exceptional(self, x: Sequence[float] | Array) -> Answer:
@@ -172,7 +172,7 @@ def _packed_sets(
     return kernel.Sets(
         np.array([kind for kind, _ in forms]),
         np.array([i for i, _ in used]),
-        np.array([place in negated for place in used]),
+        np.array([place in negated for place in used], dtype=np.int64),
         np.array(
             [
                 (*four(one.parameters), *_core(one))
@@ -199,7 +199,7 @@ def _packed_rules(
         np.cumsum([0, *(len(one) for one in members)]),
         np.array([m for one in members for m in one]),
         np.array(operators),
-        np.array([False, *(one == other for one, other in pairwise(starts))]),
+        np.array([False, *(one == other for one, other in pairwise(starts))], dtype=np.int64),
         np.array([rule.weight for rule in rules], dtype=np.float64),
         np.array([rule.consequent for rule in rules]),
         summed,

@@ -8,7 +8,7 @@ Arrays are handed on whole with an index: a slice costs more than the loop over 
 
 import math
 from decimal import Decimal
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Single = tuple[float, float, float, float, int]
 """Answer, ends of its interval, strength, and what `count_outside` found."""
 
@@ -32,6 +31,9 @@ LN_2_HIGH = math.floor(math.log(2.0) * 2.0**32) / 2.0**32  # its whole multiples
 LN_2_LOW = float(Decimal(2).ln() - Decimal(LN_2_HIGH))
 SHIFT = 1.5 * 2.0**52
 
+SUMMED, SCALES, CLAMPS, NIE_TAN, HEAD = range(4, 9)
+"""Places of the switches in the integers of `pack`, after D, S, R and M; then the arrays."""
+
 MINIMUM, PRODUCT, MAXIMUM, PROBOR = range(4)
 """What joins the terms of a rule."""
 
@@ -46,7 +48,7 @@ class Sets(NamedTuple):
 
     kind: Integers
     column: Integers
-    negated: Flags
+    negated: Integers
     shape: Floats
     footprint: Floats
 
@@ -62,7 +64,7 @@ class Rules(NamedTuple):
     first: Integers
     members: Integers
     operator: Integers
-    again: Flags
+    again: Integers
     weight: Floats
     consequent: Integers
     summed: bool
@@ -149,38 +151,86 @@ def interval_type2(
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def one_mamdani(
-    x: Floats, universes: Floats, clamps: bool, sets: Any, rules: Any, grid: Any
-) -> Single:
-    """`mamdani` of one row, which `count_outside` may move.
-
-    This and the next two take plain tuples, which are handed over sooner than named ones.
-    """
-    outside = count_outside(x, universes, clamps)
-    value, strength = mamdani(x.reshape(1, -1), Sets(*sets), Rules(*rules), Grid(*grid))
+def one_mamdani(x: Floats, integers: Integers, floats: Floats) -> Single:
+    """`mamdani` of one row and the arrays of `pack`; `count_outside` may move the row."""
+    universes, sets, rules, rest = unpacked(integers, floats)
+    outside = count_outside(x, universes, integers[CLAMPS] != 0)
+    value, strength = mamdani(x.reshape(1, -1), sets, rules, grid_of(integers, rest))
     return value[0], value[0], value[0], strength[0], outside
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def one_sugeno(
-    x: Floats, universes: Floats, clamps: bool, sets: Any, rules: Any, coefficients: Floats
-) -> Single:
-    """`sugeno` of one row, which `count_outside` may move."""
-    outside = count_outside(x, universes, clamps)
-    value, strength = sugeno(x.reshape(1, -1), Sets(*sets), Rules(*rules), coefficients)
+def one_sugeno(x: Floats, integers: Integers, floats: Floats) -> Single:
+    """`sugeno` of one row and the arrays of `pack`; `count_outside` may move the row."""
+    universes, sets, rules, rest = unpacked(integers, floats)
+    outside = count_outside(x, universes, integers[CLAMPS] != 0)
+    value, strength = sugeno(x.reshape(1, -1), sets, rules, rest.reshape(-1, x.size + 1))
     return value[0], value[0], value[0], strength[0], outside
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def one_interval_type2(
-    x: Floats, universes: Floats, clamps: bool, sets: Any, rules: Any, grid: Any, *switch: Any
-) -> Single:
-    """`interval_type2` of one row, which `count_outside` may move."""
-    outside = count_outside(x, universes, clamps)
+def one_interval_type2(x: Floats, integers: Integers, floats: Floats) -> Single:
+    """`interval_type2` of one row and the arrays of `pack`; `count_outside` may move the row."""
+    universes, sets, rules, rest = unpacked(integers, floats)
+    outside = count_outside(x, universes, integers[CLAMPS] != 0)
+    grid, nie_tan = grid_of(integers, rest), integers[NIE_TAN] != 0
     value, left, right, strength = interval_type2(
-        x.reshape(1, -1), Sets(*sets), Rules(*rules), Grid(*grid), *switch
+        x.reshape(1, -1), sets, rules, grid, nie_tan, floats[0]
     )
     return value[0], left[0], right[0], strength[0], outside
+
+
+def pack(
+    universes: Floats,
+    clamps: bool,
+    sets: Sets,
+    rules: Rules,
+    output: Grid | Floats,
+    nie_tan: bool = False,
+    least_area: float = 0.0,
+) -> tuple[Integers, Floats]:
+    """All of a system in two arrays, for numba takes longer to accept an array than to slice one.
+
+    `output` is a grid or the coefficients (K, D + 1); the last two are for type-2 only.
+    """
+    numbers: list[Floats]
+    if isinstance(output, Grid):
+        samples, scales, numbers = output.y.size, output.scales, [*output[:4]]
+    else:
+        samples, scales, numbers = 0, False, [output]
+    sizes = [len(universes), sets.kind.size, rules.weight.size, samples]
+    head = np.array([*sizes, rules.summed, scales, clamps, nie_tan])
+    per_rule = [rules.operator, rules.again, rules.consequent]
+    integers = [head, *sets[:3], *per_rule, rules.first, rules.members]
+    floats = [np.array([least_area]), universes, sets.shape, sets.footprint, rules.weight, *numbers]
+    return (
+        np.concatenate([np.ravel(one) for one in integers], dtype=np.int64),
+        np.concatenate([np.ravel(one) for one in floats], dtype=np.float64),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def unpacked(integers: Integers, floats: Floats) -> tuple[Floats, Sets, Rules, Floats]:
+    """Universes (D, 2), sets, rules, and the numbers of the output, as views of what was packed."""
+    d, s, r = integers[0], integers[1], integers[2]
+    i, j = HEAD + 3 * s, HEAD + 3 * (s + r)
+    per_set, per_rule = integers[HEAD:i].reshape(3, s), integers[i:j].reshape(3, r)
+    first, members = integers[j : j + r + 1], integers[j + r + 1 :]
+    a = 1 + 2 * d
+    b, c, e = a + 6 * s, a + 10 * s, a + 10 * s + r
+    shape, footprint = floats[a:b].reshape(s, 6), floats[b:c].reshape(s, 4)
+    summed = integers[SUMMED] != 0
+    sets = Sets(per_set[0], per_set[1], per_set[2], shape, footprint)
+    rules = Rules(first, members, per_rule[0], per_rule[1], floats[c:e], per_rule[2], summed)
+    return floats[1:a].reshape(d, 2), sets, rules, floats[e:]
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def grid_of(integers: Integers, rest: Floats) -> Grid:
+    """The grid that was packed."""
+    rows = rest.reshape(-1, integers[3])
+    upper = 1 + len(rows) // 2  # after y, weights and half of the others
+    return Grid(rows[0], rows[1], rows[2:upper], rows[upper:], integers[SCALES] != 0)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -480,11 +530,24 @@ def centroid(grid: Grid, union: Floats, n: int, value: Floats, start: int) -> No
 def moments(y: Floats, weights: Floats, union: Floats, n: int) -> tuple[Floats, Floats]:
     """Area and moment (n,) of the union (M, BLOCK)."""
     area, moment = np.zeros(n), np.zeros(n)
+    if n == 1:
+        area[0], moment[0] = moments_of_row(y, weights, union)
+        return area, moment
     for j in range(y.size):
         weight, lever = weights[j], weights[j] * y[j]
         for b in range(n):
             area[b] += weight * union[j, b]
             moment[b] += lever * union[j, b]
+    return area, moment
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def moments_of_row(y: Floats, weights: Floats, union: Floats) -> tuple[float, float]:
+    """`moments` of one row, with the sums in registers."""
+    area, moment = 0.0, 0.0
+    for j in range(y.size):
+        area += weights[j] * union[j, 0]
+        moment += weights[j] * y[j] * union[j, 0]
     return area, moment
 
 
@@ -505,6 +568,9 @@ def end_of_centroids(
     the first that does not go none does, for the centroid then rests. Multiplying the test out
     saves the division.
     """
+    if n == 1:
+        value[start] = end_of_row(grid, lower, upper, side, least_area)
+        return
     y, weights = grid.y, grid.weights
     area, moment = moments(y, weights, lower, n)
     for step in range(y.size):
@@ -517,6 +583,22 @@ def end_of_centroids(
             moment[b] += y_j * gain
     for b in range(n):
         value[start + b] = moment[b] / area[b] if area[b] > least_area else np.nan
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def end_of_row(grid: Grid, lower: Floats, upper: Floats, side: int, least_area: float) -> float:
+    """`end_of_centroids` of one row, which can stop where the centroid rests."""
+    y, weights = grid.y, grid.weights
+    area, moment = moments_of_row(y, weights, lower)
+    for step in range(y.size):
+        j = step if side > 0 else y.size - 1 - step
+        goes = side * (moment - y[j] * area) >= 0.0 or area <= least_area
+        if not goes:
+            break
+        gain = weights[j] * (upper[j, 0] - lower[j, 0])
+        area += gain
+        moment += y[j] * gain
+    return moment / area if area > least_area else np.nan
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)

@@ -10,7 +10,7 @@ import pytest
 from fuzzy import interval_type2, kernel, mamdani, sugeno
 from fuzzy.compiled import KERNEL_FORMS, compiled
 from fuzzy.control_system import control_system
-from fuzzy.inference import SYSTEMS, Options, infer
+from fuzzy.inference import LEAST_STRENGTH, SYSTEMS, Options, infer
 from fuzzy.liver import liver_system
 from fuzzy.redundancy import dominated
 from fuzzy.sets import FORMS, TYPE_1, Footprint, FuzzySet
@@ -312,6 +312,40 @@ def test_an_answer_does_not_depend_on_the_rows_beside_it(kind):
         np.testing.assert_array_equal(apart.strength, together.strength[rows])
     for x, value in zip(X[:50], together.value, strict=False):
         assert model.one(tuple(x)).value == value
+
+
+@pytest.mark.parametrize(("kind", "options"), OPTIONS)
+@pytest.mark.parametrize("seed", range(2))
+def test_one_gives_every_bit_of_evaluate(kind, options, seed):
+    # One row has sums of its own, which stop early at the ends of the type-2 interval.
+    system, X = random_system(seed), readings(seed)
+    model = compiled(system, kind, replace(options, out_of_range="matlab"))
+    output = model.evaluate(X)
+    fired = np.flatnonzero(output.strength >= LEAST_STRENGTH)
+    assert fired.size > 50
+    answers = np.array([model.one(x)[:3] for x in X[fired]])
+    ends = output.value[:, None] if output.interval is None else output.interval
+    np.testing.assert_array_equal(answers[:, 0], output.value[fired])
+    np.testing.assert_array_equal(answers[:, 1:], np.broadcast_to(ends, (len(X), 2))[fired])
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_what_is_packed_for_one_row_comes_back(kind):
+    system = random_system(4)
+    model = compiled(system, kind, Options())
+    sets, rules, output = model.arguments[:3]
+    integers, floats = kernel.pack(model.universes, True, *model.arguments)
+    universes, *parts, rest = kernel.unpacked(integers, floats)
+    np.testing.assert_array_equal(universes, model.universes)
+    wanted, got = [*sets, *rules], [*parts[0], *parts[1]]
+    if kind == "sugeno":
+        wanted.append(output.ravel())
+        got.append(rest)
+    else:
+        wanted += output
+        got += kernel.grid_of(integers, rest)
+    for one, other in zip(got, wanted, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_columns_may_lie_in_any_order_in_memory():
