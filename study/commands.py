@@ -253,8 +253,16 @@ def estimate(
 
     Parameters
     ----------
-    hcv, hbv, ald, cld, nafld
-        Reading per aetiology [kPa]; one that is not given is that of a normal liver.
+    hcv
+        Reading in hepatitis C [kPa]; one that is not given is that of a normal liver.
+    hbv
+        Reading in hepatitis B [kPa].
+    ald
+        Reading in alcoholic liver disease [kPa].
+    cld
+        Reading in cholestatic liver disease [kPa].
+    nafld
+        Reading in non-alcoholic fatty liver disease [kPa].
     inputs
         Table of readings (CSV, columns named as the inputs) instead of one patient.
     rule_base

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.inference import SYSTEMS, Options
+from fuzzy.knowledge import parameters
 from fuzzy.liver import liver_system
 from fuzzy.settings import Settings
 from fuzzy.stiffness import (
@@ -84,6 +85,8 @@ def answer(request: Request) -> Answer:
 
 def _patient(request: Request) -> Answer:
     settings = settings_of(request.settings)
+    for name, value in request.readings.items():
+        _check_plausible(value, f"--{name} {value:g}")
     readings = {name: PA_PER_KPA * value for name, value in request.readings.items()}
     found = [estimate(readings, name, settings) for name in request.systems or SYSTEMS]
     lines = [_as_json(found)] if request.as_json else [_line(one) for one in found]
@@ -97,6 +100,12 @@ def _patient(request: Request) -> Answer:
         raise ValueError("--surface: only with --figures; give a folder or leave it out")
     notes = dict.fromkeys(note for one in found for note in one.notes)
     return Answer(tuple(lines), tuple(notes))
+
+
+def _check_plausible(kpa: float, where: str) -> None:
+    low, high = parameters()["plausible_low"], parameters()["plausible_high"]
+    if not low <= kpa <= high:  # nor for NaN
+        raise ValueError(f"{where}: no liver has that; give kPa, {low:g} to {high:g}")
 
 
 def _line(found: Estimate) -> str:
@@ -134,11 +143,15 @@ def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iter
 
 
 def _table(request: Request, inputs: Path) -> Answer:
-    from fuzzy.table import evaluate_table
+    from fuzzy.table import evaluate_table, read_readings
 
     _check_table(request)
     system, unit = _rule_base(request.rule_base, request.settings)
     options = settings_of(request.settings).options
+    if request.rule_base is None:
+        for row, x in enumerate(read_readings(inputs, system), start=1):
+            for variable, value in zip(system.inputs, x, strict=True):
+                _check_plausible(value, f"{inputs}: row {row}: {variable.name} {value:g}")
     lines: list[str] = []
     notes: tuple[str, ...] = ()
     if request.out is not None:
@@ -226,9 +239,9 @@ def rule_base_lines(
         if sugeno:
             raise ValueError("--sugeno: only with --out; constants are no part of the audit")
         return audit_lines(audit(system), system)
-    if sugeno:
-        system = sugeno_of(system)
-    elif out.suffix.lower() == ".fis":
-        system = type_1_of(system)  # a .fis file holds no footprints
-    write_rule_base(system, out)
-    return [str(out)]
+    lines = [str(out)]
+    if out.suffix.lower() == ".fis" and system != type_1_of(system):
+        system = type_1_of(system)
+        lines.append("without footprints, which a .fis file cannot hold; .json can")
+    write_rule_base(sugeno_of(system) if sugeno else system, out)
+    return lines

@@ -176,6 +176,22 @@ def test_rules_are_audited(tmp_path):
     assert "236 of 247 rules change no answer" in done.stdout
 
 
+def test_the_liver_is_written_as_sugeno_too(tmp_path):
+    done = study("rules", "--out", "liver.fis", "--sugeno", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "without footprints" in done.stdout
+    assert read_rule_base(tmp_path / "liver.fis").is_sugeno
+
+
+def test_a_table_with_a_reading_that_no_liver_has_is_refused(tmp_path):
+    (tmp_path / "in.csv").write_text("hcv,hbv,ald,cld,nafld\n9,4,4,4,4\n9500,4,4,4,4\n")
+    arguments = ("estimate", "--inputs", "in.csv", "--system", "mamdani", "--out", "out.csv")
+    done = study(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "row 2: hcv 9500: no liver has that; give kPa" in done.stderr
+    assert not (tmp_path / "out.csv").exists()
+
+
 @pytest.mark.parametrize("suffix", ["fis", "json"])
 def test_the_liver_is_written_and_read_back(tmp_path, suffix):
     done = study("rules", "--out", f"liver.{suffix}", cwd=tmp_path)
