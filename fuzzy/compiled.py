@@ -4,6 +4,7 @@ The answers are those of the numpy modules to rounding, some hundred times soone
 on one thread and lets go of the interpreter's lock.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -58,7 +59,8 @@ class Answer(NamedTuple):
 
     `lower` and `upper` are the ends of the type-2 interval; for the other systems both are `value`.
     `clamped`: a reading was outside its universe and the nearest end was taken. `silent`: no rule
-    fires and the answer is no more than the middle of the universe.
+    fires by LEAST_STRENGTH, so that the answer is the middle of the universe or, if rules fire by
+    less, what can be computed from them.
     """
 
     value: float
@@ -81,6 +83,7 @@ class Compiled:
     def evaluate(self, X: Array) -> Output:
         """Answers to the readings X (N, inputs) as they are, also outside their universes.
 
+        NaN where nothing fires or what fires has no mass on the samples; `infer` refuses both.
         ValueError for a wrong width and for a reading that is not finite.
         """
         X = np.ascontiguousarray(require_readings(self.system, X))
@@ -101,7 +104,7 @@ class Compiled:
         """The answer to one reading per input, in range as `options.out_of_range` says.
 
         ValueError as from `infer`: a wrong number of readings, one that is not finite or is
-        refused, no rule that fires.
+        refused, no rule that fires, no finite answer.
         """
         readings = np.array(x, dtype=np.float64)
         if readings.shape != (len(self.universes),):
@@ -112,12 +115,12 @@ class Compiled:
         value, lower, upper, strength, outside = run(readings, integers, floats)
         policy = self.options.out_of_range
         allowed = outside == 0 or (outside > 0 and policy != "raise")
-        if allowed and strength >= LEAST_STRENGTH:
+        if allowed and strength >= LEAST_STRENGTH and math.isfinite(upper - lower):
             return Answer(value, lower, upper, outside > 0 and policy == "clamp", False)
         return self._exceptional(x)
 
     def _exceptional(self, x: Sequence[float] | Array) -> Answer:
-        """What `infer` makes of readings refused or without a rule: an error, or the middle."""
+        """What `infer` makes of readings refused or without an answer: an error, or the middle."""
         found = infer(self.system, np.array([x]), self.kind, self.options)
         ends = found.value if found.interval is None else found.interval[0]
         return Answer(found.value.item(), ends[0].item(), ends[-1].item(), False, True)

@@ -41,9 +41,10 @@ class Options:
     """How a system is evaluated.
 
     `samples` points carry the output's universe (101 is MATLAB's default); `exact` sampling takes
-    none. `out_of_range`: `clamp` takes the nearest end of the universe and says so, `raise`
-    refuses, `matlab` evaluates as it is, and where nothing fires answers with the middle of the
-    universe, and says so; the first two refuse readings for which no rule fires.
+    none and finds the ends of type-2 intervals by itself, so that `eiasc` changes nothing there.
+    `out_of_range`: `clamp` takes the nearest end of the universe and says so, `raise` refuses,
+    `matlab` evaluates as it is, and where nothing fires answers with the middle of the universe,
+    and says so; the first two refuse readings for which no rule fires.
     """
 
     sampling: Sampling = "matlab"
@@ -79,14 +80,15 @@ def infer(
     """Answers of the `kind` of system to the readings X (N, inputs), in the inputs' units.
 
     `unit` is named in notes. Raises ValueError, naming input and row, for a reading that is not
-    finite, and as `options.out_of_range` says.
+    finite, as `options.out_of_range` says, and where rules fire without giving a finite answer.
     """
     options = options or Options()
     check_kind(system, kind)
     X = require_readings(system, X)
     X, notes = in_range(system, X, options.out_of_range, unit)
-    output = _evaluate(system, X, kind, options)
-    output, silent = _answered(system, X, output, options.out_of_range)
+    with np.errstate(over="ignore", invalid="ignore"):  # an answer that is not finite is refused
+        output = _evaluate(system, X, kind, options)
+    output, silent = _answered(system, X, output, options)
     return Inferred(output.value, output.interval, (*notes, *silent), method(system, kind, options))
 
 
@@ -177,28 +179,77 @@ def _block(system: System, X: Array, kind: str, options: Options) -> Output:
 
 
 def _answered(
-    system: System, X: Array, output: Output, policy: OutOfRange
+    system: System, X: Array, output: Output, options: Options
 ) -> tuple[Output, tuple[str, ...]]:
     """The output with an answer in every row: the middle of the universe where MATLAB has it."""
-    silent = np.flatnonzero(~(output.strength >= LEAST_STRENGTH))
-    if not silent.size:
+    fires = output.strength >= LEAST_STRENGTH
+    known = np.isfinite(output.value)
+    if output.interval is not None:
+        known &= np.isfinite(output.interval).all(axis=-1)
+    if (fires & known).all():
         return output, ()
-    row = silent[0]
-    readings = ", ".join(
-        f"{variable.name} = {value:g}"
-        for variable, value in zip(system.inputs, X[row], strict=True)
-    )
-    found = f"no rule fires for {readings} (row {row + 1} of {len(X)})"
-    if policy != "matlab":
-        raise ValueError(f"{found}: add a rule or widen a set that covers these readings")
-    middle = 0.5 * (system.output.low + system.output.high)
-    value = np.where(np.isfinite(output.value), output.value, middle)
+    if (fires & ~known).any():
+        raise ValueError(_no_number(system, X, fires & ~known, options))
+    if options.out_of_range != "matlab":
+        raise ValueError(
+            f"no rule fires for {_readings(system, X, ~fires)}: add a rule or widen a set that "
+            "covers these readings"
+        )
+    return _with_middle(system, output, known), _on_silence(system, X, known, fires)
+
+
+def _no_number(system: System, X: Array, rows: NDArray[np.bool_], options: Options) -> str:
+    """Why rows have no finite answer although rules fire, and what to do."""
+    output, readings = system.output, _readings(system, X, rows)
+    universe = f"{output.low:g}-{output.high:g}"
+    if system.is_sugeno:
+        why = "its consequents overflow: correct the reading or the coefficients"
+    elif options.sampling == "exact":
+        why = f"a set that fires has no mass on {universe}: move or widen the set"
+    else:
+        why = (
+            f"a set that fires has no mass on the {options.samples} samples of {universe}: "
+            "raise samples, or choose exact sampling, or move the set"
+        )
+    return f"{output.name}: no finite answer for {readings}; {why}"
+
+
+def _readings(system: System, X: Array, rows: NDArray[np.bool_]) -> str:
+    """The readings of the first of these rows, its number, and how many more there are."""
+    first, others = int(rows.argmax()), int(rows.sum()) - 1
+    pairs = zip(system.inputs, X[first], strict=True)
+    readings = ", ".join(f"{variable.name} = {value:g}" for variable, value in pairs)
+    more = f" and {others} more" if others else ""
+    return f"{readings} (row {first + 1} of {len(X)}{more})"
+
+
+def _with_middle(system: System, output: Output, known: NDArray[np.bool_]) -> Output:
+    """The output with the middle of the universe in all rows but the known ones."""
+    low, high = system.output.low, system.output.high
+    value = np.where(known, output.value, 0.5 * (low + high))
     interval = output.interval
     if interval is not None:
-        ends = np.array([system.output.low, system.output.high])
-        interval = np.where(np.isfinite(interval), interval, ends)
-    note = f"{found}: the answer is no more than the middle of the universe, as in MATLAB"
-    return Output(value, interval, output.strength), (note,)
+        interval = np.where(known[:, None], interval, np.array([low, high]))
+    return Output(value, interval, output.strength)
+
+
+def _on_silence(
+    system: System, X: Array, known: NDArray[np.bool_], fires: NDArray[np.bool_]
+) -> tuple[str, ...]:
+    """What was done in rows without a rule that fires by LEAST_STRENGTH."""
+    cases = (
+        (~known, "no rule fires", "the answer is no more than the middle of the universe"),
+        (
+            known & ~fires,
+            f"no rule fires by {LEAST_STRENGTH:g} or more",
+            "the answer is computed from what is left",
+        ),
+    )
+    return tuple(
+        f"{found} for {_readings(system, X, rows)}: {done}, as in MATLAB"
+        for rows, found, done in cases
+        if rows.any()
+    )
 
 
 def method(system: System, kind: str, options: Options) -> str:
@@ -220,9 +271,10 @@ def method(system: System, kind: str, options: Options) -> str:
             return f"Sugeno: {joins}, {_averaged(options)}"
         case "sugeno":
             return f"Sugeno: constants by {points} over each output set, {_averaged(options)}"
+    exact_ends = "middle of the exact Karnik-Mendel interval"
     reduced = {
-        "karnik-mendel": "middle of the exact Karnik-Mendel interval",
-        "eiasc": "middle of the interval by EIASC",
+        "karnik-mendel": exact_ends,
+        "eiasc": exact_ends if options.sampling == "exact" else "middle of the interval by EIASC",
         "nie-tan": "Nie-Tan centroid, interval by Karnik-Mendel",
     }[options.reducer]
     return f"Interval type-2: {joins}, {reduced}, {points}"

@@ -270,8 +270,10 @@ def fill_upper(x: Floats, n: int, sets: Sets, degrees: Floats) -> None:
         i, row, low, high = column[s], 2 * s, shape[s, 4], shape[s, 5]
         shift, factor = footprint[s, 0], 1.0 + footprint[s, 1]
         for b in range(n):
-            toward = min(max(x[i, b], low), high) - x[i, b]
-            moved = x[i, b] + min(max(toward, -shift), shift)
+            nearest = min(max(x[i, b], low), high)
+            distance = nearest - x[i, b]
+            step = min(max(distance, -shift), shift)
+            moved = nearest if step == distance else x[i, b] + step
             degrees[row, b] = stretched(moved, low, high, factor)
         fill_form(kind[s], shape, s, n, degrees, row)
         finish_form(kind[s], n, degrees, row)
@@ -401,7 +403,7 @@ def degree(kind: int, p: float, q: float, r: float, t: float, x: float) -> float
         return min(rise, fall) if p <= x <= t else 0.0
     if kind == SPLINE:
         rise, fall = spline(x, p, q), spline(x, t, r)
-        return min(rise, fall)
+        return min(rise, fall) if p <= x <= t else 0.0
     if kind == BELL:
         return 1.0 / (1.0 + math.pow(abs((x - r) / p), 2.0 * q))
     rise, fall = sigmoid(x, p, q), sigmoid(x, r, t)
@@ -605,7 +607,10 @@ def end_of_row(grid: Grid, lower: Floats, upper: Floats, side: int, least_area: 
 def average(
     x: Floats, heights: Floats, coefficients: Floats, n: int, value: Floats, start: int
 ) -> None:
-    """Average of the consequents (K, D + 1) weighted by the heights (K, BLOCK)."""
+    """Average of the consequents (K, D + 1) weighted by the heights (K, BLOCK).
+
+    Without height a consequent has no say, even if it is no number.
+    """
     total, moment, answer = np.zeros(n), np.zeros(n), np.empty(n)
     for k in range(len(heights)):
         for b in range(n):
@@ -616,6 +621,6 @@ def average(
                 answer[b] += coefficient * x[i, b]
         for b in range(n):
             total[b] += heights[k, b]
-            moment[b] += heights[k, b] * answer[b]
+            moment[b] += heights[k, b] * answer[b] if heights[k, b] > 0.0 else 0.0
     for b in range(n):
         value[start + b] = moment[b] / total[b] if total[b] > 0.0 else np.nan

@@ -103,7 +103,7 @@ def _check_parameters(one: FuzzySet) -> None:
     if not form.valid(one.parameters):
         raise ValueError(
             f"set {one.name!r}: parameters {one.parameters} do not form a {one.kind}; "
-            "give positive widths, slopes other than 0, and corners in rising order"
+            f"{REMEDIES.get(one.kind, 'give positive widths and slopes other than 0')}"
         )
 
 
@@ -136,8 +136,12 @@ def _ramp(x: Array, foot: float, top: float) -> Array:
 
 
 def _trapezoid(x: Array, a: float, b: float, c: float, d: float) -> Array:
-    inside = (x >= a) & (x <= d)
-    return np.where(inside, np.minimum(_ramp(x, a, b), _ramp(x, d, c)), 0.0)
+    return _inside(x, a, d, np.minimum(_ramp(x, a, b), _ramp(x, d, c)))
+
+
+def _inside(x: Array, low: float, high: float, mu: Array) -> Array:
+    """Mu between the feet and 0 beyond them, where a vertical flank would leave it at 1."""
+    return np.where((x >= low) & (x <= high), mu, 0.0)
 
 
 def _sigmoid(x: Array, slope: float, centre: float) -> Array:
@@ -149,6 +153,10 @@ def _spline(x: Array, foot: float, top: float) -> Array:
     """Two parabolas from 0 at foot to 1 at top, either way round."""
     t = _ramp(x, foot, top)
     return np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
+
+
+def _pi(x: Array, a: float, b: float, c: float, d: float) -> Array:
+    return _inside(x, a, d, np.minimum(_spline(x, a, b), _spline(x, d, c)))
 
 
 def _two_sided(x: Array, p: Parameters) -> Array:
@@ -237,11 +245,20 @@ FORMS: dict[str, Form] = {
     "pimf": Form(
         "foot_left top_left top_right foot_right",
         _rising,
-        lambda x, p: np.minimum(_spline(x, p[0], p[1]), _spline(x, p[3], p[2])),
+        lambda x, p: _pi(x, *p),
         lambda p: (p[1], p[2]),
     ),
 }
 """Every kind of membership function, by its name in `.fis` files."""
+
+
+_CORNERS = "give corners in rising order, the first below the last"
+REMEDIES: dict[str, str] = {
+    **dict.fromkeys(("trimf", "trapmf", "zmf", "smf", "pimf"), _CORNERS),
+    "gauss2mf": "give positive widths, and centre_left at most centre_right: the other way round, "
+    "which MATLAB allows, it has no core and stays below 1",
+}
+"""What to do about parameters that are not valid, for kinds with more to say than most."""
 
 
 def core(one: FuzzySet) -> tuple[float, float]:
@@ -291,8 +308,12 @@ def upper_membership(one: FuzzySet, x: Array) -> Array:
     if shift == 0 and widths == 0:
         return membership(one, x)
     # Moving the set by s is moving x by -s: the best x within reach is the nearest to the core.
-    nearest = x + np.clip(np.clip(x, *core(one)) - x, -shift, shift)
-    return membership(one, _stretched(one, nearest, 1.0 + widths))
+    nearest = np.clip(x, *core(one))
+    distance = nearest - x
+    step = np.clip(distance, -shift, shift)
+    # A sum would round to either side of the core's end, which may be a vertical flank.
+    moved = np.where(step == distance, nearest, x + step)
+    return membership(one, _stretched(one, moved, 1.0 + widths))
 
 
 def lower_membership(one: FuzzySet, x: Array) -> Array:

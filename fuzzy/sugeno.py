@@ -27,7 +27,10 @@ def consequents(system: System, sampling: Sampling, samples: int) -> Array:
 
 
 def constants(system: System, sampling: Sampling, samples: int) -> Array:
-    """Centroid of each whole output set on the output's universe, shape (sets,)."""
+    """Centroid of each whole output set on the output's universe, shape (sets,).
+
+    NaN for a set without mass on it.
+    """
     if sampling == "exact":
         whole = np.eye(len(system.output.sets))
         return np.array([exact.centroid(system, heights, membership) for heights in whole])
@@ -45,8 +48,8 @@ def evaluate(system: System, X: Array, sampling: Sampling, samples: int, merge: 
     weights = merged(system, strengths, merge)
     table = consequents(system, sampling, samples)
     answers = table[:, :-1] @ X.T + table[:, -1:]
-    total = weights.sum(axis=0)
-    value = np.divide(
-        (weights * answers).sum(axis=0), total, out=np.full_like(total, np.nan), where=total > 0
-    )
+    # A set without weight has no say, even if it is off the universe and so without a constant.
+    weighted = np.multiply(weights, answers, out=np.zeros_like(weights), where=weights > 0)
+    moment, total = weighted.sum(axis=0), weights.sum(axis=0)
+    value = np.divide(moment, total, out=np.full_like(total, np.nan), where=total > 0)
     return Output(value, None, strengths.max(axis=0))

@@ -18,7 +18,7 @@ from fuzzy.system import System
 VALUE = "estimate"
 BOUNDS = ("lower", "upper")
 
-_ROW = re.compile(r"\(row (\d+)(?: of \d+)?")
+_ROW = r"\(row (\d+)(?: of \d+)?"
 
 
 class TableError(ValueError):
@@ -63,11 +63,11 @@ def evaluate_table(
     try:
         inferred = infer(system, X, kind, options, unit)
     except ValueError as error:
-        raise TableError(f"{table.file}: {_with_lines(str(error), table)}") from error
+        raise TableError(f"{table.file}: {_with_lines(str(error), table, system)}") from error
     answers = _columns(inferred).tolist()
     rows = (cells + answer for cells, answer in zip(table.rows, answers, strict=True))
     _write(csv_out, [*table.header, *added], rows)
-    return tuple(_with_lines(note, table) for note in inferred.notes)
+    return tuple(_with_lines(note, table, system) for note in inferred.notes)
 
 
 def read_readings(path: Path, system: System) -> Array:
@@ -159,9 +159,16 @@ def _reading(cell: str, table: Table, line: int, name: str) -> float:
     return value
 
 
-def _with_lines(message: str, table: Table) -> str:
+def _with_lines(message: str, table: Table, system: System) -> str:
     """The message with the line of the file where it names a row."""
-    return _ROW.sub(lambda row: f"(line {table.lines[int(row[1]) - 1]}", message)
+    # Names are matched too, and left alone, for one may itself look like the number of a row.
+    names = [re.escape(variable.name) for variable in (*system.inputs, system.output)]
+    pattern = "|".join([*sorted(names, key=len, reverse=True), _ROW])
+
+    def line(found: re.Match[str]) -> str:
+        return found[0] if found[1] is None else f"(line {table.lines[int(found[1]) - 1]}"
+
+    return re.sub(pattern, line, message)
 
 
 def _columns(inferred: Inferred) -> Array:

@@ -210,6 +210,35 @@ def test_functions_as_consequents(consequent, merge):
     assert_same(compiled(system, "sugeno", options).evaluate(X), wanted, allowed)
 
 
+# Vertical flanks
+
+
+def stepped(kind):
+    """A set for each way to have a vertical flank, all with an uncertain mean."""
+    corners = ((3.1, 3.1, 5.2, 6.7), (3.1, 4.4, 6.7, 6.7), (3.1, 3.1, 6.7, 6.7))
+    sets = tuple(FuzzySet(f"s{i}", kind, p, Footprint(mean=0.7)) for i, p in enumerate(corners))
+    out = tuple(FuzzySet(f"o{k}", "gaussmf", (0.5, 2.0 + 3 * k)) for k in range(len(sets)))
+    rules = tuple(Rule((Term(0, k),), k) for k in range(len(sets)))
+    return System((Variable("x", 0, 10, sets),), Variable("y", 0, 10, out), rules)
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("form", ["trapmf", "pimf"])
+def test_vertical_flanks_are_the_same_compiled(kind, form):
+    system, X = stepped(form), np.random.default_rng(1).uniform(0, 10, (5000, 1))
+    wanted, got = (
+        defined(system, X, kind, Options()),
+        compiled(system, kind, Options()).evaluate(X),
+    )
+    assert_same(got, wanted, SUMS * 10.0)
+    # Beyond the feet nothing fires, and within reach of the cores something fires fully.
+    reach = 0.7 if kind == "interval-type-2" else 0.0
+    beyond = (X[:, 0] < 3.1 - reach) | (X[:, 0] > 6.7 + reach)
+    assert 0.2 < beyond.mean() < 0.8
+    assert (got.strength[beyond] == 0.0).all()
+    assert (got.strength[~beyond] == 1.0).all()
+
+
 # Small strengths and areas
 
 

@@ -1,11 +1,15 @@
 """Readings that no system can answer are treated alike by all three, and never silently."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from fuzzy.inference import COMPILED_FROM_ROWS, SYSTEMS, Options, infer
+from fuzzy.compiled import compiled
+from fuzzy.inference import COMPILED_FROM_ROWS, LEAST_STRENGTH, SYSTEMS, Options, infer
 from fuzzy.sets import FuzzySet
 from fuzzy.system import Rule, System, Term, Variable
+from fuzzy.table import evaluate_table
 
 MIDDLE = 15.0
 
@@ -118,6 +122,130 @@ def test_a_sugeno_system_cannot_be_evaluated_as_mamdani():
         infer(system, [[0.5]], "type-3")
 
 
+# --- rules fire, and still there is no number --------------------------------------------------
+
+BETWEEN_SAMPLES = FuzzySet("thin", "trimf", (0.501, 0.505, 0.509))
+OFF_THE_UNIVERSE = FuzzySet("off", "trimf", (2.0, 3.0, 4.0))
+WIDE = FuzzySet("wide", "gaussmf", (0.1, 0.5))
+
+
+def beside(*outputs):
+    """One rule for each output set, from as many sets along [0, 1] that do not overlap."""
+    ends = np.linspace(0.0, 1.0, len(outputs) + 1).tolist()
+    inputs = tuple(
+        FuzzySet(f"a{i}", "trimf", (low, (low + high) / 2, high))
+        for i, (low, high) in enumerate(pairwise(ends))
+    )
+    rules = tuple(Rule((Term(0, k),), k) for k in range(len(outputs)))
+    return System((Variable("x", 0, 1, inputs),), Variable("y", 0, 1, outputs), rules)
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("policy", ["clamp", "raise", "matlab"])
+@pytest.mark.parametrize("thin", [BETWEEN_SAMPLES, OFF_THE_UNIVERSE])
+class TestWithoutMass:
+    WHAT = "a set that fires has no mass on the 101 samples of 0-1: raise samples"
+
+    @pytest.mark.parametrize("count", [2, COMPILED_FROM_ROWS])
+    def test_no_answer_is_refused_however_many_rows(self, kind, policy, thin, count):
+        x = [0.25] * (count - 1) + [0.75]
+        where = rf"^y: no finite answer for x = 0.75 \(row {count} of {count}\); {self.WHAT}"
+        with pytest.raises(ValueError, match=where):
+            answer(beside(WIDE, thin), x, kind, out_of_range=policy)
+
+    def test_so_is_that_of_a_single_row_compiled(self, kind, policy, thin):
+        model = compiled(beside(WIDE, thin), kind, Options(out_of_range=policy))
+        with pytest.raises(ValueError, match=self.WHAT):
+            model.one([0.75])
+        assert model.one([0.25]).value == pytest.approx(0.5, abs=1e-12)
+
+    @pytest.mark.parametrize("count", [1, COMPILED_FROM_ROWS])
+    def test_a_set_that_does_not_fire_spoils_no_answer(self, kind, policy, thin, count):
+        found = answer(beside(WIDE, thin), [0.25] * count, kind, out_of_range=policy)
+        assert found.value == pytest.approx(0.5, abs=1e-12)
+        assert found.notes == ()
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_the_remedies_for_a_set_between_samples_are_remedies(kind):
+    for options in ({"samples": 1001}, {"sampling": "exact"}):
+        found = answer(beside(BETWEEN_SAMPLES), [0.5], kind, **options)
+        assert found.value[0] == pytest.approx(0.505, abs=1e-9)
+
+
+def planes(*coefficients):
+    sets = (FuzzySet(f"p{k}", "linear", (factor, 1.0)) for k, factor in enumerate(coefficients))
+    x = FuzzySet("rising", "sigmf", (10.0, 0.5)), FuzzySet("falling", "sigmf", (-10.0, 0.5))
+    rules = tuple(Rule((Term(0, k),), k) for k in range(len(coefficients)))
+    return System((Variable("x", 0, 1, x),), Variable("y", 0, 1, tuple(sets)), rules)
+
+
+@pytest.mark.parametrize("count", [1, COMPILED_FROM_ROWS])
+def test_an_answer_that_overflows_is_refused(count):
+    options = Options(out_of_range="matlab")
+    for coefficients in ((10.0,), (10.0, 1.0), (-10.0,)):
+        with pytest.raises(ValueError, match=r"no finite answer for x = 1e\+308 .* overflow"):
+            infer(planes(*coefficients), np.full((count, 1), 1e308), "sugeno", options)
+        with pytest.raises(ValueError, match="overflow"):
+            compiled(planes(*coefficients), "sugeno", options).one([1e308])
+    # Neither the sigmoid's argument nor a consequent without weight spoils what has an answer.
+    found = infer(planes(0.5, 1e10), np.full((count, 1), 1e308), "sugeno", options)
+    assert found.value == pytest.approx(0.5e308)
+    assert compiled(planes(0.5, 1e10), "sugeno", options).one([1e308]).value == found.value[0]
+
+
+# --- readings for which next to nothing fires --------------------------------------------------
+
+# exp(-x^2 / 2 sd^2) = 1e-13: less than LEAST_STRENGTH, and more than nothing.
+WEAK = 5.0 + np.sqrt(2.0 * np.log(1e13))
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("fillers", [0, COMPILED_FROM_ROWS])
+def test_an_answer_by_rules_that_hardly_fire_is_said_to_be_that(kind, fillers):
+    x = [WEAK, *[5.0] * fillers, 60.0, WEAK, 70.0]
+    # On 151 samples the triangle's feet are samples, so that sums over it are symmetric.
+    found = answer(narrow(), x, kind, out_of_range="matlab", samples=151)
+    n = len(x)
+    nothing, little = found.notes
+    assert nothing == (
+        f"no rule fires for hcv = 60 (row {n - 2} of {n} and 1 more): the answer is no more than "
+        "the middle of the universe, as in MATLAB"
+    )
+    assert little == (
+        f"no rule fires by {LEAST_STRENGTH:g} or more for hcv = {WEAK:g} (row 1 of {n} and 1 more):"
+        " the answer is computed from what is left, as in MATLAB"
+    )
+    assert found.value[[-3, -1]].tolist() == [MIDDLE, MIDDLE]
+    # Clipped at next to nothing, the triangle on [0, 10] is a box, whose centroid is still 5.
+    assert found.value[[0, -2]] == pytest.approx(5.0, abs=1e-9)
+    model = compiled(narrow(), kind, Options(out_of_range="matlab", samples=151))
+    for row in (0, -1):
+        single = model.one([x[row]])
+        assert single.silent
+        assert single.value == pytest.approx(found.value[row], abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_the_refusal_of_silence_counts_the_silent_rows(kind):
+    with pytest.raises(ValueError, match=r"hcv = 40 \(row 2 of 4 and 1 more\): add a rule"):
+        answer(narrow(), [5, 40, 5, 50], kind)
+
+
+@pytest.mark.parametrize("name", ["x (row 9)", "x (row 9 of 9)", "(row 1", "row", ""])
+def test_a_table_takes_no_name_for_the_number_of_a_row(tmp_path, name):
+    system = narrow()
+    system = System((Variable(name, 0, 100, system.inputs[0].sets),), system.output, system.rules)
+    table, out = tmp_path / "in.csv", tmp_path / "out.csv"
+    table.write_text(f"{name},other\n5,1\n700,2\n")
+    outside, silent = evaluate_table(system, table, out, "mamdani", Options(out_of_range="matlab"))
+    assert outside.startswith(f"{name}: reading 700 (")
+    assert silent.startswith(f"no rule fires for {name} = 700 (")
+    if name != "(row 1":  # which is found in the number of the row, too
+        assert "= 700 (line 3)" in silent
+        assert "700 (line 3) is outside" in outside
+
+
 def test_every_answer_states_how_it_was_computed():
     stated = {
         answer(ramp(), [3], kind, **options).method
@@ -136,6 +264,16 @@ def test_every_answer_states_how_it_was_computed():
     assert len(stated) == 9
     joins = "AND min, OR max, implication min, aggregation max"
     assert f"Mamdani: {joins}, centroid by sums over 101 points" in stated
+
+
+def test_exact_sampling_does_not_claim_an_iteration_it_does_not_run():
+    exact = {
+        answer(ramp(), [3], "interval-type-2", sampling="exact", reducer=reducer).method
+        for reducer in ("eiasc", "karnik-mendel")
+    }
+    assert len(exact) == 1
+    assert not any("EIASC" in method for method in exact)
+    assert "EIASC" in answer(ramp(), [3], "interval-type-2", reducer="eiasc").method
 
 
 # --- systems that are none ---------------------------------------------------------------------

@@ -155,6 +155,48 @@ def test_a_footprint_drawn_too_narrow_lets_members_pass():
     assert (within < lower_membership(one, X) - 1e-4).any()
 
 
+# Reach of a set with a vertical flank, by its kind; the core is [10, 20].
+VERTICAL = [
+    ("trapmf", (10.0, 10.0, 20.0, 20.0)),
+    ("trapmf", (10.0, 10.0, 20.0, 31.3)),
+    ("trapmf", (-1.7, 10.0, 20.0, 20.0)),
+    ("pimf", (10.0, 10.0, 20.0, 20.0)),
+]
+
+
+@pytest.mark.parametrize(("kind", "parameters"), VERTICAL)
+@pytest.mark.parametrize("spread", [0.0, 0.3])
+def test_the_upper_membership_is_one_wherever_the_core_can_come(kind, parameters, spread):
+    rng = np.random.default_rng(1)
+    for mean in (2.5, 0.1, 1 / 3):
+        one = FuzzySet("one", kind, parameters, Footprint(mean=mean, spread=spread))
+        # A hair inside the reach, for its very end is rounded itself.
+        x = rng.uniform(10 - mean + 1e-12, 20 + mean - 1e-12, 2000)
+        assert (upper_membership(one, x) == 1.0).all()
+        if parameters[0] == parameters[1]:
+            assert upper_membership(one, np.array([10 - mean - 1e-9]))[0] == 0.0
+
+
+def test_at_a_vertical_flank_of_a_triangle_the_upper_membership_is_one():
+    one = FuzzySet("a", "trimf", (1.3, 1.3, 20.0), Footprint(mean=2.5))
+    x = np.array([3.30098])
+    assert upper_membership(one, x)[0] == 1.0
+    # The sum that leads there misses the core, so that adding alone would answer 0.
+    assert x[0] + (1.3 - x[0]) < 1.3
+
+
+@pytest.mark.parametrize(
+    "corners", [(0.2, 0.2, 0.4, 0.6), (0.2, 0.4, 0.6, 0.6), (0.2, 0.2, 0.6, 0.6)]
+)
+def test_beyond_a_vertical_flank_a_pimf_is_zero_as_a_trapmf_is(corners):
+    x = np.array([-5.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.61, 7.0])
+    pi, trapezoid = (membership(FuzzySet("one", kind, corners), x) for kind in ("pimf", "trapmf"))
+    beyond = (x < 0.2) | (x > 0.6)
+    assert (pi[beyond] == 0.0).all()
+    assert ((pi == 1.0) == (trapezoid == 1.0)).all()
+    assert ((pi > 0.0) == (trapezoid > 0.0)).all()
+
+
 def test_scale_and_lag_lower_the_lower_membership_alone():
     plain = FuzzySet("one", "trimf", (1.0, 4.0, 9.0))
     one = FuzzySet("one", "trimf", (1.0, 4.0, 9.0), Footprint(scale=0.8, lag=0.25))
@@ -182,7 +224,7 @@ def test_without_footprint_the_bounds_are_the_function(kind, parameters):
         ("gaussmf", (1.0,), {}, r"takes 2 parameters \(sd, centre\), got 1"),
         ("gaussmf", (0.0, 2.0), {}, "do not form a gaussmf"),
         ("gaussmf", (np.nan, 2.0), {}, "give finite numbers"),
-        ("gauss2mf", (1.0, 5.0, 1.0, 4.0), {}, "do not form a gauss2mf"),
+        ("gauss2mf", (1.0, 5.0, 1.0, 4.0), {}, "do not form a gauss2mf.* which MATLAB allows"),
         ("trimf", (1.0, 3.0, 2.0), {}, "do not form a trimf"),
         ("trimf", (1.0, 1.0, 1.0), {}, "do not form a trimf"),
         ("gbellmf", (1.0, -2.0, 0.0), {}, "do not form a gbellmf"),
