@@ -6,6 +6,17 @@ POISSON_RATIO = 0.25
 """Of every lattice of central springs, whatever their stiffness."""
 
 
-def reference_stiffness(youngs_modulus: float, spacing: float) -> float:
-    """k_ref = 0.4 E h [N/m], the edge stiffness of the plain edge and face-diagonal lattice."""
-    return 0.4 * youngs_modulus * spacing
+def reference_stiffness(
+    youngs_modulus: float, spacing: float, poisson_ratio: float = POISSON_RATIO
+) -> float:
+    """k_ref = mu h [N/m], the edge stiffness of the plain edge and face-diagonal lattice.
+
+    Without a volume term the springs are the whole material, of nu = 1/4, and k_ref = 0.4 E h.
+    """
+    return lame(youngs_modulus, poisson_ratio)[1] * spacing
+
+
+def lame(youngs_modulus: float, poisson_ratio: float) -> tuple[float, float]:
+    """Lame's lambda and mu [Pa]."""
+    mu = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
+    return 2.0 * mu * poisson_ratio / (1.0 - 2.0 * poisson_ratio), mu

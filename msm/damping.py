@@ -1,4 +1,8 @@
-"""Nodal damping to ground: eq. (2) of the fuzzy-tuned model, eq. (9) of the benchmark."""
+"""Damping: to ground, eq. (2) of the fuzzy-tuned model and eq. (9) of the benchmark, or Rayleigh's.
+
+Damping to ground resists rigid motion too. Rayleigh's, C = a M + b K, splits into a part of that
+kind, a M, and dashpots along the springs, b K (`msm.rayleigh`), which leave rigid motion alone.
+"""
 
 from __future__ import annotations
 
@@ -26,3 +30,26 @@ def eq_2(zeta: float, k: float, mass: float) -> Damping:
 def eq_9(gamma_0: float, gamma_1: float, mass: float) -> Damping:
     """gamma_0 [N s/m] and gamma_1 [N s/m^2] of a node of the given mass [kg]."""
     return Damping(gamma_0 / mass, gamma_1 / mass)
+
+
+def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> tuple[Damping, float]:
+    """Mass part, as nodal damping, and stiffness part b [s] with the ratios at two frequencies.
+
+    From zeta = (a / omega + b omega) / 2, omega [rad/s]. ValueError if that takes a negative part,
+    which would feed some mode.
+    """
+    (z1, z2), (w1, w2) = zetas, omegas
+    if not (w1 > 0.0 and w2 > 0.0 and w1 != w2):
+        raise ValueError(f"Rayleigh damping needs two different frequencies, not {w1:g} and {w2:g}")
+    spread = w2**2 - w1**2
+    a, b = 2.0 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2.0 * (z2 * w2 - z1 * w1) / spread
+    if not (a >= 0.0 and b >= 0.0):
+        raise ValueError(
+            f"no Rayleigh damping has ratios {z1:g} at {w1:g} rad/s and {z2:g} at {w2:g} rad/s: "
+            f"it would need a = {a:.3g} 1/s and b = {b:.3g} s, both at least 0; bring the two "
+            "ratios, or the two frequencies, closer together"
+        )
+    return Damping(a), b
+
+
+UNDAMPED = Damping(0.0)

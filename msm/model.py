@@ -3,247 +3,321 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array, diags_array, eye_array, kron
-from scipy.sparse.linalg import cg, eigsh
 
 from msm import lattice as cells
-from msm.damping import Damping
-from msm.kernel import Network, advance
-from msm.laws import Law, initial_stiffness, largest_stiffness
-from msm.springs import Springs, connect, stiffness_matrix
-from study.contact import Foundation, ToolPatch
-from study.mesh.quadrature import SurfaceRule
-from study.organ.occupancy import Body
+from msm.assembly import Assembly, Material, arrays, assemble
+from msm.checkpoint import Checkpoint, Keeper, identity, program
+from msm.integrators import INTEGRATORS
+from msm.laws import Hooke, Law
+from msm.linearised import farthest, inverted_cells, largest_strain
+from msm.network import Network
+from msm.stability import DEFAULT, Follower, critical_time_step
+from msm.statics import static_displacement
+from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.trajectory import Observation, Trajectory, empty_trajectory
 
+__all__ = [
+    "DEFAULT",
+    "Assembly",
+    "Automatic",
+    "Checkpoint",
+    "Counts",
+    "Fixed",
+    "Material",
+    "Rate",
+    "Run",
+    "Step",
+    "arrays",
+    "assemble",
+    "critical_time_step",
+    "run",
+    "static_displacement",
+]
+
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Advance = Callable[[float, int, float, Floats, Floats], None]
+OnSample = Callable[[int, Floats, Floats], None]
 
-STATIC_TOLERANCE = 1e-10
 MAX_STEPS = 300_000
-
+FOLLOWED = Automatic()
 FAR = 1.0
 """A displacement of more than this many organ sizes is divergence, however finite."""
 
 
 @dataclass(frozen=True)
-class Assembly:
-    """A lattice over an organ with its springs, support and load, whatever the springs' law.
-
-    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
-    """
-
-    lattice: cells.CellLattice
-    springs: Springs
-    mass: Floats
-    foundation: csr_array
-    load: Floats
-
-
-@dataclass(frozen=True)
 class Run:
-    """Trajectory with what it took; `wall` [s] is the kernel alone, without compilation.
+    """Trajectory with what it took.
 
-    `largest_strain`: largest absolute strain of a spring, `inverted_cells`: largest number of cells
-    turned inside out, both over the samples.
+    `substeps` (samples - 1,): steps in each sampling interval, zero after the one in which a run
+    diverged. `smallest_step`, `largest_step` [s]; `critical_time_step` [s] at rest; `margin`:
+    smallest ratio of the critical step to the step taken, wherever it was looked at;
+    `repeated_steps`: steps undone because the limit had fallen below them; `wall` [s]: steps and
+    following of the limit, without compilation. `largest_strain`: largest absolute strain of a
+    spring, `inverted_cells`: largest number of cells turned inside out, both over the samples.
     """
 
     trajectory: Trajectory
-    time_step: float
+    substeps: Ints
+    smallest_step: float
+    largest_step: float
     critical_time_step: float
-    steps: int
+    margin: float
+    repeated_steps: int
     wall: float
     largest_strain: float
     inverted_cells: int
 
-
-def assemble(
-    body: Body,
-    surface: SurfaceRule,
-    density: float,
-    spacing: float,
-    foundation: Foundation,
-    tool: ToolPatch,
-    flexion: float = 0.0,
-    body_diagonals: float = 0.0,
-) -> Assembly:
-    """Lattice over the body. ValueError if it is empty, not held, or not touched by the tool."""
-    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
-    lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
-    lattice = cells.build(body, lower, upper, spacing)
-    held = foundation.density(surface.points, surface.normals) * surface.weights
-    pushed = tool.profile(surface.points, surface.normals) * surface.weights
-    if not held.any():
-        raise ValueError("the support holds no surface; enlarge support.depth")
-    if not pushed.any():
-        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
-    weights, _ = cells.interpolation(lattice, surface.points)
-    support = csr_array(weights.T @ diags_array(held) @ weights)
-    nodal = weights.T @ (pushed * tool.force / pushed.sum())
-    return Assembly(
-        lattice,
-        connect(lattice, flexion, body_diagonals),
-        density * cells.node_volumes(lattice),
-        support,
-        np.outer(nodal, tool.direction),
-    )
-
-
-def critical_time_step(assembly: Assembly, law: Law) -> float:
-    """Largest stable step [s] of the undamped lattice, 2 / omega_max, at the law's largest slope.
-
-    Implicit damping only lengthens it. It is the limit at rest: springs pressed to half their
-    length are stiffer across than along and may fail below it.
-    """
-    stiffness = _stiffness(assembly, largest_stiffness(law))
-    count = len(assembly.mass)
-    scale = diags_array(np.repeat(1.0 / np.sqrt(assembly.mass), 3))
-    start = np.random.default_rng(0).standard_normal(3 * count)
-    operator = csc_array(scale @ stiffness @ scale)
-    omega_squared = eigsh(operator, k=1, which="LA", v0=start, return_eigenvectors=False)
-    return float(2.0 / np.sqrt(omega_squared[0]))
-
-
-def static_displacement(assembly: Assembly, law: Law) -> Floats:
-    """Displacement [m] (n, 3) at rest under the full load, springs linearised at rest."""
-    stiffness = _stiffness(assembly, initial_stiffness(law))
-    # Factors of a 3-D lattice fill in: at 20 000 nodes they take gigabytes. The lattice is well
-    # conditioned but for a stiff support, which the diagonal takes care of.
-    found, failed = cg(
-        stiffness,
-        assembly.load.ravel(),
-        rtol=STATIC_TOLERANCE,
-        maxiter=20 * len(assembly.mass),
-        M=diags_array(1.0 / stiffness.diagonal()),
-    )
-    if failed:
-        raise ValueError("the lattice finds no rest: the support does not hold it")
-    return np.asarray(found.reshape(-1, 3))
-
-
-def _stiffness(assembly: Assembly, k_ref: float) -> csr_array:
-    """Stiffness [N/m] (3 n, 3 n) of springs and support at rest."""
-    springs = stiffness_matrix(assembly.springs, len(assembly.mass), k_ref)
-    return csr_array(springs + kron(assembly.foundation, eye_array(3)))
+    @property
+    def steps(self) -> int:
+        """Steps in all intervals."""
+        return int(self.substeps.sum())
 
 
 def run(
     assembly: Assembly,
-    law: Law,
-    damping: Damping,
+    material: Material,
     factor: Callable[[Floats], Floats],
     observation: Observation,
-    step_fraction: float,
-    refinement: int = 1,
+    step: Step = FOLLOWED,
     on_progress: Callable[[float], None] = lambda _: None,
+    *,
+    integrator: str = DEFAULT,
+    linear: bool = False,
+    on_sample: OnSample = lambda *_: None,
+    checkpoint: Checkpoint | None = None,
 ) -> Run:
-    """Motion from rest with steps of at most `step_fraction` of the critical one.
+    """Motion from rest under the load times `factor` of the time [s].
 
-    `refinement` divides those steps, whatever their length. ValueError if there would be too many.
+    An integrator without a limit takes, with an automatic step, one step per sample; `linear` takes
+    the forces of small displacements. `on_sample(sample, u, v)`, u [m] and v [m/s] (n, 3) to be
+    copied, is told each sample in turn, and where samples are undone again the one from which the
+    run goes on: the last one told is where it stands. A run with a `checkpoint` can be continued
+    from it, and then tells first the sample it continues from. ValueError if there would be too
+    many steps, if the step does not suit the samples, the integrator the springs, or the
+    checkpoint the run.
     """
-    critical = critical_time_step(assembly, law)
+    method = INTEGRATORS[integrator]
+    if method.hooke_only and not isinstance(material.law, Hooke):
+        raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")
+    net = arrays(assembly, material, linear=linear)
+    follower = Follower(material.law, net, method)
     interval = float(observation.times[1] - observation.times[0])
-    per_sample = refinement * int(np.ceil(interval / (step_fraction * critical) - 1e-9))
-    if per_sample * len(observation.times) > MAX_STEPS:
+    pace = Pace(step, interval, len(observation.times) - 1, follower.limit)
+    pace.start(np.zeros_like(net.load))  # and compile what follows the limit
+    _refuse_too_many_steps(pace)
+
+    def advance(start: float, count: int, dt: float, u: Floats, v: Floats) -> None:
+        starts = np.asarray(start + dt * np.arange(count), dtype=np.float64)
+        factors = np.stack([factor(starts + at * dt) for at in method.at], axis=1)
+        method.advance(material.law, net, factors, dt, u, v)
+
+    advance(0.0, 0, interval, np.zeros_like(net.load), np.zeros_like(net.load))  # compiles
+    recorder = _Recorder(assembly.lattice, net, observation)
+    motion = _Motion(*np.zeros((2, *net.load.shape)))
+    recorder.record(0, motion.u, motion.v)
+    keeper = None
+    if checkpoint is not None:
+        found = _identity(assembly, material.law, net, integrator, step, observation, factor)
+        keeper = Keeper(checkpoint, found, _parts(motion, pace, follower, recorder))
+        keeper.resume()
+    lost = _march(advance, pace, follower, recorder, motion, on_progress, on_sample, keeper)
+    return _result(motion, lost, pace, recorder)
+
+
+def _identity(
+    assembly: Assembly,
+    law: Law,
+    net: Network,
+    integrator: str,
+    step: Step,
+    observation: Observation,
+    factor: Callable[[Floats], Floats],
+) -> str:
+    """Of all that the trajectory follows from; the load's history at samples and between them."""
+    times = observation.times
+    history = factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
+    seen = tuple(getattr(observation, field.name) for field in fields(observation))
+    return identity(program(), assembly.lattice.nodes, law, net, integrator, step, seen, history)
+
+
+def _parts(
+    motion: _Motion, pace: Pace, follower: Follower, recorder: _Recorder
+) -> dict[str, object]:
+    """What changes in a run, by the names of `msm.checkpoint`."""
+    return {
+        "motion": motion,
+        "pace": pace,
+        "follower": follower,
+        "recorder": recorder,
+        "trajectory": recorder.trajectory,
+    }
+
+
+def _refuse_too_many_steps(pace: Pace) -> None:
+    intervals = len(pace.substeps)
+    steps = pace.choose(0) * intervals if pace.plan is None else int(pace.plan.sum())
+    if steps > MAX_STEPS:
         raise ValueError(
-            f"the lattice needs {per_sample * len(observation.times):.2g} steps of at most "
-            f"{step_fraction * critical:.2g} s, the limit is {MAX_STEPS:.0e}: reduce "
-            "time.duration or support.stiffness, or enlarge lattice.spacing"
+            f"the lattice needs {steps:.2g} steps of about {pace.interval * intervals / steps:.2g} "
+            f"s, the limit is {MAX_STEPS:.0e}: reduce time.duration or support.stiffness, or "
+            "enlarge lattice.spacing"
         )
-    dt = interval / per_sample
-    net = _network(assembly, damping)
-    advance(law, net, np.zeros(0), dt, *np.zeros((2, *net.load.shape)))  # compiles, or loads
-    trajectory, wall, strain, inverted = _march(
-        net, law, factor, observation, assembly, per_sample, on_progress
-    )
-    steps = per_sample * (len(observation.times) - 1)
-    return Run(trajectory, dt, critical, steps, wall, strain, inverted)
 
 
-def _network(assembly: Assembly, damping: Damping) -> Network:
-    foundation, springs = assembly.foundation, assembly.springs
-    length = springs.rest_length
-    return Network(
-        ends=np.ascontiguousarray(springs.ends, dtype=np.int32),
-        rest=np.ascontiguousarray(springs.rest),
-        length=length,
-        scale=springs.weight * length,
-        mass=assembly.mass,
-        gamma_0=damping.gamma_0 * assembly.mass,
-        gamma_1=damping.gamma_1 * assembly.mass,
-        row=foundation.indptr.astype(np.int32),
-        column=foundation.indices.astype(np.int32),
-        value=foundation.data,
-        load=np.ascontiguousarray(assembly.load),
-    )
+class _Lost(NamedTuple):
+    """Last sample before the lattice was lost, time [s] and node."""
+
+    sample: int
+    at: float
+    near: int
+
+
+@dataclass
+class _Motion:
+    """Where a run stands: u [m] and v [m/s] (n, 3) at a sample, steps undone, time taken [s]."""
+
+    u: Floats
+    v: Floats
+    sample: int = 0
+    repeated: int = 0
+    wall: float = 0.0
 
 
 def _march(
-    net: Network,
-    law: Law,
-    factor: Callable[[Floats], Floats],
-    observation: Observation,
-    assembly: Assembly,
-    per_sample: int,
+    advance: Advance,
+    pace: Pace,
+    follower: Follower,
+    recorder: _Recorder,
+    motion: _Motion,
     on_progress: Callable[[float], None],
-) -> tuple[Trajectory, float, float, int]:
-    """Trajectory, time in the kernel [s], largest spring strain, most cells inverted at once."""
-    u, v = np.zeros_like(net.load), np.zeros_like(net.load)
-    wall, largest, inverted = 0.0, 0.0, 0
-    recorder = _Recorder(assembly.lattice, observation)
-    limit = FAR * float(np.ptp(assembly.lattice.nodes, axis=0).max())
-    times = observation.times
-    dt = float(times[1] - times[0]) / per_sample
-    recorder.record(0, u, v)
-    for sample in range(1, len(times)):
-        # The load at the end of each step, as the position it drives.
-        ends = times[sample - 1] + dt * np.arange(1, per_sample + 1)
-        factors = factor(ends)
+    on_sample: OnSample,
+    keeper: Keeper | None,
+) -> _Lost | None:
+    """Go from sample to sample, and back to the last one kept where the steps were too long."""
+    u, v, intervals = motion.u, motion.v, len(pace.substeps)
+    kept = (motion.sample, u.copy(), v.copy())
+    on_sample(motion.sample, u, v)
+    while motion.sample < intervals:
         started = time.perf_counter()
-        advance(law, net, factors, dt, u, v)
-        wall += time.perf_counter() - started
-        size = np.abs(u).max(axis=1)
-        if not (size < limit).all():
-            worst = int(np.argmax(np.where(np.isnan(size), np.inf, size)))
-            diverged = replace(
-                recorder.trajectory,
-                status="diverged",
-                diverged_at=float(times[sample]),
-                diverged_near=assembly.lattice.nodes[worst],
-            )
-            return diverged, wall, largest, inverted
-        recorder.record(sample, u, v)
-        largest = max(largest, _largest_strain(net, u))
-        inverted = max(inverted, cells.inverted_cells(assembly.lattice, u))
-        on_progress(sample / (len(times) - 1))
-    return recorder.trajectory, wall, largest, inverted
+        taken, failed = _pass_interval(advance, pace, follower, recorder, motion.sample, u, v)
+        motion.wall += time.perf_counter() - started
+        if failed is None:
+            motion.sample += 1
+            recorder.record(motion.sample, u, v)
+            on_progress(motion.sample / intervals)
+            on_sample(motion.sample, u, v)
+            if pace.unseen == 0:
+                kept = (motion.sample, u.copy(), v.copy())
+                if keeper is not None:
+                    keeper.keep(last=motion.sample == intervals)
+        elif pace.gives_up():
+            return _lost(pace, recorder, motion.sample, taken, failed)
+        else:
+            motion.repeated += taken + int(pace.substeps[kept[0] : motion.sample].sum())
+            motion.sample, u[:], v[:] = kept
+            on_sample(motion.sample, u, v)
+    return None
 
 
-def _largest_strain(net: Network, u: Floats) -> float:
-    """Largest absolute strain of the springs."""
-    stretched = net.rest + u[net.ends[:, 1]] - u[net.ends[:, 0]]
-    return float(np.abs(np.linalg.norm(stretched, axis=1) / net.length - 1.0).max())
+def _lost(pace: Pace, recorder: _Recorder, sample: int, taken: int, node: int) -> _Lost:
+    at = recorder.times[sample] + pace.interval * taken / pace.substeps[sample]
+    pace.substeps[sample + 1 :] = 0
+    return _Lost(sample, float(at), node)
+
+
+def _pass_interval(
+    advance: Advance,
+    pace: Pace,
+    follower: Follower,
+    recorder: _Recorder,
+    sample: int,
+    u: Floats,
+    v: Floats,
+) -> tuple[int, int | None]:
+    """Steps taken from a sample to the next; a node where they failed, and then not all of them."""
+    count = pace.choose(sample)
+    dt = pace.interval / count
+    taken = 0
+    for stretch in _stretches(count):
+        advance(recorder.times[sample] + taken * dt, stretch, dt, u, v)
+        taken += stretch
+        pace.unseen += stretch
+        size, node = farthest(u)
+        if not size < recorder.far:
+            pace.halve()
+            return taken, node
+        if pace.is_due(sample) and not pace.keeps_up(dt, u):
+            return taken, follower.stiffest()
+    return taken, None
+
+
+def _stretches(count: int) -> Iterator[int]:
+    """Parts of at most LOOK steps, nearly equal, of a number of steps."""
+    parts = -(-count // LOOK)
+    for part in range(parts):
+        yield (part + 1) * count // parts - part * count // parts
+
+
+def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder) -> Run:
+    steps = pace.interval / pace.substeps[pace.substeps > 0]
+    return Run(
+        recorder.trajectory if lost is None else recorder.diverged(lost),
+        pace.substeps,
+        float(steps.min(initial=np.inf)),
+        float(steps.max(initial=0.0)),
+        pace.at_rest,
+        pace.margin,
+        motion.repeated,
+        motion.wall,
+        float(recorder.strain.max()),
+        int(recorder.inverted.max()),
+    )
 
 
 class _Recorder:
-    """Writes what is observed into the arrays of a trajectory."""
+    """Writes what is observed into arrays, over what was written there before."""
 
-    def __init__(self, lattice: cells.CellLattice, observation: Observation) -> None:
-        self.frames = observation.frames
+    def __init__(self, lattice: cells.CellLattice, net: Network, observation: Observation) -> None:
+        self.net, self.lattice, self.cells = net, lattice, lattice.cells.astype(np.int32)
+        self.far = FAR * float(np.ptp(lattice.nodes, axis=0).max())
+        self.times, self.frames = observation.times, observation.frames
         self.trajectory = empty_trajectory(observation)
+        self.strain = np.zeros(len(observation.times))
+        self.inverted = np.zeros(len(observation.times), dtype=np.int64)
         self.at_probes, _ = cells.interpolation(lattice, observation.probes)
         self.in_volume, _ = cells.interpolation(lattice, observation.volume_points)
         self.on_surface, _ = cells.interpolation(lattice, observation.surface_points)
 
     def record(self, sample: int, u: Floats, v: Floats) -> None:
         """Keep the motion at one sample."""
+        self.strain[sample] = largest_strain(self.net, u)
+        self.inverted[sample] = inverted_cells(self.cells, self.lattice.spacing, u)
         self.trajectory.displacement[sample] = self.at_probes @ u
         self.trajectory.velocity[sample] = self.at_probes @ v
         for i, frame in enumerate(self.frames):  # the peak may be the last sample too
             if frame == sample:
                 self.trajectory.volume_field[i] = self.in_volume @ u
                 self.trajectory.surface_field[i] = self.on_surface @ u
+
+    def diverged(self, lost: _Lost) -> Trajectory:
+        """The trajectory up to where it was lost; later samples that were undone are cleared."""
+        after = np.arange(len(self.times)) > lost.sample
+        late = after[np.asarray(self.frames, dtype=int)]
+        self.strain[after], self.inverted[after] = 0.0, 0
+        self.trajectory.displacement[after] = np.nan
+        self.trajectory.velocity[after] = np.nan
+        self.trajectory.volume_field[late] = np.nan
+        self.trajectory.surface_field[late] = np.nan
+        return replace(
+            self.trajectory,
+            status="diverged",
+            diverged_at=lost.at,
+            diverged_near=self.lattice.nodes[lost.near],
+        )

@@ -27,6 +27,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+LARGEST_BODY_SHARE = 0.9
+
+
 @dataclass(frozen=True)
 class Springs:
     """Ends (s, 2), rest vectors [m] (s, 3) from the first end, stiffness relative to k_ref (s,)."""
@@ -45,8 +48,15 @@ def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 
     """Springs of the lattice.
 
     `flexion`: share of the axial stiffness in flexion springs; `body_diagonals`: share of the shear
-    stiffness in body diagonals. Both lie in [0, 1].
+    stiffness in body diagonals. ValueError outside [0, 1] and [0, LARGEST_BODY_SHARE].
     """
+    if not 0.0 <= flexion <= 1.0:
+        raise ValueError(f"flexion = {flexion:g}: give a share from 0 to 1")
+    if not 0.0 <= body_diagonals <= LARGEST_BODY_SHARE:
+        raise ValueError(
+            f"body_diagonals = {body_diagonals:g}: give a share from 0 to {LARGEST_BODY_SHARE:g}; "
+            "without face diagonals layers of nodes could shift in a chequerboard at no cost"
+        )
     axial = 1.0 + body_diagonals
     structural = _cell_springs(lattice, 1, axial / 4.0)
     face = _cell_springs(lattice, 2, (1.0 - body_diagonals) / 2.0)

@@ -27,6 +27,10 @@ def bars(results: Results) -> list[Bar]:
             ("exact modulus, at rest, ν = 0.25", quarter, None, LIMIT_COLOURS[0]),
             (f"exact modulus, at rest, ν = {nu:g}", limits["relative_l2"], left, LIMIT_COLOURS[1]),
         ]
+        lifted = limits.get("relative_l2_with_volume_term")
+        if lifted is not None:
+            label = f"the same with the volume term, ν = {nu:g}"
+            found.append((label, lifted, None, LIMIT_COLOURS[2]))
     for (model, reference), values in field_errors(results).items():
         if reference == "fem":
             whole = values["field-relative-l2-peak"]

@@ -142,11 +142,18 @@ def _limits(results: Results) -> Iterator[str]:
     limits = results.numbers.get("lattice_limits")
     if limits:
         yield (
-            "Limit of the lattice: at rest and given the exact modulus it still differs by "
+            "Limit of the springs: at rest and with the exact modulus the lattice still differs by "
             f"{percent(limits['relative_l2'])} at Poisson ratio {limits['poisson_ratio']:g}; the "
             f"best factor leaves {percent(limits['relative_l2_at_best_factor'])}. Against "
             f"Poisson ratio 0.25 it is {percent(limits['relative_l2_at_quarter'])}."
+            f"{_with_volume_term(limits.get('relative_l2_with_volume_term'))}"
         )
+
+
+def _with_volume_term(left: float | None) -> str:
+    if left is None:
+        return ""
+    return f" One volume term per cell, which frees the Poisson ratio, leaves {percent(left)}."
 
 
 def _rankings(results: Results) -> Iterator[str]:

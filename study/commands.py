@@ -35,7 +35,7 @@ def main() -> None:
         print(f"liver-study: {error}", file=sys.stderr)
         sys.exit(EXIT_BAD_INPUT)
     except KeyboardInterrupt:
-        print("liver-study: interrupted, nothing written", file=sys.stderr)
+        print("liver-study: interrupted; a run goes on with --resume", file=sys.stderr)
         sys.exit(128 + signal.SIGINT)
 
 
@@ -51,6 +51,8 @@ def run(
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
     out: Path | None = None,
     report: bool = True,
+    fields: Annotated[bool, Parameter(negative=())] = False,
+    resume: Annotated[bool, Parameter(negative=())] = False,
 ) -> None:
     """Run a scene through every model it names and write a results folder with its report.
 
@@ -64,16 +66,26 @@ def run(
         Results folder; results/NAME by default. Earlier results in it are replaced.
     report
         Whether to make report.pdf.
+    fields
+        Keep the motion of all lattice nodes as MODEL.vtkhdf, which ParaView reads.
+    resume
+        Go on from where an interrupted run into the same folder last kept its state.
     """
     from study.progress import on_stderr
-    from study.results import replacing, write
+    from study.results import continuing, replacing, write
+    from study.run.keeping import Keeping
     from study.run.whole import run_study
     from study.scene_file import read_scene
 
     chosen = read_scene(scene, set_ or ())
     folder = out or Path("results") / Path(scene).stem
-    with replacing(folder) as partial, on_stderr() as progress:
-        results = run_study(chosen, progress)
+    with (
+        replacing(folder) as partial,
+        continuing(folder, resume=resume) as state,
+        on_stderr() as progress,
+    ):
+        keeping = Keeping(state, resume, partial if fields else None)
+        results = run_study(chosen, progress, keeping)
         with progress.stage("results"):
             write(results, partial)
         failure = None

@@ -42,11 +42,11 @@ def _lattice_lines(scene: Scene, posed: Posed) -> list[str]:
 
     assembly = assemble(scene, posed)
     lines = [f"lattice: {len(assembly.mass)} nodes, {len(assembly.springs.weight)} springs"]
-    for contender in contenders(scene, estimates(scene)):
-        step = critical_time_step(assembly, contender.law)
+    for contender in contenders(scene, assembly.lattice, estimates(scene)):
+        step = critical_time_step(assembly, contender.material, scene.lattice.integrator)
         lines.append(
             f"{contender.name}: modulus {contender.modulus / 1e3:.2f} kPa, critical step "
-            f"{1e3 * step:.3g} ms, damping {contender.damping.gamma_0:.4g} 1/s"
+            f"{1e3 * step:.3g} ms, damping {contender.material.damping.gamma_0:.4g} 1/s"
         )
     return lines
 

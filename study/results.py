@@ -5,6 +5,7 @@ results.json    numbers, provenance        bands.csv       type-2 interval carri
 similarity.csv  score of each pair         errors.csv      differences of the whole field
 sensitivity.csv choices of the fuzzy side
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
+MODEL.vtkhdf    motion of all nodes, if asked for
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ TEXT_COLUMNS = {
     *("choice", "base", "alternative", "system"),
 }
 FILES = {MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", *(f"{t}.csv" for t in TABLES)}
+OURS, FIELDS = ".report.pdf", ".vtkhdf"
 Row = tuple[str | float, ...]
 
 
@@ -119,7 +121,9 @@ def _check_target(folder: Path) -> None:
     if not folder.is_dir():
         return
     present = {path.name for path in folder.iterdir()}
-    foreign = sorted(n for n in present - FILES if not n.startswith(".report.pdf"))
+    foreign = sorted(
+        n for n in present - FILES if not n.startswith(OURS) and not n.endswith(FIELDS)
+    )
     if foreign or (present and MARK not in present):
         name = foreign[0] if foreign else sorted(present)[0]
         raise ResultsError(f"{folder}: holds {name}, which no run wrote; give --out another folder")
@@ -147,6 +151,22 @@ def replacing(folder: Path) -> Iterator[Path]:
         partial.replace(folder)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
+
+
+@contextmanager
+def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
+    """A folder beside `folder` for what an interrupted run goes on from; success removes it."""
+    folder = folder.resolve()
+    state = folder.with_name(f".{folder.name}.state")
+    if not resume:
+        shutil.rmtree(state, ignore_errors=True)
+    state.mkdir(parents=True, exist_ok=True)
+    try:
+        yield state
+        shutil.rmtree(state)
+    finally:
+        with suppress(OSError):
+            state.rmdir()  # where nothing was kept
 
 
 def _write_table(path: Path, header: Sequence[str], rows: Iterable[Row]) -> None:

@@ -23,6 +23,15 @@ Component = Annotated[float, Quantity("", -1.0, 1.0)]
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
 ModelName = Literal["fem", "basafa", "msm"]
+IntegratorName = Literal[
+    "symplectic-euler",
+    "velocity-verlet",
+    "runge-kutta-4",
+    "implicit-euler",
+    "implicit-midpoint",
+    "split-volume",
+    "xpbd",
+]
 Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
 
 
@@ -141,13 +150,23 @@ class Fuzzy:
 
 @dataclass(frozen=True, kw_only=True)
 class Lattice:
-    """Mass-spring lattice: spacing, share of axial stiffness in flexion and in body diagonals."""
+    """Mass-spring lattice: spacing, share of axial stiffness in flexion and in body diagonals.
+
+    `volume_term` gives its fuzzy-tuned models the tissue's Poisson ratio; without it every lattice
+    of springs has 1/4. `geometry`: whether forces follow the deformed lattice. The step is at most
+    `step_fraction` of the critical one, which is followed as the body deforms, unless `time_step`
+    or `step_rate` fixes it.
+    """
 
     spacing: Length = 0.01
     flexion: Annotated[float, Quantity("", 0.0, 0.9)] = 0.2
-    body_diagonals: Share = 0.0
+    body_diagonals: Annotated[float, Quantity("", 0.0, 0.9)] = 0.0
     volume_term: bool = False
+    geometry: Literal["nonlinear", "linear"] = "nonlinear"
+    integrator: IntegratorName = "symplectic-euler"
     step_fraction: Annotated[float, Quantity("", 1e-4, 10.0)] = 0.8
+    time_step: Annotated[float, Quantity("s", 1e-9, 10.0)] | None = None
+    step_rate: Annotated[float, Quantity("Hz", 0.1, 1e9)] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 BUILT_IN = ("liver", "block", "paper")
 MAX_BYTES = 65_536
 MAX_LINE = 1_000
+SPRINGS_POISSON_RATIO = 0.25
 # What a scene without a mesh cannot use.
 _MESH_ONLY = (
     ("organ", "volume"),
@@ -221,8 +222,7 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield "fuzzy.surface: names one reading twice; name two different ones"
     if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
         yield "fuzzy.samples: has no effect with exact sampling; remove it"
-    if scene.lattice.volume_term:
-        yield "lattice.volume_term: the spring lattice has no volume term yet; set it to false"
+    yield from _lattice_contradictions(scene)
     if scene.organ.mesh is None and scene.organ.unit is not None:
         yield "organ.unit: has no effect without organ.mesh; remove it"
     for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
@@ -233,6 +233,24 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield from _point_contradictions(scene, table)
     elif scene.organ.mass is not None:
         yield "organ.mass: only a point has a mass of its own; use tissue.density"
+
+
+def _lattice_contradictions(scene: Scene) -> Iterator[str]:
+    lattice, nu = scene.lattice, scene.tissue.poisson_ratio
+    if lattice.volume_term and nu < SPRINGS_POISSON_RATIO:
+        yield (
+            f"lattice.volume_term: needs tissue.poisson_ratio of {SPRINGS_POISSON_RATIO} or more, "
+            f"not {nu:g}; leave it out or raise the ratio"
+        )
+    if lattice.integrator == "split-volume" and not lattice.volume_term:
+        yield "lattice.integrator: split-volume needs lattice.volume_term; set it to true"
+    if lattice.integrator == "xpbd" and "basafa" in scene.models:
+        yield (
+            "lattice.integrator: xpbd takes linear springs only; leave basafa out of models or "
+            "choose another integrator"
+        )
+    if lattice.time_step is not None and lattice.step_rate is not None:
+        yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
 
 
 def _tool_contradictions(scene: Scene) -> Iterator[str]:

@@ -168,4 +168,43 @@ def test_an_interrupted_run_leaves_nothing_behind(number, tmp_path):
     process.send_signal(number)
     process.communicate(timeout=60)
     assert process.returncode != 0
-    assert not list(tmp_path.iterdir())
+    assert not [path for path in tmp_path.iterdir() if path.name != ".out.state"]
+
+
+def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path):
+    arguments = ["run", "block", "--no-report", "--set", "models=['msm']", "--set"]
+    arguments.append("fuzzy.sensitivity_readings=0")
+    whole = study(*arguments, "--out", str(tmp_path / "whole"))
+    assert whole.returncode == 0, whole.stderr
+    process = subprocess.Popen(
+        [sys.executable, "-m", "study", *arguments, "--out", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    for line in process.stderr:  # one model has run
+        if line.startswith("msm-mamdani: halved"):
+            break
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert (tmp_path / ".out.state" / "msm-mamdani.npz").exists()
+    done = study(*arguments, "--out", str(tmp_path / "out"), "--resume", "--fields")
+    assert done.returncode == 2  # no fields were kept before the interruption
+    assert "run without --resume" in done.stderr
+    done = study(*arguments, "--out", str(tmp_path / "out"), "--resume")
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / ".out.state").exists()
+    curves = [(tmp_path / name / "curves.csv").read_text() for name in ("whole", "out")]
+    assert curves[0] == curves[1]
+
+
+def test_fields_of_all_nodes_are_kept_when_asked_for(tmp_path):
+    done = study(
+        *("run", "block", "--no-report", "--fields", "--out", str(tmp_path / "out")),
+        *("--set", "models=['msm']", "--set", "fuzzy.systems=['sugeno']"),
+        *("--set", "fuzzy.sensitivity_readings=0", "--set", "time.samples=26"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "msm-sugeno.vtkhdf").stat().st_size > 1e5
+    assert not (tmp_path / ".out.state").exists()

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from msm.integrators import INTEGRATORS
 from study.progress import Silent
 from study.results import TABLES, Results, ResultsError, read, replacing
 from study.results import write as write_files
@@ -100,6 +101,55 @@ def test_the_limits_of_the_lattice_are_told(small_results):
     limits = small_results.numbers["lattice_limits"]
     assert limits["relative_l2_at_best_factor"] <= limits["relative_l2"]
     assert limits["relative_l2_at_quarter"] < limits["relative_l2"]
+    assert limits["relative_l2_with_volume_term"] < 0.5 * limits["relative_l2_at_best_factor"]
+
+
+def lattice_only(scene, **keys):
+    """The scene with one fuzzy-tuned lattice, whose keys are changed."""
+    return dataclasses.replace(
+        scene,
+        models=("msm",),
+        fuzzy=dataclasses.replace(scene.fuzzy, systems=("sugeno",), sensitivity_readings=0),
+        lattice=dataclasses.replace(scene.lattice, **keys),
+    )
+
+
+def largest_displacement(results):
+    return max(row["displacement_m"] for row in rows(results, "curves"))
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_every_integrator_runs_a_scene_to_the_same_peak(small_scene, integrator):
+    """Those without a limit take samples for steps, and XPBD is stiff only in the limit."""
+    scene = lattice_only(small_scene, volume_term=True)
+    plain, other = (
+        run_study(dataclasses.replace(scene, lattice=lattice), Silent())
+        for lattice in (scene.lattice, dataclasses.replace(scene.lattice, integrator=integrator))
+    )
+    records = [results.numbers["models"][0] for results in (plain, other)]
+    assert [record["status"] for record in records] == ["finished"] * 2
+    assert records[1]["integrator"] == integrator
+    peaks = [
+        max(r["displacement_m"] for r in rows(results, "curves")) for results in (plain, other)
+    ]
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.5 if integrator == "xpbd" else 0.05)
+
+
+@pytest.mark.parametrize("keys", [{"time_step": 1e-3}, {"step_rate": 1777.0}])
+def test_a_given_step_is_kept(small_scene, keys):
+    record = run_study(lattice_only(small_scene, **keys), Silent()).numbers["models"][0]
+    longest = keys.get("time_step") or 1.0 / keys["step_rate"]
+    assert record["status"] == "finished"
+    assert record["smallest_time_step_s"] == record["time_step_s"] <= longest * (1 + 1e-9)
+
+
+def test_small_displacements_are_nearly_those_of_the_linear_path(small_scene):
+    peaks = [
+        largest_displacement(run_study(scene, Silent()))
+        for scene in (lattice_only(small_scene), lattice_only(small_scene, geometry="linear"))
+    ]
+    assert peaks[0] != peaks[1]
+    assert peaks[0] == pytest.approx(peaks[1], rel=0.05)
 
 
 def test_runs_repeat_exactly(small_scene, small_results):

@@ -7,7 +7,7 @@ from fem_reference.model import build, static_field
 from msm.calibration import reference_stiffness
 from msm.lattice import interpolation
 from msm.laws import Hooke
-from msm.model import assemble, static_displacement
+from msm.model import Material, assemble, static_displacement
 from study.contact import Foundation, ToolPatch
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary
@@ -40,7 +40,9 @@ class Block:
         found = assemble(
             MeshBody(self.mesh), self.surface, 1060, spacing, self.support, self.tool, flexion
         )
-        nodal = static_displacement(found, Hooke(factor * reference_stiffness(E, spacing)))
+        nodal = static_displacement(
+            found, Material(Hooke(factor * reference_stiffness(E, spacing)))
+        )
         return interpolation(found.lattice, self.rule.points)[0] @ nodal
 
     def difference(self, field, reference):

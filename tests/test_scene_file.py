@@ -133,10 +133,20 @@ def test_a_mesh_path_is_relative_to_the_scene_that_names_it(tmp_path):
     assert scene.organ.mesh == str(tmp_path / "a/b.stl")
 
 
-def test_the_volume_term_is_refused_while_the_engine_has_none():
-    assert read_scene("liver", ["lattice.volume_term=false"]) == read_scene("liver")
-    with pytest.raises(SceneError, match="no volume term yet"):
-        read_scene("liver", ["lattice.volume_term=true"])
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["lattice.volume_term=true", "tissue.poisson_ratio=0.2"], "needs tissue.poisson_ratio"),
+        (["lattice.integrator=split-volume"], "split-volume needs lattice.volume_term"),
+        (["lattice.integrator=xpbd"], "xpbd takes linear springs only"),
+        (["lattice.time_step=1 ms", "lattice.step_rate=1 kHz"], "contradicts lattice.step_rate"),
+        (["lattice.integrator=leapfrog"], "lattice.integrator"),
+        (["lattice.body_diagonals=1.0"], "lattice.body_diagonals"),
+    ],
+)
+def test_lattice_keys_that_do_not_fit_are_refused(overrides, message):
+    with pytest.raises(SceneError, match=message):
+        read_scene("liver", overrides)
 
 
 def test_scenes_are_frozen():

@@ -80,11 +80,24 @@ def _organ(scene: Scene) -> list[str]:
 
 def _springs(scene: Scene) -> list[str]:
     return [
-        "The fuzzy-tuned springs are linear, eq. (1); the estimate is read as Young's modulus E "
-        "and k = 0.4 E h is the calibration of the cubic lattice.",
+        "The fuzzy-tuned springs are linear, eq. (1); the estimate is read as Young's modulus E. "
+        + _calibration(scene),
         f"Damping by eq. (2) with w = sqrt(k/m), zeta = {scene.damping.ratio:g}, k and m taken at "
         "the reference spacing.",
     ]
+
+
+def _calibration(scene: Scene) -> str:
+    if not scene.lattice.volume_term:
+        return (
+            "k = 0.4 E h is the calibration of the cubic lattice, whose Poisson ratio is 1/4; "
+            "there is no volume term, as in the paper."
+        )
+    return (
+        "Springs of k = mu h carry the shear modulus mu, and one energy per cell in its volume, "
+        "1/2 kappa V (J - 1)^2 with kappa = lambda - mu, which the paper does not have, the rest; "
+        f"the Poisson ratio is the tissue's {scene.tissue.poisson_ratio:g}."
+    )
 
 
 def _similarity() -> list[str]:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from msm import model as lattice_model
-from msm.calibration import reference_stiffness
+from msm.calibration import POISSON_RATIO, reference_stiffness
+from msm.checkpoint import Checkpoint
 from msm.damping import Damping, eq_2, eq_9
-from msm.kernel import ORDER
-from msm.laws import Basafa, Hooke, Law
-from msm.model import Assembly
+from msm.integrators import INTEGRATORS
+from msm.lattice import CellLattice
+from msm.laws import Basafa, Hooke
+from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Step
+from msm.volume import volume_term
 from study.progress import Advance, Progress
+from study.run.keeping import Keeping, OnSample, checkpoint, recorded
 from study.run.outcome import Outcome, model_record
 from study.run.posed import Posed
 from study.scene import Scene
@@ -26,27 +32,41 @@ MASS_LIMIT = 0.05
 
 @dataclass(frozen=True)
 class Contender:
-    """A lattice model: name, spring law, damping, small-strain modulus [Pa]."""
+    """A lattice model: name, what it is made of, small-strain modulus [Pa]."""
 
     name: str
-    law: Law
-    damping: Damping
+    material: Material
     modulus: float
 
 
-def contenders(scene: Scene, estimates: dict[str, Estimate]) -> Iterator[Contender]:
+def contenders(
+    scene: Scene, lattice: CellLattice, estimates: dict[str, Estimate]
+) -> Iterator[Contender]:
     """The lattice models that the scene names."""
     if "basafa" in scene.models:
         yield benchmark(scene)
     if "msm" in scene.models:
         for system, estimate in estimates.items():
-            yield fuzzy_tuned(scene, system, estimate.estimate)
+            yield fuzzy_tuned(scene, lattice, system, estimate.estimate)
 
 
-def fuzzy_tuned(scene: Scene, system: str, modulus: float) -> Contender:
-    """Linear springs of eq. (1) for a modulus [Pa]."""
-    law = Hooke(reference_stiffness(modulus, scene.lattice.spacing))
-    return Contender(f"msm-{system}", law, node_damping(scene, modulus), modulus)
+def fuzzy_tuned(scene: Scene, lattice: CellLattice, system: str, modulus: float) -> Contender:
+    """Linear springs of eq. (1) for a modulus [Pa], with the volume term if the scene has it."""
+    material = elastic(lattice, modulus, poisson_ratio(scene))
+    return Contender(
+        f"msm-{system}", replace(material, damping=node_damping(scene, modulus)), modulus
+    )
+
+
+def elastic(lattice: CellLattice, modulus: float, nu: float) -> Material:
+    """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
+    law = Hooke(reference_stiffness(modulus, lattice.spacing, nu))
+    return Material(law, volume_term(lattice, modulus, nu) if nu > POISSON_RATIO else None)
+
+
+def poisson_ratio(scene: Scene) -> float:
+    """Poisson ratio of the fuzzy-tuned lattices."""
+    return scene.tissue.poisson_ratio if scene.lattice.volume_term else POISSON_RATIO
 
 
 def benchmark(scene: Scene) -> Contender:
@@ -58,12 +78,12 @@ def benchmark(scene: Scene) -> Contender:
     per_length = (h / h_0) ** 2 / h
     law = Basafa(table.k1 * per_length, table.k2 * per_length, table.x_c)
     damping = eq_9(table.gamma_0, table.gamma_1, reference_mass(scene))
-    return Contender("basafa", law, damping, 2.5 * table.k1 / h_0**2)
+    return Contender("basafa", Material(law, damping=damping), 2.5 * table.k1 / h_0**2)
 
 
 def node_damping(scene: Scene, modulus: float) -> Damping:
     """Eq. (2) for a node of the lattice at the reference spacing, so that h does not change it."""
-    k = reference_stiffness(modulus, scene.damping.reference_spacing)
+    k = reference_stiffness(modulus, scene.damping.reference_spacing, poisson_ratio(scene))
     return eq_2(scene.damping.ratio, k, reference_mass(scene))
 
 
@@ -93,17 +113,19 @@ def run_lattices(
     estimates: dict[str, Estimate],
     outcome: Outcome,
     progress: Progress,
+    keeping: Keeping | None = None,
 ) -> None:
     """Run every lattice model, and type-2's at both ends of its interval, into the outcome."""
     _check_mass(scene, posed, assembly, outcome)
-    for contender in contenders(scene, estimates):
-        _run(scene, posed, assembly, contender, outcome, progress)
+    for contender in contenders(scene, assembly.lattice, estimates):
+        _run(scene, posed, assembly, contender, outcome, progress, keeping)
     for system, estimate in estimates.items():
         if estimate.interval is not None and "msm" in scene.models:
-            ends = [fuzzy_tuned(scene, system, modulus) for modulus in estimate.interval]
+            lattice = assembly.lattice
+            ends = [fuzzy_tuned(scene, lattice, system, e) for e in estimate.interval]
             outcome.bounds[f"msm-{system}"] = (
-                _bound(scene, posed, assembly, ends[0], "lower", progress),
-                _bound(scene, posed, assembly, ends[1], "upper", progress),
+                _bound(scene, posed, assembly, ends[0], "lower", progress, keeping),
+                _bound(scene, posed, assembly, ends[1], "upper", progress, keeping),
             )
             _note_lost_bounds(system, outcome)
 
@@ -131,48 +153,83 @@ def _run(
     contender: Contender,
     outcome: Outcome,
     progress: Progress,
+    keeping: Keeping | None,
 ) -> None:
-    fraction = scene.lattice.step_fraction
-    with progress.stage(contender.name) as advance:
-        run = _march(posed, assembly, contender, fraction, 1, advance)
+    step = asked_step(scene)
+    name = contender.name
+    with (
+        progress.stage(name) as advance,
+        recorded(keeping, name, assembly, posed.observation.times) as on_sample,
+    ):
+        kept = checkpoint(keeping, name)
+        run = _march(scene, posed, assembly, contender, step, advance, kept, on_sample)
     outcome.runs[contender.name] = run.trajectory
     record = model_record(contender.name, scene, run.trajectory) | {
         "nodes": len(assembly.mass),
         "springs": len(assembly.springs.weight),
-        "time_step_s": run.time_step,
-        "critical_time_step_s": run.critical_time_step,
+        "time_step_s": run.largest_step,
+        "smallest_time_step_s": run.smallest_step,
+        "repeated_steps": run.repeated_steps,
+        "integrator": scene.lattice.integrator,
+        "poisson_ratio": POISSON_RATIO
+        if contender.material.volume is None
+        else poisson_ratio(scene),
+        "critical_time_step_s": _finite(run.critical_time_step),
+        "smallest_step_margin": _finite(run.margin),
         "steps": run.steps,
         "wall_s": run.wall,
         "small_strain_modulus_pa": contender.modulus,
         "node_mass_kg": scene.tissue.density * scene.lattice.spacing**3,
-        "damping_rate_per_s": contender.damping.gamma_0,
+        "damping_rate_per_s": contender.material.damping.gamma_0,
         "largest_spring_strain": run.largest_strain,
         "inverted_cells": run.inverted_cells,
     }
     outcome.models.append(record)
     if run.trajectory.status == "finished":
         with progress.stage(f"{contender.name}: halved steps") as advance:
-            half = _march(posed, assembly, contender, fraction, 2, advance).trajectory
-        outcome.add_time_step_errors(record, posed.probes, run.trajectory, half, ORDER)
+            halved = Counts(2 * run.substeps)
+            kept = checkpoint(keeping, f"{name}-halved")
+            half = _march(scene, posed, assembly, contender, halved, advance, kept).trajectory
+        order = INTEGRATORS[scene.lattice.integrator].order
+        outcome.add_time_step_errors(record, posed.probes, run.trajectory, half, order)
+
+
+def asked_step(scene: Scene) -> Step:
+    """How the scene wants steps to be chosen."""
+    lattice = scene.lattice
+    if lattice.time_step is not None:
+        return Fixed(lattice.time_step)
+    if lattice.step_rate is not None:
+        return Rate(lattice.step_rate)
+    return Automatic(lattice.step_fraction)
+
+
+def _finite(value: float) -> float | None:
+    """The value, or None where an integrator has no limit."""
+    return value if np.isfinite(value) else None
 
 
 def _march(
+    scene: Scene,
     posed: Posed,
     assembly: Assembly,
     contender: Contender,
-    fraction: float,
-    refinement: int,
+    step: Step,
     advance: Advance,
+    kept: Checkpoint | None,
+    on_sample: OnSample = lambda *_: None,
 ) -> lattice_model.Run:
     return lattice_model.run(
         assembly,
-        contender.law,
-        contender.damping,
+        contender.material,
         posed.factor,
         posed.observation,
-        fraction,
-        refinement,
+        step,
         advance,
+        integrator=scene.lattice.integrator,
+        linear=scene.lattice.geometry == "linear",
+        checkpoint=kept,
+        on_sample=on_sample,
     )
 
 
@@ -183,7 +240,10 @@ def _bound(
     contender: Contender,
     side: str,
     progress: Progress,
+    keeping: Keeping | None,
 ) -> Trajectory:
     with progress.stage(f"{contender.name}: {side} bound") as advance:
-        fraction = scene.lattice.step_fraction
-        return _march(posed, assembly, contender, fraction, 1, advance).trajectory
+        kept = checkpoint(keeping, f"{contender.name}-{side}")
+        return _march(
+            scene, posed, assembly, contender, asked_step(scene), advance, kept
+        ).trajectory

@@ -13,12 +13,17 @@ from study.scene import Scene
 
 if TYPE_CHECKING:
     from fuzzy.stiffness import Estimate
+    from study.run.keeping import Keeping
 
 GRAVITY = 9.81
 
 
 def run_organ(
-    scene: Scene, posed: Posed, estimates: dict[str, Estimate], progress: Progress
+    scene: Scene,
+    posed: Posed,
+    estimates: dict[str, Estimate],
+    progress: Progress,
+    keeping: Keeping | None = None,
 ) -> Outcome:
     """Run the finite elements, the benchmark and one lattice per estimate."""
     from study.run.lattices import assemble, node_damping, run_lattices
@@ -39,7 +44,7 @@ def run_organ(
 
             lattice_limits(scene, posed, body, assembly, outcome, progress)
     if has_lattice:
-        run_lattices(scene, posed, assembly, estimates, outcome, progress)
+        run_lattices(scene, posed, assembly, estimates, outcome, progress, keeping)
     return outcome
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from study.run.outcome import Outcome
 from study.scene import Scene
 from study.scene_file import resolved, write_scene
 
+if TYPE_CHECKING:
+    from study.run.keeping import Keeping
+
 STRAIN_LIMIT = 0.05
 """Above it the report warns that the linear reference is stretched."""
 
@@ -27,8 +30,10 @@ def is_point(scene: Scene) -> bool:
     return scene.organ.shape == "point" and scene.organ.mesh is None
 
 
-def run_study(scene: Scene, progress: Progress) -> Results:
+def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) -> Results:
     """Run all that the scene names and gather the results.
+
+    `keeping`: what the lattice runs keep on disk meanwhile.
 
     Raises ValueError for an organ, support or tool that cannot be used.
     """
@@ -47,7 +52,7 @@ def run_study(scene: Scene, progress: Progress) -> Results:
 
         with progress.stage("organ"):
             posed = pose(scene)
-        lens, outcome = posed.lens, run_organ(scene, posed, found, progress)
+        lens, outcome = posed.lens, run_organ(scene, posed, found, progress, keeping)
         arrays["fields"] = {
             "points": posed.geometry.surface.points,
             "triangles": posed.geometry.surface.triangles,

@@ -1,0 +1,91 @@
+"""A lattice over an organ with its support and load, and what it is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from msm import lattice as cells
+from msm import volume as volumes
+from msm.damping import UNDAMPED, Damping
+from msm.laws import Law
+from msm.network import Network, network
+from msm.springs import Springs, connect
+from msm.volume import VolumeTerm
+from study.contact import Foundation, ToolPatch
+from study.mesh.quadrature import SurfaceRule
+from study.organ.occupancy import Body
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A lattice over an organ with its springs, support and load, whatever the springs' law.
+
+    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    """
+
+    lattice: cells.CellLattice
+    springs: Springs
+    mass: Floats
+    foundation: csr_array
+    load: Floats
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a lattice is made of: spring law, volume term if any, nodal damping."""
+
+    law: Law
+    volume: VolumeTerm | None = None
+    damping: Damping = UNDAMPED
+
+
+def assemble(
+    body: Body,
+    surface: SurfaceRule,
+    density: float,
+    spacing: float,
+    foundation: Foundation,
+    tool: ToolPatch,
+    flexion: float = 0.0,
+    body_diagonals: float = 0.0,
+) -> Assembly:
+    """Lattice over the body. ValueError if it is empty, not held, or not touched by the tool."""
+    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
+    lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
+    lattice = cells.build(body, lower, upper, spacing)
+    held = foundation.density(surface.points, surface.normals) * surface.weights
+    pushed = tool.profile(surface.points, surface.normals) * surface.weights
+    if not held.any():
+        raise ValueError("the support holds no surface; enlarge support.depth")
+    if not pushed.any():
+        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
+    weights, _ = cells.interpolation(lattice, surface.points)
+    support = csr_array(weights.T @ diags_array(held) @ weights)
+    nodal = weights.T @ (pushed * tool.force / pushed.sum())
+    return Assembly(
+        lattice,
+        connect(lattice, flexion, body_diagonals),
+        density * cells.node_volumes(lattice),
+        support,
+        np.outer(nodal, tool.direction),
+    )
+
+
+def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> Network:
+    """The lattice and its material as the kernels read them."""
+    volume = material.volume or volumes.none(assembly.lattice.spacing)
+    return network(
+        assembly.springs,
+        assembly.mass,
+        assembly.foundation,
+        assembly.load,
+        volume,
+        material.damping,
+        linear=linear,
+    )

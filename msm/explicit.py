@@ -1,0 +1,88 @@
+"""Explicit integrators, compiled: symplectic Euler, velocity Verlet, Runge-Kutta of order 4.
+
+Each takes one step per row of `factors`, whose columns are the load factors at the fractions of
+the step that the integrator names. Nodal damping is diagonal and treated implicitly where that
+keeps the order: at the end of the step by symplectic Euler, half before and half after by velocity
+Verlet. Runge-Kutta takes it as it takes every force, and its step is bounded by it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.forces import damping, internal_forces
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def symplectic_euler(
+    law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
+) -> None:
+    """V += dt a(u), damped at the end; then u += dt v. Load at the end of the step."""
+    force = np.empty_like(u)
+    for n in range(factors.shape[0]):
+        internal_forces(law, net, u, force)
+        for i in range(u.shape[0]):
+            inertia = net.mass[i] + dt * damping(net, u, i)
+            kept, share = net.mass[i] / inertia, dt / inertia
+            for d in range(3):
+                pushed = force[i, d] + factors[n, 0] * net.load[i, d]
+                v[i, d] = kept * v[i, d] + share * pushed
+                u[i, d] += dt * v[i, d]
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def velocity_verlet(
+    law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
+) -> None:
+    """Half a kick, a drift, half a kick; damping implicit in the first half, explicit after."""
+    force = np.empty_like(u)
+    internal_forces(law, net, u, force)
+    for n in range(factors.shape[0]):
+        for i in range(u.shape[0]):
+            inertia = net.mass[i] + 0.5 * dt * damping(net, u, i)
+            kept, share = net.mass[i] / inertia, 0.5 * dt / inertia
+            for d in range(3):
+                pushed = force[i, d] + factors[n, 0] * net.load[i, d]
+                v[i, d] = kept * v[i, d] + share * pushed
+                u[i, d] += dt * v[i, d]
+        internal_forces(law, net, u, force)
+        for i in range(u.shape[0]):
+            share = 0.5 * dt / net.mass[i]
+            c = damping(net, u, i)
+            for d in range(3):
+                pushed = force[i, d] + factors[n, 1] * net.load[i, d]
+                v[i, d] += share * (pushed - c * v[i, d])
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def runge_kutta_4(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
+    """The classical four stages."""
+    force = np.empty_like(u)
+    at, speed = np.empty_like(u), np.empty_like(u)
+    du, dv = np.empty_like(u), np.empty_like(u)
+    for n in range(factors.shape[0]):
+        at[:], speed[:] = u, v
+        du[:], dv[:] = 0.0, 0.0
+        for stage in range(4):
+            weight = dt / 6.0 if stage in (0, 3) else dt / 3.0
+            ahead = 0.5 * dt if stage < 2 else dt
+            factor = factors[n, (stage + 1) // 2]
+            internal_forces(law, net, at, force)
+            for i in range(u.shape[0]):
+                c = damping(net, at, i)
+                for d in range(3):
+                    rate = (force[i, d] + factor * net.load[i, d] - c * speed[i, d]) / net.mass[i]
+                    du[i, d] += weight * speed[i, d]
+                    dv[i, d] += weight * rate
+                    if stage < 3:
+                        at[i, d] = u[i, d] + ahead * speed[i, d]
+                        speed[i, d] = v[i, d] + ahead * rate
+        u += du
+        v += dv

@@ -1,0 +1,156 @@
+"""Forces of the network, compiled: springs, volume term, foundation.
+
+Division by zero follows IEEE (`error_model`): a spring pressed to a point gives NaN, which the
+caller reports as divergence, and not an exception.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.laws import tension
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
+    """Set the force [N] (n, 3) of springs, cells and foundation on the nodes displaced by u."""
+    force[:] = 0.0
+    if net.linear:
+        add_linear_spring_forces(law, net, u, force)
+        add_linear_volume_forces(net, u, force)
+    else:
+        add_spring_forces(law, net, u, force)
+        add_volume_forces(net, u, force)
+    add_foundation_forces(net, u, force)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
+    """Add the force [N] of each spring to its two ends."""
+    for s in range(net.ends.shape[0]):
+        i, j = net.ends[s, 0], net.ends[s, 1]
+        dx = net.rest[s, 0] + u[j, 0] - u[i, 0]
+        dy = net.rest[s, 1] + u[j, 1] - u[i, 1]
+        dz = net.rest[s, 2] + u[j, 2] - u[i, 2]
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        pull = net.scale[s] * tension(law, (length - net.length[s]) / net.length[s]) / length
+        force[i, 0] += pull * dx
+        force[i, 1] += pull * dy
+        force[i, 2] += pull * dz
+        force[j, 0] -= pull * dx
+        force[j, 1] -= pull * dy
+        force[j, 2] -= pull * dz
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
+    """Add the spring forces [N] of small displacements, along the springs at rest."""
+    for s in range(net.ends.shape[0]):
+        i, j = net.ends[s, 0], net.ends[s, 1]
+        rx, ry, rz = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]
+        squared = net.length[s] * net.length[s]
+        along = rx * (u[j, 0] - u[i, 0]) + ry * (u[j, 1] - u[i, 1]) + rz * (u[j, 2] - u[i, 2])
+        pull = net.scale[s] * tension(law, along / squared) / net.length[s]
+        force[i, 0] += pull * rx
+        force[i, 1] += pull * ry
+        force[i, 2] += pull * rz
+        force[j, 0] -= pull * rx
+        force[j, 1] -= pull * ry
+        force[j, 2] -= pull * rz
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float, float, float]:
+    """Mean gradient over a cell of component d of u; corners as in msm.lattice.CORNERS."""
+    u0, u1, u2, u3 = u[cell[0], d], u[cell[1], d], u[cell[2], d], u[cell[3], d]
+    u4, u5, u6, u7 = u[cell[4], d], u[cell[5], d], u[cell[6], d], u[cell[7], d]
+    u01, u23, u45, u67 = u0 + u1, u2 + u3, u4 + u5, u6 + u7
+    x = u45 + u67 - u01 - u23
+    y = u23 + u67 - u01 - u45
+    z = u1 - u0 + u3 - u2 + u5 - u4 + u7 - u6
+    return to_gradient * x, to_gradient * y, to_gradient * z
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> None:
+    """Subtract the nodal forces along d of a stress with row (x, y, z), weights included."""
+    plus, minus = x + y, x - y
+    c0, c1, c2, c3 = plus + z, plus - z, minus + z, minus - z  # of corners 0 to 3
+    force[cell[0], d] += c0
+    force[cell[1], d] += c1
+    force[cell[2], d] += c2
+    force[cell[3], d] += c3
+    force[cell[4], d] -= c3  # and the corners across from them
+    force[cell[5], d] -= c2
+    force[cell[6], d] -= c1
+    force[cell[7], d] -= c0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
+    """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
+    to_gradient = 0.25 / net.spacing
+    for c in range(net.cells.shape[0]):
+        cell = net.cells[c]
+        a, b, e = gradient_of(cell, u, 0, to_gradient)
+        f, g, h = gradient_of(cell, u, 1, to_gradient)
+        i, j, k = gradient_of(cell, u, 2, to_gradient)
+        # J - 1 as a difference of numbers near 1 would round to more than a small load where kappa
+        # is large; hence the first cofactor without its 1.
+        around = g + k + g * k - h * j
+        swelling = a + (a + 1.0) * around
+        a, g, k = a + 1.0, g + 1.0, k + 1.0
+        # Rows of the cofactor matrix, which is J times the transposed inverse of F.
+        xx, xy, xz = 1.0 + around, h * i - f * k, f * j - g * i
+        yx, yy, yz = e * j - b * k, a * k - e * i, b * i - a * j
+        zx, zy, zz = b * h - e * g, e * f - a * h, a * g - b * f
+        pressure = net.bulk[c] * (swelling + b * xy + e * xz) * to_gradient
+        scatter(cell, force, 0, pressure * xx, pressure * xy, pressure * xz)
+        scatter(cell, force, 1, pressure * yx, pressure * yy, pressure * yz)
+        scatter(cell, force, 2, pressure * zx, pressure * zy, pressure * zz)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
+    """Add -kappa V div(u) B_a for each corner a of each cell."""
+    to_gradient = 0.25 / net.spacing
+    for c in range(net.cells.shape[0]):
+        cell = net.cells[c]
+        x, _, _ = gradient_of(cell, u, 0, to_gradient)
+        _, y, _ = gradient_of(cell, u, 1, to_gradient)
+        _, _, z = gradient_of(cell, u, 2, to_gradient)
+        pressure = net.bulk[c] * (x + y + z) * to_gradient
+        scatter(cell, force, 0, pressure, 0.0, 0.0)
+        scatter(cell, force, 1, 0.0, pressure, 0.0)
+        scatter(cell, force, 2, 0.0, 0.0, pressure)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_foundation_forces(net: Network, u: Floats, force: Floats) -> None:
+    """Subtract S u.
+
+    The foundation is explicit like the springs: an implicit diagonal in its place would be stable
+    at any stiffness, but would hold back motions of cut cells that S itself does not hold.
+    """
+    for i in range(u.shape[0]):
+        x, y, z = 0.0, 0.0, 0.0
+        for p in range(net.row[i], net.row[i + 1]):
+            j, k = net.column[p], net.value[p]
+            x, y, z = x + k * u[j, 0], y + k * u[j, 1], z + k * u[j, 2]
+        force[i, 0] -= x
+        force[i, 1] -= y
+        force[i, 2] -= z
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def damping(net: Network, u: Floats, i: int) -> float:
+    """Damping [N s/m] of a node, eq. (9), or eq. (2) with gamma_1 = 0."""
+    away = np.sqrt(u[i, 0] ** 2 + u[i, 1] ** 2 + u[i, 2] ** 2)
+    return net.gamma_0[i] + net.gamma_1[i] * away  # type: ignore[no-any-return] # numpy scalars

@@ -1,0 +1,43 @@
+"""The integrators by name, each with its order and how far its step may go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from msm import explicit, implicit, split, xpbd
+
+UNBOUNDED = float("inf")
+
+
+class Integrator(NamedTuple):
+    """One integrator.
+
+    `order` of its error in the step; `at`: fractions of the step at which it wants the load factor,
+    one column each; `advance(law, network, factors, dt, u, v)` takes a step per row of factors, in
+    place. It is stable up to omega dt = `oscillation` without damping, and up to
+    c dt / m = `damping` for damping alone. With `implicit_volume`, omega is that of the network
+    without its volume term. With `hooke_only` it takes no law but Hooke's.
+    """
+
+    order: int
+    at: tuple[float, ...]
+    advance: Callable[..., Any]
+    oscillation: float
+    damping: float
+    implicit_volume: bool = False
+    hooke_only: bool = False
+
+
+INTEGRATORS = {
+    "symplectic-euler": Integrator(1, (1.0,), explicit.symplectic_euler, 2.0, UNBOUNDED),
+    "velocity-verlet": Integrator(2, (0.0, 1.0), explicit.velocity_verlet, 2.0, UNBOUNDED),
+    # On the imaginary axis 2 sqrt(2); on the real one where |1 + z + z^2/2 + z^3/6 + z^4/24| = 1.
+    "runge-kutta-4": Integrator(4, (0.0, 0.5, 1.0), explicit.runge_kutta_4, np.sqrt(8.0), 2.785293),
+    "implicit-euler": Integrator(1, (1.0,), implicit.implicit_euler, UNBOUNDED, UNBOUNDED),
+    "implicit-midpoint": Integrator(2, (0.5,), implicit.implicit_midpoint, UNBOUNDED, UNBOUNDED),
+    "split-volume": Integrator(1, (1.0,), split.split_volume, 2.0, UNBOUNDED, implicit_volume=True),
+    "xpbd": Integrator(1, (1.0,), xpbd.xpbd, UNBOUNDED, UNBOUNDED, hooke_only=True),
+}

@@ -1,0 +1,147 @@
+"""Springs and cells one by one at a displaced state: stiffness, bounds on it, inversion.
+
+A spring of tangent k_t under tension T at length l resists k_t along itself and T / l across it,
+which is negative under compression. A cell resists kappa V [(cof F : G) cof F + (J - 1) dcof F[G]]
+for a gradient G of the motion. `msm.tangent` puts them together.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.forces import gradient_of
+from msm.laws import stiffness, tension
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
+    """Direction, stiffness along and stiffness across [N/m] of a spring at the state u."""
+    i, j = net.ends[s, 0], net.ends[s, 1]
+    rx, ry, rz = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]
+    dx, dy, dz = u[j, 0] - u[i, 0], u[j, 1] - u[i, 1], u[j, 2] - u[i, 2]
+    weight = net.scale[s] / net.length[s]
+    if net.linear:
+        inverse = 1.0 / net.length[s]
+        strain = (rx * dx + ry * dy + rz * dz) * inverse * inverse
+        return rx * inverse, ry * inverse, rz * inverse, weight * stiffness(law, strain), 0.0
+    rx, ry, rz = rx + dx, ry + dy, rz + dz
+    length = np.sqrt(rx * rx + ry * ry + rz * rz)
+    strain = (length - net.length[s]) / net.length[s]
+    across = net.scale[s] * tension(law, strain) / length
+    along = weight * stiffness(law, strain)
+    return rx / length, ry / length, rz / length, along, across
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def cross(a: Any, b: Any) -> Any:
+    """Vector product of two rows."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def deformation(cell: Any, spacing: float, u: Floats) -> Any:
+    """Rows of the mean deformation gradient F of a cell."""
+    to_gradient = 0.25 / spacing
+    xx, xy, xz = gradient_of(cell, u, 0, to_gradient)
+    yx, yy, yz = gradient_of(cell, u, 1, to_gradient)
+    zx, zy, zz = gradient_of(cell, u, 2, to_gradient)
+    return (xx + 1.0, xy, xz), (yx, yy + 1.0, yz), (zx, zy, zz + 1.0)
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def dot(a: Any, b: Any) -> Any:
+    """Scalar product of two rows."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
+    """Set (n,) values [1/s^2], the largest of which is no less than omega_max squared at u.
+
+    Each part of the energy is bounded by squares of the motions of its nodes: a spring by
+    sigma |x_i - x_j|^2 <= 2 sigma (|x_i|^2 + |x_j|^2), sigma its larger stiffness; a cell by
+    kappa V (|cof F|^2 + sqrt(3) |J - 1| |F|) |G|^2 with |G|^2 <= sum |x_a|^2 / (2 h^2); the
+    foundation by its row sums.
+    """
+    bound[:] = 0.0
+    for s in range(net.ends.shape[0]):
+        _, _, _, along, across = spring_state(law, net, u, s)
+        stiffer = 2.0 * max(along, across, 0.0)
+        bound[net.ends[s, 0]] += stiffer
+        bound[net.ends[s, 1]] += stiffer
+    for c in range(net.cells.shape[0]):
+        stiffer = net.bulk[c] * cell_growth(net, c, u) / (2.0 * net.spacing**2)
+        for a in range(8):
+            bound[net.cells[c, a]] += stiffer
+    for i in range(u.shape[0]):
+        for p in range(net.row[i], net.row[i + 1]):
+            bound[i] += abs(net.value[p])
+        bound[i] /= net.mass[i]
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def cell_growth(net: Network, c: int, u: Floats) -> Any:
+    """Largest slope of a cell's stress in F over kappa: 3 at rest."""
+    if net.linear:
+        return 3.0
+    f, g, h = deformation(net.cells[c], net.spacing, u)
+    gh, hf, fg = cross(g, h), cross(h, f), cross(f, g)
+    cofactor = dot(gh, gh) + dot(hf, hf) + dot(fg, fg)
+    size = np.sqrt(dot(f, f) + dot(g, g) + dot(h, h))
+    return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0) * size
+
+
+@numba.njit(cache=True, error_model="numpy")
+def inverted_cells(cells: NDArray[np.int32], spacing: float, u: Floats) -> int:
+    """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F."""
+    count = 0
+    for c in range(cells.shape[0]):
+        f, g, h = deformation(cells[c], spacing, u)
+        count += 0 if dot(f, cross(g, h)) > 0.0 else 1
+    return count
+
+
+@numba.njit(cache=True, error_model="numpy")
+def farthest(u: Floats) -> tuple[float, int]:
+    """Largest component [m] of u (n, 3) and its node; NaN and infinity count as infinite."""
+    size, node = 0.0, 0
+    for i in range(u.shape[0]):
+        for d in range(3):
+            if not np.isfinite(u[i, d]):
+                return np.inf, i
+            if abs(u[i, d]) > size:
+                size, node = abs(u[i, d]), i
+    return size, node
+
+
+@numba.njit(cache=True, error_model="numpy")
+def largest_turn(net: Network, u: Floats, before: Floats) -> float:
+    """Largest change of a spring's vector over its rest length, between two displacements [m]."""
+    largest = 0.0
+    for s in range(net.ends.shape[0]):
+        i, j = net.ends[s, 0], net.ends[s, 1]
+        squared = 0.0
+        for d in range(3):
+            squared += (u[j, d] - u[i, d] - before[j, d] + before[i, d]) ** 2
+        largest = max(largest, squared / net.length[s] ** 2)
+    return float(np.sqrt(largest))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def largest_strain(net: Network, u: Floats) -> float:
+    """Largest absolute strain of a spring at the displacement u [m] (n, 3)."""
+    largest = 0.0
+    for s in range(net.ends.shape[0]):
+        i, j = net.ends[s, 0], net.ends[s, 1]
+        squared = 0.0
+        for d in range(3):
+            squared += (net.rest[s, d] + u[j, d] - u[i, d]) ** 2
+        largest = max(largest, abs(np.sqrt(squared) / net.length[s] - 1.0))
+    return largest

@@ -1,0 +1,72 @@
+"""The arrays that the compiled loops read: springs, cells, nodes, foundation, load."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from msm.damping import Damping
+from msm.springs import Springs
+from msm.volume import VolumeTerm
+
+Floats = NDArray[np.float64]
+
+
+class Network(NamedTuple):
+    """What the force and integrator kernels are given.
+
+    Springs: `ends` (s, 2) uint32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight
+    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
+    [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `row`, `column`, `value` [N/m]:
+    compressed rows of the foundation; `load` [N] (n, 3). `linear`: forces of small displacements.
+    """
+
+    ends: NDArray[np.uint32]
+    rest: Floats
+    length: Floats
+    scale: Floats
+    cells: NDArray[np.uint32]
+    bulk: Floats
+    spacing: float
+    mass: Floats
+    gamma_0: Floats
+    gamma_1: Floats
+    row: NDArray[np.uint32]
+    column: NDArray[np.uint32]
+    value: Floats
+    load: Floats
+    linear: bool
+
+
+def network(
+    springs: Springs,
+    mass: Floats,
+    foundation: csr_array,
+    load: Floats,
+    volume: VolumeTerm,
+    damping: Damping,
+    *,
+    linear: bool = False,
+) -> Network:
+    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3)."""
+    length = springs.rest_length
+    return Network(
+        ends=np.ascontiguousarray(springs.ends, dtype=np.uint32),
+        rest=np.ascontiguousarray(springs.rest),
+        length=length,
+        scale=springs.weight * length,
+        cells=np.ascontiguousarray(volume.cells, dtype=np.uint32),
+        bulk=np.ascontiguousarray(volume.bulk),
+        spacing=float(volume.spacing),
+        mass=np.ascontiguousarray(mass),
+        gamma_0=damping.gamma_0 * mass,
+        gamma_1=damping.gamma_1 * mass,
+        row=foundation.indptr.astype(np.uint32),
+        column=foundation.indices.astype(np.uint32),
+        value=foundation.data.astype(np.float64),
+        load=np.ascontiguousarray(load),
+        linear=linear,
+    )

@@ -1,0 +1,181 @@
+"""The tangent stiffness kept at one state, for solvers that multiply with it many times.
+
+What `msm.linearised` finds for a spring or a cell is stored here, so that a product needs neither
+roots nor divisions, and what can make the stiffness indefinite can be left out.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.forces import gradient_of, scatter
+from msm.linearised import cross, spring_state
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+
+SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+"""B_a of corner a, times 4 h; in the order of msm.lattice.CORNERS."""
+
+
+class Tangent(NamedTuple):
+    """Springs and cells at a state.
+
+    Springs: `direction` (s, 3), stiffness `along` and `across` [N/m] (s,). Cells: `deformation` F
+    and its `cofactor` (c, 3, 3), `swelling` J - 1 and `pressure` kappa V (J - 1) [J] (c,).
+    """
+
+    direction: Floats
+    along: Floats
+    across: Floats
+    deformation: Floats
+    cofactor: Floats
+    swelling: Floats
+    pressure: Floats
+
+
+@numba.njit(cache=True, error_model="numpy")
+def empty_tangent(net: Network) -> Tangent:
+    """Arrays for the stiffness of a network."""
+    springs, cells = net.ends.shape[0], net.cells.shape[0]
+    return Tangent(
+        np.empty((springs, 3)),
+        np.empty(springs),
+        np.empty(springs),
+        np.empty((cells, 3, 3)),
+        np.empty((cells, 3, 3)),
+        np.empty(cells),
+        np.empty(cells),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
+    """Set the stiffness at the displacement u [m] (n, 3)."""
+    for s in range(net.ends.shape[0]):
+        x, y, z, at.along[s], at.across[s] = spring_state(law, net, u, s)
+        at.direction[s, 0], at.direction[s, 1], at.direction[s, 2] = x, y, z
+    linearise_cells(net, u, at)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
+    """Set F, its cofactors, J - 1 and the pressure of each cell."""
+    for c in range(net.cells.shape[0]):
+        at.swelling[c] = deform(net, c, u, at.deformation[c], at.cofactor[c])
+        at.pressure[c] = 0.0 if net.linear else net.bulk[c] * at.swelling[c]
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
+    """Set F and its cofactors (3, 3) of a cell; J - 1. At rest, and div u, if the net is linear."""
+    for d in range(3):
+        f[d, 0], f[d, 1], f[d, 2] = gradient_of(net.cells[c], u, d, 0.25 / net.spacing)
+    swelling = f[0, 0] + f[1, 1] + f[2, 2]
+    if net.linear:
+        f[:] = 0.0
+    else:  # J - 1 without the difference of numbers near 1, as in `msm.forces`
+        around = f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1]
+        swelling += f[0, 0] * (f[1, 1] + f[2, 2]) + (1.0 + f[0, 0]) * around
+    for d in range(3):
+        f[d, d] += 1.0
+    for d in range(3):
+        g[d, 0], g[d, 1], g[d, 2] = cross(f[(d + 1) % 3], f[(d + 2) % 3])
+    if not net.linear:
+        swelling += f[0, 1] * g[0, 1] + f[0, 2] * g[0, 2]
+    return swelling
+
+
+@numba.njit(cache=True, error_model="numpy")
+def make_definite(at: Tangent) -> None:
+    """Leave out what can make the stiffness indefinite.
+
+    A compressed spring pushes its ends sideways (T < 0 across it), and pressure turns with the
+    faces of its cell. What remains is a sum of squares.
+    """
+    for s in range(at.across.shape[0]):
+        at.across[s] = max(at.across[s], 0.0)
+    at.pressure[:] = 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
+    """Add `share` times the stiffness times p (n, 3)."""
+    add_spring_product(net, at, p, share, out)
+    add_cell_product(net, at, p, share, out)
+    for i in range(p.shape[0]):
+        for e in range(net.row[i], net.row[i + 1]):
+            for d in range(3):
+                out[i, d] += share * net.value[e] * p[net.column[e], d]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
+    """Add that of the springs."""
+    for s in range(net.ends.shape[0]):
+        i, j = net.ends[s, 0], net.ends[s, 1]
+        nx, ny, nz = at.direction[s, 0], at.direction[s, 1], at.direction[s, 2]
+        dx, dy, dz = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[j, 2] - p[i, 2]
+        across = share * at.across[s]
+        along = (share * at.along[s] - across) * (nx * dx + ny * dy + nz * dz)
+        fx, fy, fz = across * dx + along * nx, across * dy + along * ny, across * dz + along * nz
+        out[i, 0] -= fx
+        out[i, 1] -= fy
+        out[i, 2] -= fz
+        out[j, 0] += fx
+        out[j, 1] += fy
+        out[j, 2] += fz
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
+    """Add that of the cells."""
+    to_gradient = 0.25 / net.spacing
+    rate = np.empty((3, 3))
+    for c in range(net.cells.shape[0]):
+        cell, f, g = net.cells[c], at.deformation[c], at.cofactor[c]
+        swelling = 0.0
+        for d in range(3):
+            rate[d, 0], rate[d, 1], rate[d, 2] = gradient_of(cell, p, d, to_gradient)
+            swelling += rate[d, 0] * g[d, 0] + rate[d, 1] * g[d, 1] + rate[d, 2] * g[d, 2]
+        bulk = -share * to_gradient * net.bulk[c] * swelling
+        turned = -share * to_gradient * at.pressure[c]
+        for d in range(3):
+            e, k = (d + 1) % 3, (d + 2) % 3
+            a, b = cross(rate[e], f[k]), cross(f[e], rate[k])
+            x = bulk * g[d, 0] + turned * (a[0] + b[0])
+            y = bulk * g[d, 1] + turned * (a[1] + b[1])
+            z = bulk * g[d, 2] + turned * (a[2] + b[2])
+            scatter(cell, out, d, x, y, z)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
+    """Add `share` times the diagonal (n, 3) of the stiffness made definite."""
+    for s in range(net.ends.shape[0]):
+        across = max(at.across[s], 0.0)
+        for d in range(3):
+            k = across + (at.along[s] - across) * at.direction[s, d] ** 2
+            out[net.ends[s, 0], d] += share * k
+            out[net.ends[s, 1], d] += share * k
+    for c in range(net.cells.shape[0]):
+        for a in range(8):
+            for d in range(3):
+                slope = corner_slope(at.cofactor[c], a, d) / net.spacing
+                out[net.cells[c, a], d] += share * net.bulk[c] * slope * slope
+    for i in range(out.shape[0]):
+        for e in range(net.row[i], net.row[i + 1]):
+            if net.column[e] == i:
+                for d in range(3):
+                    out[i, d] += share * net.value[e]
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def corner_slope(cofactor: Floats, a: int, d: int) -> Any:
+    """Derivative of J by the displacement of corner a along d, times h."""
+    g = cofactor[d]
+    return 0.25 * (SIGNS[a, 0] * g[0] + SIGNS[a, 1] * g[1] + SIGNS[a, 2] * g[2])

@@ -1,0 +1,73 @@
+"""The volume term: one energy per cell, which lifts Poisson's ratio off the springs' 1/4.
+
+    W = 1/2 kappa V (J - 1)^2,   kappa = lambda - mu
+
+with J = det F of the mean deformation gradient of the cell, F = I + sum_a u_a B_a^T,
+B_a = (+-1, +-1, +-1) / (4 h). The springs carry mu and, being central, lambda = mu; the term adds
+the rest (after Golec et al. 2020, doi 10.1007/s00371-019-01663-0). One J per cell does not lock.
+Linearised, J - 1 is div u. A cell filled to phi counts with phi V.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from msm.calibration import POISSON_RATIO, lame
+from msm.lattice import CORNERS, CellLattice
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LARGEST_POISSON_RATIO = 0.4999
+
+
+@dataclass(frozen=True)
+class VolumeTerm:
+    """Cells (c, 8), their kappa V [J] (c,) and edge [m]; no cells means no volume term."""
+
+    cells: Ints
+    bulk: Floats
+    spacing: float
+
+
+def none(spacing: float) -> VolumeTerm:
+    """Springs alone."""
+    return VolumeTerm(np.zeros((0, 8), dtype=np.int64), np.zeros(0), spacing)
+
+
+def volume_term(lattice: CellLattice, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
+    """The term that makes the lattice's springs of modulus mu a material of E [Pa] and nu.
+
+    ValueError for a Poisson ratio below 1/4, where kappa is negative and swelling gains energy, or
+    above LARGEST_POISSON_RATIO.
+    """
+    if not POISSON_RATIO <= poisson_ratio <= LARGEST_POISSON_RATIO:
+        raise ValueError(
+            f"a lattice with a volume term has Poisson ratios from {POISSON_RATIO} to "
+            f"{LARGEST_POISSON_RATIO}, not {poisson_ratio:g}: below, the term would be negative "
+            "and a swollen body gain energy; change tissue.poisson_ratio or leave the term out"
+        )
+    first, mu = lame(youngs_modulus, poisson_ratio)
+    bulk = (first - mu) * lattice.fill * lattice.spacing**3
+    return VolumeTerm(lattice.cells, bulk, lattice.spacing)
+
+
+def divergence(term: VolumeTerm, node_count: int) -> csr_array:
+    """Div u of each cell [1/m] from the nodal displacements, shape (c, 3 n)."""
+    slopes = (2.0 * CORNERS - 1.0) / (4.0 * term.spacing)
+    cells = len(term.cells)
+    rows = np.repeat(np.arange(cells), 24)
+    columns = (3 * term.cells[:, :, None] + np.arange(3)).ravel()
+    entries = np.tile(slopes.ravel(), cells)
+    return csr_array((entries, (rows, columns)), shape=(cells, 3 * node_count))
+
+
+def stiffness_matrix(term: VolumeTerm, node_count: int) -> csr_array:
+    """Stiffness [N/m] (3 n, 3 n) of the term at rest."""
+    d = divergence(term, node_count)
+    scaled = csr_array(d.multiply(term.bulk[:, None]))
+    return csr_array(d.T @ scaled)

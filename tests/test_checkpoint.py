@@ -1,0 +1,310 @@
+"""A run that is interrupted and continued is the run that was not."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+
+from msm import checkpoint as states
+from msm import model
+from msm.assembly import Assembly, Material
+from msm.calibration import reference_stiffness
+from msm.checkpoint import Checkpoint
+from msm.damping import Damping
+from msm.lattice import build, node_volumes
+from msm.laws import Basafa, Hooke
+from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, run
+from msm.springs import connect
+from msm.volume import volume_term
+from study.organ.block import block_mesh
+from study.organ.occupancy import MeshBody
+from study.trajectory import Observation
+
+E, H, RHO, SAMPLES = 5e3, 0.01, 1054.0, 41
+STIFFENING = Basafa(8.0, 1600.0, 0.2)
+MEASURED = {"wall"}
+
+
+class Killed(Exception):  # noqa: N818 - not an error of the program
+    """Stands for a kill of the program."""
+
+
+def press(nu=0.25, force=0.5, law=STIFFENING):
+    """A block on a soft ground, pushed on its top until its springs stiffen."""
+    size = (4 * H, 4 * H, 4 * H)
+    lattice = build(MeshBody(block_mesh(size, H)), np.zeros(3), np.array(size), H)
+    z = lattice.nodes[:, 2]
+    top = z > size[2] - 1e-9
+    load = np.outer(top / top.sum() * force, [0.2, 0.0, -1.0])
+    ground = csr_array(diags_array(np.where(z < 1e-9, E * H, 0.0)))
+    body = Assembly(lattice, connect(lattice), RHO * node_volumes(lattice), ground, load)
+    return body, Material(law, volume_term(lattice, E, nu), Damping(4.0))
+
+
+def ramp(times):
+    return np.minimum(times / 0.2, 1.0)
+
+
+def watch(body, seconds=0.4):
+    nodes = body.lattice.nodes
+    times = np.linspace(0.0, seconds, SAMPLES)
+    return Observation(times, nodes[[-1]], (SAMPLES // 2, SAMPLES - 1), nodes[:9], nodes[-9:])
+
+
+def go(case, step=FOLLOWED, **options):
+    body, material = case
+    return run(body, material, ramp, watch(body), step, **options)
+
+
+def stopping_at(stops):
+    """An observer that raises at each call of a sequence, once, and notes every sample told."""
+    told, stops = [], set(stops)
+
+    def on_sample(sample, u, v):
+        told.append((sample, u.copy(), v.copy()))
+        if len(told) in stops:
+            raise Killed
+
+    return told, on_sample
+
+
+def go_on(case, path, stops, seconds=0.0, **options):
+    """Run, interrupted and resumed until it ends; the run, what was told, how often it resumed."""
+    told, on_sample = stopping_at(stops)
+    for resumed in range(len(stops) + 1):
+        point = Checkpoint(path, seconds, resume=True)
+        try:
+            return go(case, checkpoint=point, on_sample=on_sample, **options), told, resumed
+        except Killed:
+            pass
+    raise AssertionError("interrupted more often than asked")
+
+
+def assert_same(one, other):
+    """To the bit, NaN included, but for the time it took."""
+    for field in dataclasses.fields(one.trajectory):
+        np.testing.assert_array_equal(
+            getattr(one.trajectory, field.name), getattr(other.trajectory, field.name)
+        )
+    for field in dataclasses.fields(one):
+        if field.name not in MEASURED | {"trajectory"}:
+            np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """The uninterrupted run, in which a stretch of several samples was repeated."""
+    found = go(press())
+    assert found.repeated_steps >= 50
+    assert found.trajectory.status == "finished"
+    return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_interrupted_run_continues_to_the_same_bits(pressed, seed, tmp_path):
+    stops = np.random.default_rng(seed).choice(np.arange(2, SAMPLES), 4, replace=False)
+    found, _, resumed = go_on(press(), tmp_path / "state.npz", stops)
+    assert resumed == 4
+    assert_same(found, pressed)
+
+
+def test_it_may_be_interrupted_before_and_after_steps_were_undone(pressed, tmp_path):
+    """At each sample from the last one kept before them to the first one kept after them."""
+    told, on_sample = stopping_at(())
+    go(press(), on_sample=on_sample)
+    order = [sample for sample, _, _ in told]
+    back = next(i for i in range(1, len(order)) if order[i] <= order[i - 1])
+    assert order[back - 1] - order[back] >= 5
+    for number, stop in enumerate(range(back - 6, back + 8)):
+        found, again, _ = go_on(press(), tmp_path / f"{number}.npz", [stop])
+        assert_same(found, pressed)
+        assert [sample for sample, _, _ in again].count(order[back - 1]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("case", "options"),
+    [
+        (press(0.49, 0.3, Hooke(reference_stiffness(E, H, 0.49))), {}),
+        (press(0.45), {"integrator": "velocity-verlet", "step": Rate(900.0)}),
+        (press(0.45), {"integrator": "runge-kutta-4", "step": Automatic(0.5)}),
+        (press(), {"linear": True, "step": Fixed(0.4 / (SAMPLES - 1) / 10)}),
+        (press(), {"step": Counts(np.arange(SAMPLES - 1) % 3 + 10)}),
+        (press(0.45), {"integrator": "split-volume"}),
+    ],
+)
+def test_so_it_is_for_every_way_of_choosing_the_step(case, options, tmp_path):
+    plain = go(case, **options)
+    found, _, resumed = go_on(case, tmp_path / "state.npz", [9, 23, 37], **options)
+    assert resumed == 3
+    assert plain.trajectory.status == "finished"
+    assert_same(found, plain)
+
+
+def test_a_run_that_is_lost_is_lost_alike_after_an_interruption(tmp_path):
+    plain = go(press(force=4.0))
+    assert plain.trajectory.status == "diverged"
+    assert plain.repeated_steps > 0
+    found, told, resumed = go_on(press(force=4.0), tmp_path / "state.npz", [7, 15])
+    assert resumed == 2
+    assert_same(found, plain)
+    kept = ~np.isnan(plain.trajectory.displacement[:, 0, 0])
+    assert told[-1][0] == np.flatnonzero(kept)[-1]  # where it stood in the end
+
+
+def test_a_finished_run_is_not_run_again(pressed, tmp_path):
+    point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
+    go(press(), checkpoint=point)
+    told, on_sample = stopping_at(())
+    assert_same(go(press(), checkpoint=point, on_sample=on_sample), pressed)
+    assert [sample for sample, _, _ in told] == [SAMPLES - 1]
+
+
+def test_without_resume_a_state_is_left_unread_and_written_over(tmp_path):
+    path = tmp_path / "state.npz"
+    path.write_bytes(b"of something else")
+    go(press(), checkpoint=Checkpoint(path, seconds=1e9))
+    assert len(np.load(path)["motion.u"]) == 125
+
+
+def test_the_last_sample_told_is_where_the_run_stands(pressed):
+    told, on_sample = stopping_at(())
+    go(press(), on_sample=on_sample)
+    final = {sample: (u, v) for sample, u, v in told}
+    assert sorted(final) == list(range(SAMPLES))
+    assert len(told) > SAMPLES
+    probe = np.array([final[sample][0][-1] for sample in range(SAMPLES)])
+    np.testing.assert_allclose(probe, pressed.trajectory.displacement[:, 0], rtol=1e-12, atol=1e-15)
+
+
+def test_all_that_changes_in_a_run_is_in_its_state(monkeypatch):
+    """Negative control of the table: an attribute that it leaves out is seen."""
+    seen = {}
+
+    def watched(parts):
+        seen["parts"], seen["before"] = parts, snapshot(parts)
+        return parts
+
+    genuine = model._parts
+    monkeypatch.setattr(model, "_parts", lambda *things: watched(genuine(*things)))
+    monkeypatch.setattr(states, "write", lambda *_: None)
+    go(press(), checkpoint=Checkpoint(None, seconds=1e9))
+    changed = differences(seen["before"], snapshot(seen["parts"]))
+    assert changed <= {(part, name) for part, names in states.CHANGING.items() for name in names}
+    assert {("pace", "now"), ("follower", "mode"), ("motion", "u")} <= changed
+
+
+def snapshot(parts):
+    return {
+        (part, name): np.array(value)
+        for part, thing in parts.items()
+        for name, value in vars(thing).items()
+        if isinstance(value, bool | int | float | np.ndarray)
+    }
+
+
+def differences(before, after):
+    return {key for key in after if not np.array_equal(before[key], after[key], equal_nan=True)}
+
+
+@pytest.mark.parametrize("left_out", ["pace.now", "follower.mode", "motion.v"])
+def test_a_state_that_lacks_a_part_is_noticed_by_these_tests(
+    pressed, left_out, tmp_path, monkeypatch
+):
+    part, name = left_out.split(".")
+    names = tuple(n for n in states.CHANGING[part] if n != name)
+    monkeypatch.setitem(states.CHANGING, part, names)
+    found, _, _ = go_on(press(), tmp_path / "state.npz", [35])
+    with pytest.raises(AssertionError):
+        assert_same(found, pressed)
+
+
+def other_damping(case):
+    body, material = case
+    return body, dataclasses.replace(material, damping=Damping(4.1))
+
+
+def other_load(case):
+    body, material = case
+    load = body.load.copy()
+    load[-1, 0] = np.nextafter(load[-1, 0], 1.0)
+    return dataclasses.replace(body, load=load), material
+
+
+@pytest.mark.parametrize(
+    ("change", "options"),
+    [
+        (other_damping, {}),
+        (other_load, {}),
+        (lambda _: press(law=Basafa(8.0, 1600.0, 0.21)), {}),
+        (lambda _: press(nu=0.3), {}),
+        (lambda case: case, {"step": Automatic(0.7)}),
+        (lambda case: case, {"integrator": "velocity-verlet"}),
+        (lambda case: case, {"linear": True}),
+    ],
+)
+def test_the_state_of_another_run_is_refused(change, options, tmp_path):
+    point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
+    go(press(), checkpoint=point)
+    with pytest.raises(ValueError, match=r"another run.*run without --resume"):
+        go(change(press()), checkpoint=point, **options)
+
+
+def test_another_history_of_the_load_or_another_watch_is_refused(tmp_path):
+    point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
+    body, material = press()
+    go((body, material), checkpoint=point)
+    for factor, seen in (
+        (np.zeros_like, watch(body)),
+        (ramp, watch(body, 0.5)),
+        (ramp, dataclasses.replace(watch(body), probes=body.lattice.nodes[[0]])),
+    ):
+        with pytest.raises(ValueError, match="another run"):
+            run(body, material, factor, seen, checkpoint=point)
+
+
+def test_a_state_of_another_program_is_refused(tmp_path, monkeypatch):
+    point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
+    go(press(), checkpoint=point)
+    monkeypatch.setattr(model, "program", lambda: "later")
+    with pytest.raises(ValueError, match="the program has changed"):
+        go(press(), checkpoint=point)
+
+
+@pytest.mark.parametrize("keep", [0, 10, 4000])
+def test_a_damaged_state_is_refused(keep, tmp_path):
+    point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
+    go(press(), checkpoint=point)
+    point.path.write_bytes(point.path.read_bytes()[:keep])
+    with pytest.raises(ValueError, match=r"state\.npz: damaged state.*without --resume"):
+        go(press(), checkpoint=point)
+
+
+def test_a_failure_while_writing_leaves_the_state_before(tmp_path, monkeypatch):
+    point = Checkpoint(tmp_path / "state.npz", seconds=0.0, resume=True)
+    go(press(), checkpoint=point)
+    whole = point.path.read_bytes()
+
+    def failing(file, **_):
+        file.write(b"half")
+        raise OSError("no space left")
+
+    monkeypatch.setattr(np, "savez", failing)
+    with pytest.raises(OSError, match="no space"):
+        go(press(), checkpoint=dataclasses.replace(point, resume=False))
+    assert point.path.read_bytes() == whole
+
+
+def test_states_are_written_no_more_often_than_asked(tmp_path, monkeypatch):
+    written = []
+    clock = iter(range(10_000))
+    monkeypatch.setattr(states.time, "perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr(states, "write", lambda *_: written.append(1))
+    go(press(), checkpoint=Checkpoint(tmp_path / "state.npz", seconds=1e9))
+    assert len(written) == 1  # the last
+    go(press(), checkpoint=Checkpoint(tmp_path / "state.npz", seconds=0.0))
+    assert len(written) >= 5
+
+
+def test_keeping_states_does_not_change_a_run(pressed, tmp_path):
+    assert_same(go(press(), checkpoint=Checkpoint(tmp_path / "state.npz", seconds=0.0)), pressed)
