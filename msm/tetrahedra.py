@@ -1,0 +1,131 @@
+"""Springs along the edges of a tetrahedral mesh, to show what they cost in accuracy.
+
+Each edge of length L gets k = E sum(V) / L^2, summed over the tetrahedra round it (Van Gelder 1998,
+J. Graph. Tools 3(2)). Uniform strain explains the constant. Each tetrahedron of volume V adds E V
+to k L^2 of six edges, so the springs have C_ijkl = 6 E <n_i n_j n_k n_l> over their directions n;
+evenly spread, these give C44 = C12 = 6 E / 15 = 0.4 E, the material of E and nu = 1/4.
+
+A mesh falls short of that in one of two ways. If it repeats itself, its few directions are not
+evenly spread: it is anisotropic. If it does not, its nodes are no centres of symmetry: they give
+way under uniform strain, and the moduli are those that the irregularity of the mesh leaves.
+Refinement cures neither, and no stiffness does. The tests have the figures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from msm.calibration import reference_stiffness
+from msm.springs import Springs
+from study.contact import Foundation, ToolPatch
+from study.mesh.kinds import TetrahedralMesh
+from study.mesh.locate import locate
+from study.mesh.quadrature import SurfaceRule
+from study.mesh.tetrahedra import EDGES, edges, mean_edge, volumes
+
+Floats = NDArray[np.float64]
+
+OUTSIDE = 1e-9
+"""A barycentric coordinate below minus this is outside, and not on a face up to rounding."""
+
+
+@dataclass(frozen=True)
+class TetrahedralLattice:
+    """A mesh as the lattice of an assembly."""
+
+    mesh: TetrahedralMesh
+
+    @property
+    def nodes(self) -> Floats:
+        """Nodes [m] (n, 3)."""
+        return self.mesh.points
+
+    @property
+    def spacing(self) -> float:
+        """Mean edge [m]; Hooke(reference_stiffness(E, spacing)) is the law of modulus E."""
+        return mean_edge(self.mesh)
+
+    def interpolation(self, points: Floats) -> tuple[csr_array, int]:
+        """Linear weights (q, n) at points [m] (q, 3), and how many lie outside all tetrahedra.
+
+        Those are extrapolated from one nearby, which keeps force and moment of a load.
+        """
+        tetrahedron, barycentric = locate(self.mesh, points)
+        rows = np.repeat(np.arange(len(points)), 4)
+        columns = self.mesh.tetrahedra[tetrahedron].ravel()
+        shape = (len(points), len(self.mesh.points))
+        outside = int((barycentric.min(axis=1) < -OUTSIDE).sum())
+        return csr_array((barycentric.ravel(), (rows, columns)), shape=shape), outside
+
+    def inverted_cells(self, displacement: Floats) -> int:
+        """How many tetrahedra are turned inside out by a displacement [m] (n, 3)."""
+        moved = TetrahedralMesh(self.mesh.points + displacement, self.mesh.tetrahedra)
+        return int((volumes(moved) <= 0.0).sum())
+
+
+@dataclass(frozen=True)
+class TetrahedralAssembly:
+    """A mesh with springs on its edges, support and load: the fields of `msm.model.Assembly`.
+
+    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    """
+
+    lattice: TetrahedralLattice
+    springs: Springs
+    mass: Floats
+    foundation: csr_array
+    load: Floats
+
+
+def assemble(
+    mesh: TetrahedralMesh,
+    surface: SurfaceRule,
+    density: float,
+    foundation: Foundation,
+    tool: ToolPatch,
+) -> TetrahedralAssembly:
+    """Springs on a mesh. ValueError if it is not held, or not touched by the tool."""
+    held = foundation.density(surface.points, surface.normals) * surface.weights
+    pushed = tool.profile(surface.points, surface.normals) * surface.weights
+    if not held.any():
+        raise ValueError("the support holds no surface; enlarge support.depth")
+    if not pushed.any():
+        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
+    lattice = TetrahedralLattice(mesh)
+    weights, _ = lattice.interpolation(surface.points)
+    nodal = weights.T @ (pushed * tool.force / pushed.sum())
+    return TetrahedralAssembly(
+        lattice,
+        connect(mesh),
+        density * node_volumes(mesh),
+        csr_array(weights.T @ diags_array(held) @ weights),
+        np.outer(nodal, tool.direction),
+    )
+
+
+def connect(mesh: TetrahedralMesh) -> Springs:
+    """One spring per edge, weights relative to the reference stiffness at the mean edge."""
+    ends = edges(mesh.tetrahedra)
+    rest = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
+    weight = _volume_round(mesh, ends) / (rest**2).sum(axis=1)
+    return Springs(ends, rest, weight / reference_stiffness(1.0, mean_edge(mesh)))
+
+
+def _volume_round(mesh: TetrahedralMesh, ends: NDArray[np.int64]) -> Floats:
+    """Volume [m^3] of the tetrahedra round each edge."""
+    row_major = np.array([len(mesh.points), 1])
+    pairs = np.sort(mesh.tetrahedra[:, EDGES], axis=2) @ row_major
+    edge = np.searchsorted(ends @ row_major, pairs)
+    share = np.repeat(volumes(mesh), len(EDGES))
+    return np.bincount(edge.ravel(), weights=share, minlength=len(ends)).astype(np.float64)
+
+
+def node_volumes(mesh: TetrahedralMesh) -> Floats:
+    """Volume [m^3] that each node stands for, a quarter of each tetrahedron; shape (n,)."""
+    share = np.repeat(volumes(mesh) / 4.0, 4)
+    count = len(mesh.points)
+    return np.bincount(mesh.tetrahedra.ravel(), share, count).astype(np.float64)
