@@ -10,6 +10,8 @@ rises to its core, where it is 1, and falls after it, so both have closed forms 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from math import exp, log, log1p
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -270,29 +272,89 @@ def core(one: FuzzySet) -> tuple[float, float]:
 
 
 def corners(one: FuzzySet) -> tuple[float, ...]:
-    """Positions where the function, or a bound of its footprint, is not smooth."""
+    """Positions where the function, or a bound of its footprint, is not smooth or may be steep."""
     p, shift, widths = one.parameters, one.footprint.mean, one.footprint.spread
+    places: tuple[float, ...]
     match one.kind:
         case "trimf" | "trapmf" | "pimf" | "zmf" | "smf":
             halves = (0.5 * (p[0] + p[1]), 0.5 * (p[-2] + p[-1]))
             places = (*p, *(halves if one.kind in ("pimf", "zmf", "smf") else ()))
         case "gauss2mf":
             places = (p[1], p[3])
-        case "gaussmf" | "gbellmf":
-            places = (p[-1] if one.kind == "gbellmf" else p[1],)
+        case "gbellmf":
+            places = (p[2] - p[0], p[2], p[2] + p[0])
+        case "gaussmf" | "sigmf":
+            places = (p[1],)
         case _:
-            places = ()
+            places = (p[1], p[3], *_turns(one)) if one.kind in ("dsigmf", "psigmf") else ()
     if not places or (shift == 0 and widths == 0):
         return places
     low, high = core(one)
-    stretched = (
-        q + factor * (x - q)
-        for x in places
-        for factor in (1.0 - widths, 1.0, 1.0 + widths)
-        for q in (min(max(x, low), high),)
-    )
-    middle = (0.5 * (low + high),) if np.isfinite([low, high]).all() else ()
-    return (*middle, *(x + s for x in stretched for s in (-shift, 0.0, shift)))
+    if widths > 0:
+        nearest = [(x, min(max(x, low), high)) for x in places]
+        factors = (1.0 - widths, 1.0, 1.0 + widths)
+        places = tuple(q + factor * (x - q) for x, q in nearest for factor in factors)
+    crossing = (_crossing(one),) if shift > 0 and np.isfinite([low, high]).all() else ()
+    return (*crossing, *(x + s for x in places for s in (-shift, 0.0, shift)))
+
+
+BISECTIONS = 80
+
+
+@lru_cache(maxsize=1024)
+def _crossing(one: FuzzySet) -> float:
+    """Where the memberships of the set moved left and right as far as it may be are equal."""
+    (low, high), shift, factor = core(one), one.footprint.mean, 1.0 - one.footprint.spread
+    if one.kind in ("gaussmf", "gbellmf"):
+        return low
+
+    def difference(x: float) -> float:
+        left, right = membership(one, _stretched(one, x + np.array([-shift, shift]), factor))
+        return float(left - right)
+
+    return _root(difference, low - shift, high + shift)
+
+
+@lru_cache(maxsize=1024)
+def _turns(one: FuzzySet) -> Parameters:
+    """Where a product of two sigmoids is largest, and a difference largest or 0."""
+    (c_1, c_2), (a_1, a_2) = one.parameters[1::2], one.parameters[::2]
+    reach = abs(c_1 - c_2) + 750.0 / min(abs(a_1), abs(a_2))  # exp(-750) is 0
+    if one.kind == "psigmf":
+        # The slope of its logarithm falls throughout, from above 0 to below it if it has a peak.
+        centres, slopes = np.array([c_1, c_2]), np.array([a_1, a_2])
+        peak = _root(
+            lambda x: -float(slopes @ np.exp(-np.logaddexp(0.0, slopes * (x - centres)))),
+            min(c_1, c_2) - reach,
+            max(c_1, c_2) + reach,
+        )
+        return (peak,)
+    zero = ((a_1 * c_1 - a_2 * c_2) / (a_1 - a_2),) if a_1 != a_2 else ()
+    if a_1 * a_2 < 0:
+        return zero
+    # At the centre of the steeper one that one is steeper, and far off, or never, the other.
+    (steep, centre), (flat, other) = sorted([(a_1, c_1), (a_2, c_2)], key=lambda s: -abs(s[0]))
+
+    def steeper(x: float) -> float:
+        ratio = _log_slope(steep * (x - centre)) - _log_slope(flat * (x - other))
+        return ratio + log(steep / flat)
+
+    left = _root(steeper, centre - reach, centre)
+    right = _root(lambda x: -steeper(x), centre, centre + reach)
+    return (*zero, left, right)
+
+
+def _log_slope(z: float) -> float:
+    """Logarithm of the slope of 1 / (1 + exp(-z))."""
+    return -abs(z) - 2.0 * log1p(exp(-abs(z)))
+
+
+def _root(function: Callable[[float], float], left: float, right: float) -> float:
+    """Where a function rises through 0, by bisection."""
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (left + right)
+        left, right = (left, middle) if function(middle) > 0 else (middle, right)
+    return 0.5 * (left + right)
 
 
 def membership(one: FuzzySet, x: Array) -> Array:

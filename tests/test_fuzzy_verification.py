@@ -261,6 +261,39 @@ def test_exact_sampling_is_the_limit_of_many_samples(kind):
     assert answer(system, X, kind, sampling="octave") != pytest.approx(limit, abs=1e-5)
 
 
+def test_exact_interval_spans_the_universe_where_nothing_fills_it_from_below():
+    x = Variable("x", 0, 1, (FuzzySet("a", "trimf", (0.2, 0.5, 0.8), Footprint(mean=0.1)),))
+    y = Variable("y", 0, 100, (FuzzySet("o", "gaussmf", (3.0, 90.0)),))
+    found = infer(
+        System((x,), y, (rule([(0, 0)], 0),)),
+        [[0.28]],  # within the footprint of the foot: the lower strength is 0
+        "interval-type-2",
+        Options(sampling="exact"),
+    )
+    assert found.interval[0] == pytest.approx([0.0, 100.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        FuzzySet("skewed", "trimf", (0.436, 0.526, 0.543), Footprint(mean=0.0357)),
+        FuzzySet("lagging", "gaussmf", (0.05, 0.4), Footprint(spread=0.3, scale=0.9, lag=0.4)),
+        FuzzySet("both", "trapmf", (0.1, 0.2, 0.25, 0.9), Footprint(mean=0.03, spread=0.2)),
+    ],
+)
+def test_exact_interval_is_that_of_two_million_samples(one):
+    y = np.linspace(0, 1, 2_000_001)
+    weights = np.ones_like(y)
+    weights[[0, -1]] = 0.5
+    sampled_ends = karnik_mendel(
+        Quadrature(y, weights), lower_membership(one, y), upper_membership(one, y)
+    )
+    system = always(one, low=0, high=1)
+    found = infer(system, ANY, "interval-type-2", Options(sampling="exact")).interval[0]
+    # The samples' own error: a step of 5e-7 squared, times bends of up to 60.
+    assert found == pytest.approx(sampled_ends, abs=1e-10)
+
+
 # --- Sugeno ----------------------------------------------------------------------------------
 
 
