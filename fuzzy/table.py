@@ -125,7 +125,8 @@ def _check_header(table: Table, added: Sequence[str]) -> None:
 def _readings(table: Table, system: System) -> Array:
     """The columns of the inputs as numbers, shape (rows, inputs)."""
     names = [name.strip() for name in table.header]
-    columns = [_column(variable.name, names, table) for variable in system.inputs]
+    inputs = [variable.name for variable in system.inputs]
+    columns = [_column(name, names, inputs, table) for name in inputs]
     return np.array(
         [
             [_reading(cells[column], table, line, names[column]) for column in columns]
@@ -134,14 +135,15 @@ def _readings(table: Table, system: System) -> Array:
     )
 
 
-def _column(name: str, names: list[str], table: Table) -> int:
+def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int:
     if name in names:
         return names.index(name)
     if len(names) == 1 and ";" in names[0]:
         raise table.fault(
             table.header_line, "columns are parted by semicolons; export with commas and points"
         )
-    folded = {present.casefold(): present for present in names}
+    # Never another input's column: two diseases may have names alike.
+    folded = {present.casefold(): present for present in names if present not in inputs}
     closest = difflib.get_close_matches(name.casefold(), folded, 1)
     hint = f"; did you mean {folded[closest[0]]!r}? Rename it" if closest else "; add it"
     present = ", ".join(repr(one) for one in names)

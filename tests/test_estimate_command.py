@@ -192,6 +192,15 @@ def test_a_table_with_a_reading_that_no_liver_has_is_refused(tmp_path):
     assert not (tmp_path / "out.csv").exists()
 
 
+def test_a_missing_column_is_not_looked_for_under_another_disease(tmp_path):
+    (tmp_path / "in.csv").write_text("hcv [kPa],hbv,ald,cld,nafld\n9,4,4,4,4\n")
+    arguments = ("estimate", "--inputs", "in.csv", "--system", "mamdani", "--out", "out.csv")
+    done = study(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no column 'hcv'" in done.stderr
+    assert "did you mean 'hbv'" not in done.stderr
+
+
 @pytest.mark.parametrize("suffix", ["fis", "json"])
 def test_the_liver_is_written_and_read_back(tmp_path, suffix):
     done = study("rules", "--out", f"liver.{suffix}", cwd=tmp_path)
