@@ -46,12 +46,14 @@ def evaluate_table(
     kind: str,
     options: Options | None = None,
     unit: str = "",
+    plausible: tuple[float, float] = (-math.inf, math.inf),
 ) -> tuple[str, ...]:
     """Write the table with the column `estimate`, for type-2 also `lower` and `upper`; its notes.
 
     Columns are found by the names of the inputs, in their units; all columns are passed on as they
     are, empty lines are left out. An earlier `csv_out` is replaced once everything is computed; it
-    may not be `csv_in`. Raises ValueError naming file, line, column and remedy.
+    may not be `csv_in`. Raises ValueError naming file, line, column and remedy, also for a reading
+    outside the `plausible` ones.
     """
     check_kind(system, kind)
     if csv_out.resolve() == csv_in.resolve():
@@ -60,6 +62,7 @@ def evaluate_table(
     added = (VALUE, *BOUNDS) if kind == "interval-type-2" else (VALUE,)
     _check_header(table, added)
     X = _readings(table, system)
+    _check_plausible(X, table, system, plausible, unit)
     try:
         inferred = infer(system, X, kind, options, unit)
     except ValueError as error:
@@ -68,6 +71,19 @@ def evaluate_table(
     rows = (cells + answer for cells, answer in zip(table.rows, answers, strict=True))
     _write(csv_out, [*table.header, *added], rows)
     return tuple(_with_lines(note, table, system) for note in inferred.notes)
+
+
+def _check_plausible(
+    X: Array, table: Table, system: System, plausible: tuple[float, float], unit: str
+) -> None:
+    low, high = plausible
+    beyond = np.argwhere((low > X) | (high < X))
+    if beyond.size:
+        row, i = beyond[0]
+        raise table.fault(
+            table.lines[row],
+            f"{system.inputs[i].name}: {X[row, i]:g} cannot be; give {low:g} to {high:g} {unit}",
+        )
 
 
 def read_readings(path: Path, system: System) -> Array:

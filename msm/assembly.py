@@ -59,22 +59,31 @@ def assemble(
     margin = 1e-9 * np.ptp(surface.points, axis=0).max()
     lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
     lattice = cells.build(body, lower, upper, spacing)
+    weights, _ = cells.interpolation(lattice, surface.points)
+    return Assembly(
+        lattice,
+        connect(lattice, flexion, body_diagonals),
+        density * cells.node_volumes(lattice),
+        *contact(weights, surface, foundation, tool),
+    )
+
+
+def contact(
+    weights: csr_array, surface: SurfaceRule, foundation: Foundation, tool: ToolPatch
+) -> tuple[csr_array, Floats]:
+    """Foundation [N/m] (n, n) and load [N] (n, 3) that nodes take by weights (q, n).
+
+    ValueError if nothing is held, or touched by the tool.
+    """
     held = foundation.density(surface.points, surface.normals) * surface.weights
     pushed = tool.profile(surface.points, surface.normals) * surface.weights
     if not held.any():
         raise ValueError("the support holds no surface; enlarge support.depth")
     if not pushed.any():
         raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
-    weights, _ = cells.interpolation(lattice, surface.points)
     support = csr_array(weights.T @ diags_array(held) @ weights)
     nodal = weights.T @ (pushed * tool.force / pushed.sum())
-    return Assembly(
-        lattice,
-        connect(lattice, flexion, body_diagonals),
-        density * cells.node_volumes(lattice),
-        support,
-        np.outer(nodal, tool.direction),
-    )
+    return support, np.outer(nodal, tool.direction)
 
 
 def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> Network:

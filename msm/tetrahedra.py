@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
+from msm.assembly import contact
 from msm.calibration import reference_stiffness
 from msm.springs import Springs
 from study.contact import Foundation, ToolPatch
@@ -89,21 +90,13 @@ def assemble(
     tool: ToolPatch,
 ) -> TetrahedralAssembly:
     """Springs on a mesh. ValueError if it is not held, or not touched by the tool."""
-    held = foundation.density(surface.points, surface.normals) * surface.weights
-    pushed = tool.profile(surface.points, surface.normals) * surface.weights
-    if not held.any():
-        raise ValueError("the support holds no surface; enlarge support.depth")
-    if not pushed.any():
-        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
     lattice = TetrahedralLattice(mesh)
     weights, _ = lattice.interpolation(surface.points)
-    nodal = weights.T @ (pushed * tool.force / pushed.sum())
     return TetrahedralAssembly(
         lattice,
         connect(mesh),
         density * node_volumes(mesh),
-        csr_array(weights.T @ diags_array(held) @ weights),
-        np.outer(nodal, tool.direction),
+        *contact(weights, surface, foundation, tool),
     )
 
 

@@ -25,6 +25,9 @@ from fuzzy.stiffness import (
 )
 from fuzzy.system import System
 
+PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
+"""Readings [kPa] beyond which a unit must be wrong."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
@@ -103,7 +106,7 @@ def _patient(request: Request) -> Answer:
 
 
 def _check_plausible(kpa: float, where: str) -> None:
-    low, high = parameters()["plausible_low"], parameters()["plausible_high"]
+    low, high = PLAUSIBLE
     if not low <= kpa <= high:  # nor for NaN
         raise ValueError(f"{where}: no liver has that; give kPa, {low:g} to {high:g}")
 
@@ -143,20 +146,17 @@ def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iter
 
 
 def _table(request: Request, inputs: Path) -> Answer:
-    from fuzzy.table import evaluate_table, read_readings
+    from fuzzy.table import evaluate_table
 
     _check_table(request)
     system, unit = _rule_base(request.rule_base, request.settings)
     options = settings_of(request.settings).options
-    if request.rule_base is None:
-        for row, x in enumerate(read_readings(inputs, system), start=1):
-            for variable, value in zip(system.inputs, x, strict=True):
-                _check_plausible(value, f"{inputs}: row {row}: {variable.name} {value:g}")
     lines: list[str] = []
     notes: tuple[str, ...] = ()
     if request.out is not None:
         (kind,) = request.systems
-        notes = evaluate_table(system, inputs, request.out, kind, options, unit)
+        range_ = PLAUSIBLE if request.rule_base is None else (-np.inf, np.inf)
+        notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_)
         lines.append(str(request.out))
     if request.explain:
         lines += _explained(request, system, _table_row(inputs, request.row, system))

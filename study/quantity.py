@@ -61,7 +61,7 @@ class Quantity:
 def _bare(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         # pydantic reports ValueErrors only.
-        raise ValueError(f'write a number with its unit, for example "1 {unit}"')  # noqa: TRY004
+        raise ValueError(f'write a number with its unit, for example "1 {unit}"')  # noqa: TRY004 - see above
     try:
         return float(value)
     except OverflowError:

@@ -61,8 +61,8 @@ def _grid(points: Floats, cells: Ints) -> vtkUnstructuredGrid:
     order = HEXAHEDRON if corners == 8 else range(4)
     flat = np.ascontiguousarray(cells[:, list(order)], dtype=np.int64).ravel()
     places, connectivity = vtkPoints(), vtkCellArray()
-    places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))  # type: ignore[no-untyped-call]
-    connectivity.SetData(corners, numpy_to_vtkIdTypeArray(flat, deep=True))  # type: ignore[no-untyped-call]
+    places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))  # type: ignore[no-untyped-call] # VTK has no types here
+    connectivity.SetData(corners, numpy_to_vtkIdTypeArray(flat, deep=True))  # type: ignore[no-untyped-call] # VTK has no types here
     grid = vtkUnstructuredGrid()
     grid.SetPoints(places)
     grid.SetCells(CELL_TYPES[corners], connectivity)
@@ -76,7 +76,7 @@ class _Source(VTKPythonAlgorithmBase):
     """
 
     def __init__(self, grid: vtkUnstructuredGrid, times: list[float], fields: Fields) -> None:
-        super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkUnstructuredGrid")  # type: ignore[no-untyped-call]
+        super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkUnstructuredGrid")  # type: ignore[no-untyped-call] # VTK has no types here
         self.grid, self.times, self.fields = grid, times, fields
         self.error: Exception | None = None
 
@@ -97,10 +97,10 @@ class _Source(VTKPythonAlgorithmBase):
         output.GetInformation().Set(output.DATA_TIME_STEP(), at)
         try:
             for name, values in self.fields(self.times.index(at)).items():
-                array = numpy_to_vtk(values, deep=True)  # type: ignore[no-untyped-call]
+                array = numpy_to_vtk(values, deep=True)  # type: ignore[no-untyped-call] # VTK has no types here
                 array.SetName(name)
                 output.GetPointData().AddArray(array)
-        except Exception as error:
+        except Exception as error:  # VTK would print it and go on; it is raised afterwards
             self.error = error
             return 0
         return 1

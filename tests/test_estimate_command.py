@@ -188,7 +188,7 @@ def test_a_table_with_a_reading_that_no_liver_has_is_refused(tmp_path):
     arguments = ("estimate", "--inputs", "in.csv", "--system", "mamdani", "--out", "out.csv")
     done = study(*arguments, cwd=tmp_path)
     assert done.returncode == 2
-    assert "row 2: hcv 9500: no liver has that; give kPa" in done.stderr
+    assert "in.csv:3: hcv: 9500 cannot be; give 0.5 to 150 kPa" in done.stderr
     assert not (tmp_path / "out.csv").exists()
 
 
