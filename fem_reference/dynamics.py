@@ -1,80 +1,116 @@
-"""Second-order implicit time stepping with mass-proportional damping.
+"""Implicit time stepping of M u'' + C u' + K u = f(t), C = a M + b K, from rest.
 
-M u'' + alpha M u' + K u = f(t) as a first-order system in u and v, by TR-BDF2: a trapezoidal stage
-to t + gamma dt, gamma = 2 - sqrt(2), then the second-order backward formula. Both stages share one
-matrix, and the scheme is L-stable: an overdamped velocity settles within a few steps, however long.
-Bank et al. (1985), IEEE Trans. CAD 4:436; Hosea and Shampine (1996), Appl. Numer. Math. 20:21.
+TR-BDF2 is a trapezoidal stage to t + gamma dt, gamma = 2 - sqrt(2), then the second-order backward
+formula, on the first-order system in u and v. Both stages share one matrix, and the scheme is
+L-stable: an overdamped velocity settles within a few steps, however long. Bank et al. (1985), IEEE
+Trans. CAD 4:436; Hosea and Shampine (1996), Appl. Numer. Math. 20:21.
+
+HHT-alpha is Newmark's scheme with forces taken between the ends of the step, which damps what the
+step cannot follow; alpha = 0 is the average acceleration. Hilber, Hughes and Taylor (1977),
+Earthquake Eng. Struct. Dyn. 5:283.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+
+from fem_reference.direct import Solve, factorised
+from fem_reference.stiffness import Stiffness
 
 Floats = NDArray[np.float64]
+March = Callable[
+    ["Oscillator", Callable[[Floats], Floats], float, int], Iterator[tuple[Floats, Floats]]
+]
 
 GAMMA = 2.0 - np.sqrt(2.0)
 ORDER = 2
+ALPHA = -0.05
 
 
-def factorised(matrix: csc_array) -> Any:
-    """Sparse factors of a symmetric positive matrix, with an ordering that keeps them small.
+@dataclass(frozen=True)
+class Damping:
+    """Rayleigh damping C = mass M + stiffness K, in 1/s and s."""
 
-    ValueError if the matrix is singular: nothing holds the body.
-    """
-    try:
-        return splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        raise ValueError("the stiffness is singular: the support does not hold the body") from None
-
-
-def solve_static(stiffness: csc_array, load: Floats) -> Floats:
-    """Displacement [m] at rest under a load [N]. ValueError if the result is not in balance."""
-    displacement = np.asarray(factorised(stiffness).solve(load))
-    residual = np.linalg.norm(stiffness @ displacement - load) / np.linalg.norm(load)
-    if not residual < 1e-6:
-        raise ValueError(f"static solution out of balance by {residual:.1e} of the load")
-    return displacement
+    mass: float
+    stiffness: float = 0.0
 
 
 @dataclass(frozen=True)
 class Oscillator:
-    """M u'' + alpha M u' + K u = factor(t) load."""
+    """M u'' + C u' + K u = factor(t) load."""
 
     mass: csc_array
-    stiffness: csc_array
+    stiffness: Stiffness
     load: Floats
-    damping_rate: float
+    damping: Damping
+
+    def shifted(self, damped: float, elastic: float) -> Solve:
+        """Solution of (M + damped C + elastic K) u = f by factors."""
+        share = damped * self.damping.stiffness + elastic
+        mass = (1.0 + damped * self.damping.mass) * self.mass
+        solve = factorised(self.stiffness.system(mass, share))
+        size, more = self.stiffness.size, self.stiffness.unknowns - self.stiffness.size
+        return lambda f: solve(np.concatenate([f, np.zeros(more)]))[:size]
+
+    def force(self, u: Floats, v: Floats) -> Floats:
+        """C v + K u [N]."""
+        a, b = self.damping.mass, self.damping.stiffness
+        return np.asarray(a * (self.mass @ v) + self.stiffness @ (u + b * v))
 
 
 def march(
     system: Oscillator, factor: Callable[[Floats], Floats], step: float, count: int
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Displacement and velocity, from rest, at 0, step, ..., count * step [s]."""
+    """Displacement and velocity by TR-BDF2, from rest, at 0, step, ..., count * step [s]."""
     theta = 0.5 * GAMMA * step
-    alpha, M, K = system.damping_rate, system.mass, system.stiffness
-    solver = factorised(csc_array((1.0 + theta * alpha) * M + theta**2 * K))
+    M, solve = system.mass, system.shifted(theta, theta**2)
     u, v = np.zeros_like(system.load), np.zeros_like(system.load)
     yield u, v
     a = 1.0 / (GAMMA * (2.0 - GAMMA))
     b = (1.0 - GAMMA) ** 2 * a
     for n in range(count):
         start, middle, end = factor(step * (n + np.array([0.0, GAMMA, 1.0])))
-        force = (start + middle) * system.load - K @ (2.0 * u + theta * v)
-        v_mid = solver.solve((1.0 - theta * alpha) * (M @ v) + theta * force)
+        force = (start + middle) * system.load - system.force(2.0 * u + theta * v, v)
+        v_mid = solve(M @ v + theta * force)
         u_mid = u + theta * (v + v_mid)
         u_hat, v_hat = a * u_mid - b * u, a * v_mid - b * v
-        v = solver.solve(M @ v_hat + theta * (end * system.load - K @ u_hat))
+        v = solve(M @ v_hat + theta * (end * system.load - system.stiffness @ u_hat))
         u = u_hat + theta * v
+        yield u, v
+
+
+def hht(
+    system: Oscillator,
+    factor: Callable[[Floats], Floats],
+    step: float,
+    count: int,
+    alpha: float = ALPHA,
+) -> Iterator[tuple[Floats, Floats]]:
+    """Displacement and velocity by HHT-alpha, from rest, at 0, step, ..., count * step [s].
+
+    The first acceleration is that of the load at the start. ValueError for an alpha outside -1/3 to
+    0.
+    """
+    if not -1.0 / 3.0 <= alpha <= 0.0:
+        raise ValueError(f"alpha of HHT is {alpha:g}; give -1/3 to 0")
+    gamma, beta = 0.5 - alpha, 0.25 * (1.0 - alpha) ** 2
+    solve = system.shifted((1.0 + alpha) * gamma * step, (1.0 + alpha) * beta * step**2)
+    u, v = np.zeros_like(system.load), np.zeros_like(system.load)
+    before = float(factor(np.zeros(1))[0])
+    a = before * factorised(system.mass)(system.load)
+    yield u, v
+    for n in range(count):
+        after = float(factor(np.array([step * (n + 1)]))[0])
+        u_hat = u + step * v + step**2 * (0.5 - beta) * a
+        v_hat = v + step * (1.0 - gamma) * a
+        load = ((1.0 + alpha) * after - alpha * before) * system.load
+        resisted = (1.0 + alpha) * system.force(u_hat, v_hat) - alpha * system.force(u, v)
+        a = solve(load - resisted)
+        u, v = u_hat + step**2 * beta * a, v_hat + step * gamma * a
+        before = after
         yield u, v

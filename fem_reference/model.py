@@ -4,102 +4,138 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Oscillator, march, solve_static
-from fem_reference.elasticity import Body, discretise, evaluation, largest_strain
+from fem_reference.dynamics import Damping, March, Oscillator, hht, march
+from fem_reference.elasticity import Body, discretise
+from fem_reference.grid import Projection
+from fem_reference.memory import refuse_too_large
+from fem_reference.observation import at_points, evaluation
+from fem_reference.recording import Recorder
+from fem_reference.solvers import solve_static
+from fem_reference.superposition import Superposed, superposed
 from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.scene import Tissue
-from study.trajectory import Observation, Trajectory, empty_trajectory
+from study.trajectory import Observation, Trajectory
 
 Floats = NDArray[np.float64]
+Factor = Callable[[Floats], Floats]
+Advance = Callable[[float], None]
 
-MAX_UNKNOWNS = 90_000
-"""Direct factors beyond this take minutes and gigabytes."""
+STEPPING: dict[str, March] = {"tr-bdf2": march, "hht-alpha": hht}
+METHODS = ("ritz-vectors", "modal", *STEPPING)
+
+
+@dataclass(frozen=True)
+class Method:
+    """How the motion is found: a name of `METHODS`, steps per sample, modes of `modal`."""
+
+    name: str = "ritz-vectors"
+    steps_per_sample: int = 1
+    modes: int = 100
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Trajectory with what it took; `wall` [s] has the factorisation in it, not the assembly.
+    """Trajectory with what it took; `wall` [s] has the solution in it, not the assembly.
 
-    `largest_strain`: largest absolute principal strain in the kept frames; linear elasticity is
-    good for a few per cent.
+    `time_step` [s] and `steps`: for a superposition those of the load. `superposed`: how a
+    superposition was made, and the motion of all nodes; none of steps in time. `largest_strain`:
+    largest absolute principal strain in the kept frames; linear elasticity is good for a few per
+    cent.
     """
 
     trajectory: Trajectory
     nodes: int
     elements: int
+    element: str
     time_step: float
     steps: int
     wall: float
     largest_strain: float
+    superposed: Superposed | None = None
 
 
-def build(mesh: TetrahedralMesh, tissue: Tissue, foundation: Foundation, tool: ToolPatch) -> Body:
-    """Discretised body. ValueError if it is too large for a direct solver."""
-    expected = 3 * (len(mesh.points) + int(1.25 * len(mesh.tetrahedra)))
-    if expected > MAX_UNKNOWNS:
-        raise ValueError(
-            f"the finite-element mesh has {len(mesh.tetrahedra)} tetrahedra, about {expected} "
-            f"unknowns; the direct solver takes {MAX_UNKNOWNS}: enlarge reference.element_size or "
-            "coarsen organ.mesh"
-        )
-    return discretise(mesh, tissue, foundation, tool)
+def build(
+    mesh: TetrahedralMesh,
+    tissue: Tissue,
+    foundation: Foundation,
+    tool: ToolPatch,
+    element: str = "auto",
+    project: Projection | None = None,
+    method: str = METHODS[0],
+) -> Body:
+    """Discretised body. ValueError, before anything is assembled, if memory does not hold it."""
+    refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
+    return discretise(mesh, tissue, foundation, tool, element, project)
 
 
 def run(
     body: Body,
-    damping_rate: float,
-    factor: Callable[[Floats], Floats],
+    damping: Damping,
+    factor: Factor,
     observation: Observation,
-    steps_per_sample: int = 1,
-    on_progress: Callable[[float], None] = lambda _: None,
+    method: Method = Method(),
+    on_progress: Advance = lambda _: None,
 ) -> Reference:
-    """Motion from rest; one step, or more, per sample."""
-    times = observation.times
-    step = float(times[1] - times[0]) / steps_per_sample
-    count = (len(times) - 1) * steps_per_sample
-    recorder = _Recorder(body, observation)
-    strain = 0.0
-    started = time.perf_counter()
-    system = Oscillator(body.mass, body.stiffness, body.load, damping_rate)
-    for n, (u, v) in enumerate(march(system, factor, step, count)):
-        if n % steps_per_sample == 0:
-            recorder.record(n // steps_per_sample, u, v)
-            if n // steps_per_sample in observation.frames:
-                strain = max(strain, largest_strain(body, u))
-            on_progress(n / count)
-    wall = time.perf_counter() - started
-    elements = len(body.mesh.tetrahedra)
-    return Reference(recorder.trajectory, body.node_count, elements, step, count, wall, strain)
+    """Motion from rest."""
+    if method.name not in METHODS:
+        raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
+    recorder = Recorder(body, observation)
+    if method.name in STEPPING:
+        return _stepped(body, damping, factor, recorder, method, on_progress)
+    return _superposed(body, damping, factor, recorder, method, on_progress)
 
 
 def static_field(body: Body, points: Floats) -> Floats:
     """Displacement [m] (q, 3) at points under the full load at rest."""
-    return np.asarray(
-        (evaluation(body, points) @ solve_static(body.stiffness, body.load)).reshape(-1, 3)
-    )
+    return at_points(evaluation(body, points), solve_static(body))
 
 
-class _Recorder:
-    """Writes what is observed into the arrays of a trajectory."""
+def _stepped(
+    body: Body,
+    damping: Damping,
+    factor: Factor,
+    recorder: Recorder,
+    method: Method,
+    advance: Advance,
+) -> Reference:
+    times, every = recorder.observation.times, method.steps_per_sample
+    step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
+    system = Oscillator(body.mass, body.stiffness, body.load, damping)
+    started, seen = time.perf_counter(), recorder.at_probes
+    for n, (u, v) in enumerate(STEPPING[method.name](system, factor, step, count)):
+        if n % every == 0:
+            recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
+            recorder.field(n // every, u)
+            advance(n / count)
+    return _reference(body, recorder, step, count, time.perf_counter() - started)
 
-    def __init__(self, body: Body, observation: Observation) -> None:
-        self.frames = observation.frames
-        self.trajectory = empty_trajectory(observation)
-        self.at_probes = evaluation(body, observation.probes)
-        self.in_volume = evaluation(body, observation.volume_points)
-        self.on_surface = evaluation(body, observation.surface_points)
 
-    def record(self, sample: int, u: Floats, v: Floats) -> None:
-        """Keep the motion at one sample."""
-        self.trajectory.displacement[sample] = (self.at_probes @ u).reshape(-1, 3)
-        self.trajectory.velocity[sample] = (self.at_probes @ v).reshape(-1, 3)
-        for i, frame in enumerate(self.frames):  # the peak may be the last sample too
-            if frame == sample:
-                self.trajectory.volume_field[i] = (self.in_volume @ u).reshape(-1, 3)
-                self.trajectory.surface_field[i] = (self.on_surface @ u).reshape(-1, 3)
+def _superposed(
+    body: Body,
+    damping: Damping,
+    factor: Factor,
+    recorder: Recorder,
+    method: Method,
+    advance: Advance,
+) -> Reference:
+    modes = method.modes if method.name == "modal" else None
+    started = time.perf_counter()
+    found = superposed(body, damping, factor, recorder, method.steps_per_sample, modes, advance)
+    wall = time.perf_counter() - started
+    for sample in range(len(recorder.observation.times)):
+        recorder.motion(sample, *(curve[sample] for curve in found.curves))
+    for frame in set(recorder.observation.frames):
+        recorder.field(frame, found.state(frame)[0])
+    seen = _reference(body, recorder, found.time_step, found.steps, wall)
+    return replace(seen, superposed=found)
+
+
+def _reference(body: Body, recorder: Recorder, step: float, steps: int, wall: float) -> Reference:
+    sizes = body.node_count, len(body.mesh.tetrahedra), body.element
+    return Reference(recorder.trajectory, *sizes, step, steps, wall, recorder.strain)

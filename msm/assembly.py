@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, diags_array
 from msm import lattice as cells
 from msm import volume as volumes
 from msm.damping import UNDAMPED, Damping
+from msm.lattice import Lattice
 from msm.laws import Law
 from msm.network import Network, network
 from msm.springs import Springs, connect
@@ -24,12 +25,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Assembly:
-    """A lattice over an organ with its springs, support and load, whatever the springs' law.
+    """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
     `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
     """
 
-    lattice: cells.CellLattice
+    lattice: Lattice
     springs: Springs
     mass: Floats
     foundation: csr_array
@@ -38,7 +39,7 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Material:
-    """What a lattice is made of: spring law, volume term if any, nodal damping."""
+    """What a lattice is made of: spring law, volume term if any, damping."""
 
     law: Law
     volume: VolumeTerm | None = None
@@ -55,11 +56,11 @@ def assemble(
     flexion: float = 0.0,
     body_diagonals: float = 0.0,
 ) -> Assembly:
-    """Lattice over the body. ValueError if it is empty, not held, or not touched by the tool."""
+    """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool."""
     margin = 1e-9 * np.ptp(surface.points, axis=0).max()
     lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
     lattice = cells.build(body, lower, upper, spacing)
-    weights, _ = cells.interpolation(lattice, surface.points)
+    weights, _ = lattice.interpolation(surface.points)
     return Assembly(
         lattice,
         connect(lattice, flexion, body_diagonals),

@@ -1,7 +1,7 @@
 """Damping: to ground, eq. (2) of the fuzzy-tuned model and eq. (9) of the benchmark, or Rayleigh's.
 
-Damping to ground resists rigid motion too. Rayleigh's, C = a M + b K, splits into a part of that
-kind, a M, and dashpots along the springs, b K (`msm.rayleigh`), which leave rigid motion alone.
+Damping to ground resists rigid motion too. Rayleigh's, C = alpha M + beta K, splits into a part of
+that kind, alpha M, and dashpots along the springs, beta K (`msm.rayleigh`), which do not.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import numpy as np
 class Damping:
     """Damping c = gamma_0 + gamma_1 |u| of a node, per mass: [1/s] and [1/(m s)].
 
-    Per mass it is the same material at every lattice spacing.
+    Per mass it is the same material at every lattice spacing. `beta` [s]: damping of springs, cells
+    and foundation, per stiffness.
     """
 
     gamma_0: float
     gamma_1: float = 0.0
+    beta: float = 0.0
 
 
 def eq_2(zeta: float, k: float, mass: float) -> Damping:
@@ -32,24 +34,24 @@ def eq_9(gamma_0: float, gamma_1: float, mass: float) -> Damping:
     return Damping(gamma_0 / mass, gamma_1 / mass)
 
 
-def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> tuple[Damping, float]:
-    """Mass part, as nodal damping, and stiffness part b [s] with the ratios at two frequencies.
+def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> Damping:
+    """Damping alpha M + beta K that has the ratios at two frequencies.
 
-    From zeta = (a / omega + b omega) / 2, omega [rad/s]. ValueError if that takes a negative part,
-    which would feed some mode.
+    From zeta = (alpha / omega + beta omega) / 2, omega [rad/s]. ValueError if that takes a negative
+    part, which would feed some mode.
     """
     (z1, z2), (w1, w2) = zetas, omegas
     if not (w1 > 0.0 and w2 > 0.0 and w1 != w2):
         raise ValueError(f"Rayleigh damping needs two different frequencies, not {w1:g} and {w2:g}")
     spread = w2**2 - w1**2
-    a, b = 2.0 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2.0 * (z2 * w2 - z1 * w1) / spread
-    if not (a >= 0.0 and b >= 0.0):
+    alpha, beta = 2.0 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2.0 * (z2 * w2 - z1 * w1) / spread
+    if not (alpha >= 0.0 and beta >= 0.0):
         raise ValueError(
             f"no Rayleigh damping has ratios {z1:g} at {w1:g} rad/s and {z2:g} at {w2:g} rad/s: "
-            f"it would need a = {a:.3g} 1/s and b = {b:.3g} s, both at least 0; bring the two "
-            "ratios, or the two frequencies, closer together"
+            f"it would need alpha = {alpha:.3g} 1/s and beta = {beta:.3g} s, both at least 0; "
+            "bring the two ratios, or the two frequencies, closer together"
         )
-    return Damping(a), b
+    return Damping(alpha, beta=beta)
 
 
 UNDAMPED = Damping(0.0)

@@ -3,7 +3,8 @@
 Each takes one step per row of `factors`, whose columns are the load factors at the fractions of
 the step that the integrator names. Nodal damping is diagonal and treated implicitly where that
 keeps the order: at the end of the step by symplectic Euler, half before and half after by velocity
-Verlet. Runge-Kutta takes it as it takes every force, and its step is bounded by it.
+Verlet. Runge-Kutta takes it as it takes every force, and its step is bounded by it. The stiffness
+part of Rayleigh damping is not diagonal: symplectic Euler takes it at the start of the step.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from msm.forces import damping, internal_forces
 from msm.network import Network
+from msm.rayleigh import add_stiffness_damping
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +30,8 @@ def symplectic_euler(
     force = np.empty_like(u)
     for n in range(factors.shape[0]):
         internal_forces(law, net, u, force)
+        if net.beta > 0.0:
+            add_stiffness_damping(law, net, u, net.beta * v, force)
         for i in range(u.shape[0]):
             inertia = net.mass[i] + dt * damping(net, u, i)
             kept, share = net.mass[i] / inertia, dt / inertia

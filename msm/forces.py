@@ -93,28 +93,38 @@ def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> N
     force[cell[7], d] -= c0
 
 
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
+    """J - 1 of a cell, and the rows of its cofactor matrix, J times the transposed inverse of F."""
+    a, b, e = gradient_of(cell, u, 0, to_gradient)
+    f, g, h = gradient_of(cell, u, 1, to_gradient)
+    i, j, k = gradient_of(cell, u, 2, to_gradient)
+    # J - 1 as a difference of numbers near 1 would round to more than a small load where kappa
+    # is large; hence the first cofactor without its 1.
+    around = g + k + g * k - h * j
+    swelling = a + (a + 1.0) * around
+    a, g, k = a + 1.0, g + 1.0, k + 1.0
+    x = 1.0 + around, h * i - f * k, f * j - g * i
+    y = e * j - b * k, a * k - e * i, b * i - a * j
+    z = b * h - e * g, e * f - a * h, a * g - b * f
+    return swelling + b * x[1] + e * x[2], x, y, z
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, z: Any) -> None:
+    """Subtract the nodal forces of a pressure on the cofactors of a cell, weights included."""
+    scatter(cell, force, 0, pressure * x[0], pressure * x[1], pressure * x[2])
+    scatter(cell, force, 1, pressure * y[0], pressure * y[1], pressure * y[2])
+    scatter(cell, force, 2, pressure * z[0], pressure * z[1], pressure * z[2])
+
+
 @numba.njit(cache=True, error_model="numpy")
 def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
     to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
-        cell = net.cells[c]
-        a, b, e = gradient_of(cell, u, 0, to_gradient)
-        f, g, h = gradient_of(cell, u, 1, to_gradient)
-        i, j, k = gradient_of(cell, u, 2, to_gradient)
-        # J - 1 as a difference of numbers near 1 would round to more than a small load where kappa
-        # is large; hence the first cofactor without its 1.
-        around = g + k + g * k - h * j
-        swelling = a + (a + 1.0) * around
-        a, g, k = a + 1.0, g + 1.0, k + 1.0
-        # Rows of the cofactor matrix, which is J times the transposed inverse of F.
-        xx, xy, xz = 1.0 + around, h * i - f * k, f * j - g * i
-        yx, yy, yz = e * j - b * k, a * k - e * i, b * i - a * j
-        zx, zy, zz = b * h - e * g, e * f - a * h, a * g - b * f
-        pressure = net.bulk[c] * (swelling + b * xy + e * xz) * to_gradient
-        scatter(cell, force, 0, pressure * xx, pressure * xy, pressure * xz)
-        scatter(cell, force, 1, pressure * yx, pressure * yy, pressure * yz)
-        scatter(cell, force, 2, pressure * zx, pressure * zy, pressure * zz)
+        swelling, x, y, z = volume_change(net.cells[c], u, to_gradient)
+        scatter_pressure(net.cells[c], force, net.bulk[c] * swelling * to_gradient, x, y, z)
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -19,7 +19,8 @@ class Integrator(NamedTuple):
     one column each; `advance(law, network, factors, dt, u, v)` takes a step per row of factors, in
     place. It is stable up to omega dt = `oscillation` without damping, and up to
     c dt / m = `damping` for damping alone. With `implicit_volume`, omega is that of the network
-    without its volume term. With `hooke_only` it takes no law but Hooke's.
+    without its volume term. With `hooke_only` it takes no law but Hooke's; only with
+    `stiffness_damping` it takes the stiffness part of Rayleigh damping.
     """
 
     order: int
@@ -29,10 +30,13 @@ class Integrator(NamedTuple):
     damping: float
     implicit_volume: bool = False
     hooke_only: bool = False
+    stiffness_damping: bool = False
 
 
 INTEGRATORS = {
-    "symplectic-euler": Integrator(1, (1.0,), explicit.symplectic_euler, 2.0, UNBOUNDED),
+    "symplectic-euler": Integrator(
+        1, (1.0,), explicit.symplectic_euler, 2.0, UNBOUNDED, stiffness_damping=True
+    ),
     "velocity-verlet": Integrator(2, (0.0, 1.0), explicit.velocity_verlet, 2.0, UNBOUNDED),
     # On the imaginary axis 2 sqrt(2); on the real one where |1 + z + z^2/2 + z^3/6 + z^4/24| = 1.
     "runge-kutta-4": Integrator(4, (0.0, 0.5, 1.0), explicit.runge_kutta_4, np.sqrt(8.0), 2.785293),

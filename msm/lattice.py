@@ -1,8 +1,9 @@
-"""Cubic lattice over a body: cells with fill fractions, nodes, trilinear weights."""
+"""Lattices, and the cubic one over a body: cells with fill fractions, nodes, trilinear weights."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
+from msm.linearised import inverted_cells
 from study.organ.occupancy import Body
 
 Floats = NDArray[np.float64]
@@ -24,6 +26,28 @@ SMALLEST_FILL = 0.05
 CORNERS = np.array([[(c >> 2) & 1, (c >> 1) & 1, c & 1] for c in range(8)])
 EXTRAPOLATION = 0.75
 """How far outside its cell, in spacings, a point may lie before its weights are clamped."""
+
+
+class Lattice(Protocol):
+    """What a model needs to know of its lattice, whatever the cells."""
+
+    @property
+    def nodes(self) -> Floats:
+        """Nodes [m] (n, 3)."""
+
+    @property
+    def cells(self) -> Ints:
+        """Node numbers of cubes (c, 8), corners in the order of CORNERS, or tetrahedra (c, 4)."""
+
+    @property
+    def spacing(self) -> float:
+        """Length [m] at which springs of relative stiffness 1 have k_ref."""
+
+    def interpolation(self, points: Floats) -> tuple[csr_array, int]:
+        """Weights (q, n) of the nodes at points [m] (q, 3), and how many lie outside all cells."""
+
+    def inverted_cells(self, displacement: Floats) -> int:
+        """How many cells are turned inside out by a displacement [m] (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +65,14 @@ class CellLattice:
     index: Ints
     fill: Floats
     dropped: float
+
+    def interpolation(self, points: Floats) -> tuple[csr_array, int]:
+        """Trilinear weights (q, n), see `interpolation`."""
+        return interpolation(self, points)
+
+    def inverted_cells(self, displacement: Floats) -> int:
+        """How many cells a displacement [m] (n, 3) turns inside out: J <= 0 of the mean F."""
+        return int(inverted_cells(self.cells, self.spacing, displacement))
 
 
 def build(body: Body, lower: Floats, upper: Floats, spacing: float) -> CellLattice:
@@ -89,14 +121,6 @@ def node_volumes(lattice: CellLattice) -> Floats:
     share = np.repeat(lattice.fill * lattice.spacing**3 / 8.0, 8)
     volumes = np.bincount(lattice.cells.ravel(), weights=share, minlength=len(lattice.nodes))
     return volumes.astype(np.float64)
-
-
-def inverted_cells(lattice: CellLattice, displacement: Floats) -> int:
-    """How many cells are turned inside out by a displacement [m] (n, 3): J <= 0 at the centre."""
-    corner = displacement[lattice.cells]
-    toward = (2.0 * CORNERS - 1.0) / (4.0 * lattice.spacing)
-    gradient = np.einsum("cad,ae->cde", corner, toward)
-    return int((np.linalg.det(np.eye(3) + gradient) <= 0.0).sum())
 
 
 def interpolation(lattice: CellLattice, points: Floats) -> tuple[csr_array, int]:

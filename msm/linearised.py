@@ -99,7 +99,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def inverted_cells(cells: NDArray[np.int32], spacing: float, u: Floats) -> int:
+def inverted_cells(cells: NDArray[np.int64], spacing: float, u: Floats) -> int:
     """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F."""
     count = 0
     for c in range(cells.shape[0]):

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm import lattice as cells
 from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
 from msm.integrators import INTEGRATORS
+from msm.lattice import Lattice
 from msm.laws import Hooke, Law
-from msm.linearised import farthest, inverted_cells, largest_strain
+from msm.linearised import farthest, largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, Follower, critical_time_step
 from msm.statics import static_displacement
@@ -106,6 +106,11 @@ def run(
     method = INTEGRATORS[integrator]
     if method.hooke_only and not isinstance(material.law, Hooke):
         raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")
+    if material.damping.beta > 0.0 and not method.stiffness_damping:
+        raise ValueError(
+            f"the integrator {integrator} has no stiffness part of Rayleigh damping; set "
+            "damping.stiffness to 0 or choose another"
+        )
     net = arrays(assembly, material, linear=linear)
     follower = Follower(material.law, net, method)
     interval = float(observation.times[1] - observation.times[0])
@@ -284,21 +289,21 @@ def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder
 class _Recorder:
     """Writes what is observed into arrays, over what was written there before."""
 
-    def __init__(self, lattice: cells.CellLattice, net: Network, observation: Observation) -> None:
-        self.net, self.lattice, self.cells = net, lattice, lattice.cells.astype(np.int32)
+    def __init__(self, lattice: Lattice, net: Network, observation: Observation) -> None:
+        self.net, self.lattice = net, lattice
         self.far = FAR * float(np.ptp(lattice.nodes, axis=0).max())
         self.times, self.frames = observation.times, observation.frames
         self.trajectory = empty_trajectory(observation)
         self.strain = np.zeros(len(observation.times))
         self.inverted = np.zeros(len(observation.times), dtype=np.int64)
-        self.at_probes, _ = cells.interpolation(lattice, observation.probes)
-        self.in_volume, _ = cells.interpolation(lattice, observation.volume_points)
-        self.on_surface, _ = cells.interpolation(lattice, observation.surface_points)
+        self.at_probes, _ = lattice.interpolation(observation.probes)
+        self.in_volume, _ = lattice.interpolation(observation.volume_points)
+        self.on_surface, _ = lattice.interpolation(observation.surface_points)
 
     def record(self, sample: int, u: Floats, v: Floats) -> None:
         """Keep the motion at one sample."""
         self.strain[sample] = largest_strain(self.net, u)
-        self.inverted[sample] = inverted_cells(self.cells, self.lattice.spacing, u)
+        self.inverted[sample] = self.lattice.inverted_cells(u)
         self.trajectory.displacement[sample] = self.at_probes @ u
         self.trajectory.velocity[sample] = self.at_probes @ v
         for i, frame in enumerate(self.frames):  # the peak may be the last sample too

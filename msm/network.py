@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.damping import Damping
-from msm.springs import Springs
-from msm.volume import VolumeTerm
+if TYPE_CHECKING:
+    from msm.damping import Damping
+    from msm.springs import Springs
+    from msm.volume import VolumeTerm
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +21,9 @@ class Network(NamedTuple):
 
     Springs: `ends` (s, 2) uint32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight
     times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
-    [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `row`, `column`, `value` [N/m]:
-    compressed rows of the foundation; `load` [N] (n, 3). `linear`: forces of small displacements.
+    [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
+    springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
+    `load` [N] (n, 3). `linear`: forces of small displacements.
     """
 
     ends: NDArray[np.uint32]
@@ -34,6 +36,7 @@ class Network(NamedTuple):
     mass: Floats
     gamma_0: Floats
     gamma_1: Floats
+    beta: float
     row: NDArray[np.uint32]
     column: NDArray[np.uint32]
     value: Floats
@@ -64,6 +67,7 @@ def network(
         mass=np.ascontiguousarray(mass),
         gamma_0=damping.gamma_0 * mass,
         gamma_1=damping.gamma_1 * mass,
+        beta=float(damping.beta),
         row=foundation.indptr.astype(np.uint32),
         column=foundation.indices.astype(np.uint32),
         value=foundation.data.astype(np.float64),

@@ -3,7 +3,9 @@
 An explicit integrator is stable up to omega_max dt = `oscillation`, omega_max^2 the largest
 eigenvalue of M^-1 K(u), K the tangent stiffness at the state u. Nodal damping that is treated
 implicitly only lengthens the step, for symplectic Euler by sqrt(1 + zeta^2) + zeta; no use is made
-of that here. Explicit damping shortens it.
+of that here. Explicit damping shortens it, as does the stiffness part beta K of Rayleigh's, whose
+dashpots never exceed beta times the stiffness along springs: by sqrt(1 + zeta^2) - zeta with
+zeta = beta omega_max / 2 the damping ratio that it gives the fastest mode.
 
 As the body deforms the limit moves. No Hookean spring becomes stiffer than at rest: along itself it
 keeps its stiffness; across, it resists less than that under tension, and pushes aside under
@@ -64,14 +66,18 @@ def critical_time_step(assembly: Assembly, material: Material, integrator: str =
     method = INTEGRATORS[integrator]
     still = np.zeros_like(net.load)
     omega, _ = largest_frequency(material.law, bounding(net, method), still)
-    return longest_step(method, omega, damping_rate(net, still))
+    return longest_step(method, omega, damping_rate(net, still), net.beta)
 
 
-def longest_step(method: Integrator, omega: float, rate: float) -> float:
-    """Largest stable step [s] at frequencies up to omega [rad/s] and damping c / m = rate [1/s]."""
+def longest_step(method: Integrator, omega: float, rate: float, beta: float = 0.0) -> float:
+    """Largest stable step [s] at frequencies up to omega [rad/s] and damping c / m = rate [1/s].
+
+    `beta` [s]: explicit damping over stiffness, of methods with an oscillation limit of 2.
+    """
     pace, damped = omega / method.oscillation, rate / method.damping
     slowest = max(float(np.hypot(pace, np.sqrt(SHARED) * damped)), damped)
-    return 1.0 / slowest if slowest > 0.0 else float("inf")
+    zeta = 0.5 * beta * omega
+    return (float(np.hypot(1.0, zeta)) - zeta) / slowest if slowest > 0.0 else float("inf")
 
 
 def cell_bound(youngs_modulus: float, poisson_ratio: float, density: float, h: float) -> float:
@@ -162,7 +168,7 @@ class Follower:
         if not self.bounded:
             return longest_step(self.method, 0.0, rate)
         nodal_bounds(self.law, self.net, u, self.bound)
-        return longest_step(self.method, self._frequency(u), rate)
+        return longest_step(self.method, self._frequency(u), rate, self.net.beta)
 
     def stiffest(self) -> int:
         """The node about which the network was stiffest when last looked at."""

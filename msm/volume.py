@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from msm.calibration import POISSON_RATIO, lame
-from msm.lattice import CORNERS, CellLattice
+from msm.lattice import CORNERS, CellLattice, Lattice
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -39,12 +39,17 @@ def none(spacing: float) -> VolumeTerm:
     return VolumeTerm(np.zeros((0, 8), dtype=np.int64), np.zeros(0), spacing)
 
 
-def volume_term(lattice: CellLattice, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
+def volume_term(lattice: Lattice, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
     """The term that makes the lattice's springs of modulus mu a material of E [Pa] and nu.
 
-    ValueError for a Poisson ratio below 1/4, where kappa is negative and swelling gains energy, or
-    above LARGEST_POISSON_RATIO.
+    ValueError for a lattice that is not cubic, for a Poisson ratio below 1/4, where kappa is
+    negative and swelling gains energy, or above LARGEST_POISSON_RATIO.
     """
+    if not isinstance(lattice, CellLattice):
+        raise ValueError(  # noqa: TRY004 - a scene's choice, reported as such
+            "springs on tetrahedra have no volume term; leave out lattice.volume_term, or set "
+            "lattice.springs to lattice"
+        )
     if not POISSON_RATIO <= poisson_ratio <= LARGEST_POISSON_RATIO:
         raise ValueError(
             f"a lattice with a volume term has Poisson ratios from {POISSON_RATIO} to "

@@ -182,6 +182,68 @@ def report(folder: Path) -> None:
     print(folder / "report.pdf")
 
 
+@app.command
+def export(
+    target: str,
+    *,
+    to: str,
+    out: Path | None = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
+) -> None:
+    """Write the finite-element problem of a scene or of results for another code.
+
+    Parameters
+    ----------
+    target
+        A built-in scene, a TOML file, or a results folder.
+    to
+        calculix (input decks, and our displacement to compare with) or vtu (for ParaView).
+    out
+        Folder to write; export in the results folder, or NAME-export here, by default.
+    set_
+        Override of a scene, table.key=value. May be repeated.
+    """
+    from study.exporting import Request
+    from study.exporting import export as write
+    from study.progress import on_stderr
+
+    with on_stderr() as progress:
+        folder = write(Request(target=target, to=to, out=out, overrides=set_ or ()), progress)
+    print(folder)
+
+
+@app.command
+def verify(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Solve problems with known answers by the finite-element reference and judge its errors.
+
+    Parameters
+    ----------
+    quick
+        Only the problems that take about a second each.
+    out
+        Table to write too (CSV).
+    as_json
+        Print JSON instead of a table.
+    """
+    from study import verifying
+    from study.progress import on_stderr
+
+    if out is not None and not out.parent.is_dir():
+        raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")
+    with on_stderr() as progress:
+        verdicts = verifying.verify(progress, quick=quick)
+    if out is not None:
+        verifying.write_csv(verdicts, out)
+    print(verifying.as_json(verdicts) if as_json else "\n".join(verifying.table(verdicts)))
+    if not all(verdict.passed for verdict in verdicts):
+        sys.exit(EXIT_FAILED_CHECK)
+
+
 @dataclass(frozen=True, kw_only=True)
 class LiverFlags:
     """How the liver's rule base is read.

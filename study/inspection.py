@@ -41,12 +41,15 @@ def _lattice_lines(scene: Scene, posed: Posed) -> list[str]:
     from study.run.lattices import assemble, contenders
 
     assembly = assemble(scene, posed)
-    lines = [f"lattice: {len(assembly.mass)} nodes, {len(assembly.springs.weight)} springs"]
+    where = "lattice" if scene.lattice.springs == "lattice" else "springs on the mesh"
+    lines = [f"{where}: {len(assembly.mass)} nodes, {len(assembly.springs.weight)} springs"]
     for contender in contenders(scene, assembly.lattice, estimates(scene)):
         step = critical_time_step(assembly, contender.material, scene.lattice.integrator)
+        damping = contender.material.damping
+        dashpots = f" and {1e3 * damping.beta:.4g} ms" if damping.beta > 0.0 else ""
         lines.append(
             f"{contender.name}: modulus {contender.modulus / 1e3:.2f} kPa, critical step "
-            f"{1e3 * step:.3g} ms, damping {contender.material.damping.gamma_0:.4g} 1/s"
+            f"{1e3 * step:.3g} ms, damping {damping.gamma_0:.4g} 1/s{dashpots}"
         )
     return lines
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # pint evaluates arithmetic and guesses at commas, so it never sees raw text: one plain number and
 # at most four unit names joined by * or /.
 _NUMBER = r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)"
-_UNIT = r"[A-Za-z]{1,12}(\^[1-4])?"
+_UNIT = r"[A-Za-z]{1,12}(\^-?[1-4])?"
 _TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
 _LONGEST_TEXT = 80
 

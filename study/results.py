@@ -13,15 +13,16 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study import folders
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +56,10 @@ TEXT_COLUMNS = {
     *("model", "probe", "reference", "curve", "measure", "quantity"),
     *("choice", "base", "alternative", "system"),
 }
-FILES = {MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", *(f"{t}.csv" for t in TABLES)}
+FILES = {
+    *(MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", "export"),
+    *(f"{name}.csv" for name in TABLES),
+}
 OURS, FIELDS = ".report.pdf", ".vtkhdf"
 Row = tuple[str | float, ...]
 
@@ -112,45 +116,19 @@ def read(folder: Path) -> Results:
     return Results(scene, numbers, tables, arrays)
 
 
-def _check_target(folder: Path) -> None:
-    """ResultsError unless the folder is absent, empty, or holds earlier results alone."""
-    if folder == Path.cwd():
-        raise ResultsError(f"{folder}: is the current folder; give --out another")
-    if folder.exists() and not folder.is_dir():
-        raise ResultsError(f"{folder}: is a file; give --out a folder")
-    if not folder.is_dir():
-        return
-    present = {path.name for path in folder.iterdir()}
-    foreign = sorted(
-        n for n in present - FILES if not n.startswith(OURS) and not n.endswith(FIELDS)
-    )
-    if foreign or (present and MARK not in present):
-        name = foreign[0] if foreign else sorted(present)[0]
-        raise ResultsError(f"{folder}: holds {name}, which no run wrote; give --out another folder")
-
-
-@contextmanager
-def replacing(folder: Path) -> Iterator[Path]:
+def replacing(folder: Path) -> AbstractContextManager[Path]:
     """A folder beside `folder` that takes its place when the block ends without an exception.
 
-    ResultsError before the block if `folder` holds anything else or cannot be written.
+    FolderError before the block if `folder` holds anything but results, or cannot be written.
     """
-    folder = folder.resolve()
-    _check_target(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    except OSError as error:
-        raise ResultsError(f"{folder}: cannot be written ({error.strerror})") from None
-    try:
-        partial = aside / "new"
-        partial.mkdir()
-        yield partial
-        if folder.exists():
-            folder.replace(aside / "old")
-        partial.replace(folder)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+    return folders.replacing(folder, _foreign, "run")
+
+
+def _foreign(present: set[str]) -> str | None:
+    found = sorted(n for n in present - FILES if not n.startswith(OURS) and not n.endswith(FIELDS))
+    if not found and MARK not in present:
+        found = sorted(present)
+    return found[0] if found else None
 
 
 @contextmanager

@@ -32,6 +32,8 @@ IntegratorName = Literal[
     "split-volume",
     "xpbd",
 ]
+ElementName = Literal["auto", "p1", "p2", "taylor-hood"]
+MethodName = Literal["ritz-vectors", "modal", "tr-bdf2", "hht-alpha"]
 Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
 
 
@@ -107,7 +109,7 @@ class Tissue:
     """The liver as the reference sees it; the fuzzy estimates are judged against its modulus."""
 
     youngs_modulus: Modulus = 9.5e3
-    poisson_ratio: Annotated[float, Quantity("", 0.0, 0.499)] = 0.45
+    poisson_ratio: Annotated[float, Quantity("", 0.0, 0.49999)] = 0.45
     density: Annotated[float, Quantity("kg/m^3", 500.0, 2000.0)] = 1054.0
 
 
@@ -149,18 +151,34 @@ class Fuzzy:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SpringLaw:
+    """Points of a spring's tension over its strain, joined by straight lines that go on beyond.
+
+    `relative_tension` is that of a linear spring at this strain: where it equals `strain`, the
+    spring has the stiffness of the estimated modulus.
+    """
+
+    strain: tuple[Annotated[float, Quantity("", -1.0, 10.0)], ...]
+    relative_tension: tuple[Annotated[float, Quantity("", -1e3, 1e3)], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Lattice:
     """Mass-spring lattice: spacing, share of axial stiffness in flexion and in body diagonals.
 
-    `volume_term` gives its fuzzy-tuned models the tissue's Poisson ratio; without it every lattice
-    of springs has 1/4. `geometry`: whether forces follow the deformed lattice. The step is at most
+    `springs`: those of a cubic lattice of this spacing, or one along each edge of the organ's
+    finite-element mesh. `law` of the fuzzy-tuned springs, linear if none is given. `volume_term`
+    gives these models the tissue's Poisson ratio; without it every cubic lattice of springs has
+    1/4. `geometry`: whether forces follow the deformed lattice. The step is at most
     `step_fraction` of the critical one, which is followed as the body deforms, unless `time_step`
     or `step_rate` fixes it.
     """
 
+    springs: Literal["lattice", "tetrahedra"] = "lattice"
     spacing: Length = 0.01
     flexion: Annotated[float, Quantity("", 0.0, 0.9)] = 0.2
     body_diagonals: Annotated[float, Quantity("", 0.0, 0.9)] = 0.0
+    law: SpringLaw | None = None
     volume_term: bool = False
     geometry: Literal["nonlinear", "linear"] = "nonlinear"
     integrator: IntegratorName = "symplectic-euler"
@@ -171,9 +189,16 @@ class Lattice:
 
 @dataclass(frozen=True, kw_only=True)
 class Damping:
-    """Damping ratio zeta of eq. (2), and the spacing at which k, m and Table II are taken."""
+    """Damping of the fuzzy-tuned models and of the reference; the benchmark has that of eq. (9).
 
+    `ratio`: zeta of eq. (2); `mass` and `stiffness`: Rayleigh's alpha and beta, C = alpha M +
+    beta K. `reference_spacing`: where k and m of eq. (2) and Table II are taken.
+    """
+
+    kind: Literal["eq-2", "rayleigh"] = "eq-2"
     ratio: Annotated[float, Quantity("", 0.0, 100.0)] = 0.9
+    mass: Annotated[float, Quantity("s^-1", 0.0, 1e6)] = 0.0
+    stiffness: Annotated[float, Quantity("s", 0.0, 100.0)] = 0.0
     reference_spacing: Length = 5.5e-3
 
 
@@ -190,10 +215,22 @@ class Basafa:
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Finite-element reference: size of its elements (edge of the mesh lattice), time steps."""
+    """Finite-element reference: elements, their size (edge of the mesh lattice), motion in time.
 
+    With `accuracy`, a relative error, a finer mesh is taken until the displacement of each control
+    point is estimated to be as accurate. `element`: auto is quadratic, with a pressure of its own
+    above a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of
+    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `large_strain`: law of a static
+    solution beside it where strains exceed what linear elasticity is good for.
+    """
+
+    element: ElementName = "auto"
     element_size: Length = 0.017
+    accuracy: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
+    method: MethodName = "ritz-vectors"
+    modes: Annotated[int, Quantity("", 1, 1000)] = 100
     steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
+    large_strain: Literal["neo-hookean", "st-venant-kirchhoff", "none"] = "neo-hookean"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,11 +8,12 @@ import math
 import tomllib
 from collections.abc import Iterator, Sequence
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from study.quantity import Quantity
-from study.scene import Scene
+from study.scene import Lattice, Scene, SpringLaw
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -94,7 +95,7 @@ def resolved(scene: Scene) -> dict[str, Any]:
 
 
 def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
-    """Keys that mean nothing for the shape and the history in use."""
+    """Keys that mean nothing for the shape, history, springs and damping in use."""
     if scene.organ.mesh is not None:
         yield "organ", "shape"
     if scene.organ.mesh is not None or scene.organ.shape != "block":
@@ -109,6 +110,13 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     ):
         if scene.tool.history.kind != kind:
             yield "tool", "history", key
+    if scene.lattice.springs == "tetrahedra":
+        for key in ("spacing", "flexion", "body_diagonals"):
+            yield "lattice", key
+    for key in ("mass", "stiffness") if scene.damping.kind == "eq-2" else ("ratio",):
+        yield "damping", key
+    if scene.reference.method != "modal":
+        yield "reference", "modes"
 
 
 def _load(name: str) -> tuple[dict[str, Any], Path]:
@@ -222,7 +230,10 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield "fuzzy.surface: names one reading twice; name two different ones"
     if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
         yield "fuzzy.samples: has no effect with exact sampling; remove it"
-    yield from _lattice_contradictions(scene)
+    if scene.reference.method != "modal" and "modes" in table.get("reference", {}):
+        yield "reference.modes: only the method modal takes it; remove it"
+    yield from _lattice_contradictions(scene, table)
+    yield from _damping_contradictions(scene, table)
     if scene.organ.mesh is None and scene.organ.unit is not None:
         yield "organ.unit: has no effect without organ.mesh; remove it"
     for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
@@ -235,8 +246,12 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         yield "organ.mass: only a point has a mass of its own; use tissue.density"
 
 
-def _lattice_contradictions(scene: Scene) -> Iterator[str]:
+def _lattice_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
     lattice, nu = scene.lattice, scene.tissue.poisson_ratio
+    if lattice.springs == "tetrahedra":
+        yield from _mesh_springs_contradictions(lattice, table)
+    if lattice.law is not None:
+        yield from _law_contradictions(scene, lattice.law)
     if lattice.volume_term and nu < SPRINGS_POISSON_RATIO:
         yield (
             f"lattice.volume_term: needs tissue.poisson_ratio of {SPRINGS_POISSON_RATIO} or more, "
@@ -249,8 +264,78 @@ def _lattice_contradictions(scene: Scene) -> Iterator[str]:
             "lattice.integrator: xpbd takes linear springs only; leave basafa out of models or "
             "choose another integrator"
         )
+    if lattice.integrator == "xpbd" and lattice.law is not None:
+        yield "lattice.law: xpbd takes linear springs only; remove it or change lattice.integrator"
     if lattice.time_step is not None and lattice.step_rate is not None:
         yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
+
+
+def _mesh_springs_contradictions(lattice: Lattice, table: dict[str, Any]) -> Iterator[str]:
+    if lattice.volume_term:
+        yield (
+            "lattice.volume_term: springs on tetrahedra have none; leave it out or set "
+            "lattice.springs to lattice"
+        )
+    for key in ("flexion", "body_diagonals"):
+        if _has(table, ("lattice", key)):
+            yield f"lattice.{key}: has no effect on springs along a mesh; remove it"
+
+
+def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
+    if "msm" not in scene.models:
+        yield "lattice.law: only fuzzy-tuned springs follow it; add msm to models or remove it"
+    if not len(law.strain) == len(law.relative_tension) >= 2:
+        yield (
+            f"lattice.law: has {len(law.strain)} of strain and {len(law.relative_tension)} of "
+            "relative_tension; give as many of each, two or more"
+        )
+        return
+    if not _rises(law.strain):
+        yield "lattice.law.strain: must rise from point to point; sort the points, each strain once"
+    elif not _rises(law.relative_tension):
+        yield (
+            "lattice.law.relative_tension: must rise with the strain; a spring that weakens as it "
+            "is stretched makes the lattice unstable"
+        )
+    points = list(zip(law.strain, law.relative_tension, strict=True))
+    if (0.0, 0.0) not in points:
+        yield "lattice.law: must be free of tension at rest; give a point of strain 0 and tension 0"
+    elif scene.lattice.volume_term and not _is_linear_at_rest(points):
+        yield (
+            "lattice.law: with lattice.volume_term the points beside 0 must have a relative "
+            "tension equal to their strain, or the springs lack the shear modulus that the term "
+            "completes; change them or leave the term out"
+        )
+
+
+def _rises(values: Sequence[float]) -> bool:
+    return all(before < after for before, after in pairwise(values))
+
+
+def _is_linear_at_rest(points: Sequence[tuple[float, float]]) -> bool:
+    """Whether the points next to (0, 0) lie where a linear spring has them."""
+    rest = points.index((0.0, 0.0))
+    return all(math.isclose(x, t) for x, t in points[max(rest - 1, 0) : rest + 2])
+
+
+def _damping_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
+    damping = scene.damping
+    given = [key for key in ("mass", "stiffness") if _has(table, ("damping", key))]
+    if damping.kind == "eq-2":
+        for key in given:
+            yield (
+                f"damping.{key}: has no effect on the damping of eq. (2); set damping.kind to "
+                "rayleigh or remove it"
+            )
+        return
+    if not given:
+        yield "damping.kind: rayleigh needs damping.mass, damping.stiffness or both; give them"
+    implicit = scene.lattice.integrator != "symplectic-euler"
+    if damping.stiffness > 0.0 and implicit and "msm" in scene.models:
+        yield (
+            f"damping.stiffness: {scene.lattice.integrator} has only the mass part of Rayleigh "
+            "damping; set it to 0, or lattice.integrator to symplectic-euler"
+        )
 
 
 def _tool_contradictions(scene: Scene) -> Iterator[str]:
@@ -276,6 +361,8 @@ def _point_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
             "organ.mass: cannot follow from eq. (2) without damping; give it, or set "
             "damping.ratio and basafa.gamma_0 above zero"
         )
+    if scene.damping.kind == "rayleigh":
+        yield "damping.kind: a single point has the damping of eqs. (2) and (9) only; remove it"
     for key in _MESH_ONLY:
         if _has(table, key):
             yield f"{'.'.join(key)}: has no effect on a single point; remove it"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from msm.integrators import INTEGRATORS
+from study.folders import FolderError
 from study.progress import Silent
 from study.results import TABLES, Results, ResultsError, read, replacing
 from study.results import write as write_files
@@ -208,7 +209,7 @@ def test_a_failure_while_writing_leaves_nothing_and_keeps_the_old(paper_results,
 
 def test_a_folder_with_other_files_is_not_touched(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(ResultsError, match="another folder"), replacing(tmp_path):
+    with pytest.raises(FolderError, match="another folder"), replacing(tmp_path):
         pass
     assert (tmp_path / "thesis.tex").exists()
 
@@ -234,7 +235,7 @@ def test_a_folder_of_results_with_a_foreign_file_is_not_replaced(paper_results, 
     target = tmp_path / "out"
     write(paper_results, target)
     (target / "thesis.tex").write_text("years of work")
-    with pytest.raises(ResultsError, match=r"thesis\.tex"):
+    with pytest.raises(FolderError, match=r"thesis\.tex"):
         write(paper_results, target)
     assert (target / "thesis.tex").exists()
 

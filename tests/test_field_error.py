@@ -2,11 +2,10 @@
 
 from itertools import pairwise
 
-import numpy as np
 import pytest
 
-from fem_reference.dynamics import solve_static
 from fem_reference.elasticity import discretise
+from fem_reference.model import static_field
 from msm.assembly import Material
 from msm.lattice import interpolation
 from msm.statics import static_displacement
@@ -14,7 +13,7 @@ from study.mesh.quadrature import over_volume
 from study.organ.block import block_mesh
 from study.run.comparison import relative_l2
 from tests.benchmarks import field_error, large_strain
-from tests.benchmarks.converged import converged, field, solve
+from tests.benchmarks.converged import converged
 
 TABLE = field_error.read()
 CASES = {"block": field_error.block, "liver": field_error.liver}
@@ -95,8 +94,8 @@ def coarse(cases):
 
 
 def solved(case, mesh, rule):
-    body = discretise(mesh, case.tissue(0.45), case.foundation, case.tool)
-    return rule, field(body, rule.points)
+    body = discretise(mesh, case.tissue(0.45), case.foundation, case.tool, project=case.project)
+    return rule, static_field(body, rule.points)
 
 
 def difference(assembly, matter, rule, truth):
@@ -133,23 +132,13 @@ def test_a_wrong_kappa_is_seen_in_the_field(cases, assemblies, coarse):
 
 @pytest.mark.slow
 def test_the_error_that_the_reference_states_is_the_one_it_has(coarse):
-    """Of 20 mm elements: what is left from there to 13.4 mm is 1 - (13.4 / 20)^2 of it."""
+    """Of 20 mm elements, against 13.4 mm: an estimate with a safety factor, so mostly above."""
     rule, truth = coarse["block"]
-    case = field_error.block(0.04, 0.02)
+    case = field_error.block((0.04, 0.08 / 3, 0.02))
     given = (case.tissue(0.45), case.foundation, case.tool, rule.points, rule.weights)
-    found = converged(case.meshes, case.ratio, *given)
+    found = converged(case.meshes, case.sizes, *given)
     distance = relative_l2(found.field, truth, rule.weights)
-    # An estimate, not a bound: good to a factor of two.
-    assert 0.5 < found.error * (1 - (13.4 / 20) ** 2) / distance < 2.0
-
-
-def test_the_iterative_reference_is_the_direct_one():
-    case = field_error.block(0.04, 0.02)
-    for nu in (0.25, 0.49):
-        body = discretise(case.meshes[0], case.tissue(nu), case.foundation, case.tool)
-        direct = solve_static(body.stiffness, body.load)
-        difference = np.linalg.norm(solve(body) - direct)
-        assert difference < 1e-6 * np.linalg.norm(direct)  # residual 1e-8, condition below
+    assert 0.7 < found.error / distance < 3.0
 
 
 def test_the_nonlinear_lattice_departs_from_the_linear_one_in_proportion_to_the_strain():

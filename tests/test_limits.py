@@ -122,12 +122,6 @@ def test_a_peak_at_the_last_sample_keeps_its_field(small_scene):
     assert errors["field-relative-l2-peak"] == errors["field-relative-l2-final"] > 0
 
 
-def test_a_block_too_small_for_a_coarser_mesh_says_so(small_scene):
-    scene = changed(small_scene, reference={"element_size": 0.06})
-    results = run_study(dataclasses.replace(scene, models=("fem",)), Silent())
-    assert "mesh_error" not in results.numbers["models"][0]
-    assert any("not estimated" in note for note in results.numbers["notes"])
-
 
 def test_halved_steps_are_halved_even_where_the_samples_set_the_step(small_scene):
     """Negative control: an error estimate from two equal runs would be zero."""

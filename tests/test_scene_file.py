@@ -6,7 +6,11 @@ from dataclasses import replace
 import pytest
 
 from study.quantity import Quantity
-from study.scene_file import BUILT_IN, SceneError, read_scene, write_scene
+from study.scene_file import BUILT_IN, SceneError, read_scene, resolved, write_scene
+
+MESH = "lattice.springs=tetrahedra"
+RAYLEIGH = "damping.kind=rayleigh"
+NO_BENCHMARK = 'models=["msm"]'
 
 
 def written(tmp_path, text):
@@ -142,11 +146,95 @@ def test_a_mesh_path_is_relative_to_the_scene_that_names_it(tmp_path):
         (["lattice.time_step=1 ms", "lattice.step_rate=1 kHz"], "contradicts lattice.step_rate"),
         (["lattice.integrator=leapfrog"], "lattice.integrator"),
         (["lattice.body_diagonals=1.0"], "lattice.body_diagonals"),
+        (["lattice.springs=edges"], r"lattice\.springs: should be 'lattice' or 'tetrahedra'"),
+        ([MESH, "lattice.volume_term=true"], r"lattice\.volume_term: springs on tetrahedra"),
+        ([MESH, "lattice.flexion=0.1"], r"lattice\.flexion: has no effect on springs along a mesh"),
+        ([MESH, "lattice.body_diagonals=0"], r"lattice\.body_diagonals: has no effect"),
     ],
 )
 def test_lattice_keys_that_do_not_fit_are_refused(overrides, message):
     with pytest.raises(SceneError, match=message):
         read_scene("liver", overrides)
+
+
+def law(strain, relative_tension):
+    return f"lattice.law={{strain={strain}, relative_tension={relative_tension}}}"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["lattice.law=linear"], r"lattice\.law: should be a table"),
+        (["lattice.law={strain=[0, 1]}"], r"lattice\.law\.relative_tension: Field required"),
+        ([law([0, 1], [0, 1, 2])], r"lattice\.law: has 2 of strain and 3 of relative_tension"),
+        ([law([0], [0])], "two or more"),
+        ([law([-2, 0], [-1, 0])], r"lattice\.law\.strain\.0: must lie between -1 and 10"),
+        ([law([0, 0.2, 0.1], [0, 1, 2])], r"lattice\.law\.strain: must rise"),
+        ([law([0, 0.1, 0.1], [0, 1, 2])], r"lattice\.law\.strain: must rise"),
+        ([law([-0.1, 0, 0.1], [-1, 0, -1])], r"lattice\.law\.relative_tension: must rise"),
+        ([law([0, 0.1, 0.2], [0, 1, 1])], r"lattice\.law\.relative_tension: must rise"),
+        ([law([-0.1, 0.1], [-1, 1])], "give a point of strain 0 and tension 0"),
+        ([law([-0.1, 0, 0.1], [0, 0.1, 1])], "give a point of strain 0 and tension 0"),
+        (
+            [law([0, 1], [0, 1]), "lattice.integrator=xpbd", NO_BENCHMARK],
+            r"lattice\.law: xpbd takes",
+        ),
+        ([law([0, 1], [0, 1]), 'models=["fem"]'], "add msm to models"),
+        ([law([0, 1], [0, 2]), "lattice.volume_term=true"], "equal to their strain"),
+        ([law([-1, 0, 1], [-2, 0, 1]), "lattice.volume_term=true"], "equal to their strain"),
+    ],
+)
+def test_a_spring_law_that_cannot_be_is_refused_by_key(overrides, message):
+    with pytest.raises(SceneError, match=message):
+        read_scene("liver", overrides)
+
+
+def test_a_spring_law_may_soften_stiffen_and_be_steeper_on_one_side():
+    """With the volume term it must only start as the linear spring."""
+    given = law([-0.2, 0, 0.01, 0.1], [-0.05, 0, 0.01, 0.6])
+    assert read_scene("liver", [given]).lattice.law.relative_tension == (-0.05, 0, 0.01, 0.6)
+    linear_at_rest = law([-0.2, -0.1, 0, 0.01, 0.1], [-0.11, -0.1, 0, 0.01, 0.6])
+    assert read_scene("liver", [linear_at_rest, "lattice.volume_term=true"]).lattice.law is not None
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["damping.kind=viscous"], r"damping\.kind: should be 'eq-2' or 'rayleigh'"),
+        (["damping.mass=3"], r"damping\.mass: has no effect.*damping\.kind to rayleigh"),
+        (["damping.stiffness=1 ms"], r"damping\.stiffness: has no effect"),
+        ([RAYLEIGH], r"damping\.kind: rayleigh needs damping\.mass"),
+        ([RAYLEIGH, "damping.mass=-1"], r"damping\.mass: must lie between"),
+        ([RAYLEIGH, "damping.mass=1 s"], r"damping\.mass: 's' is not a unit like s\^-1"),
+        ([RAYLEIGH, "damping.stiffness=1 Hz"], r"damping\.stiffness: 'Hz' is not a unit like s"),
+        (
+            [RAYLEIGH, "damping.stiffness=1 ms", "lattice.integrator=velocity-verlet"],
+            r"damping\.stiffness: velocity-verlet has only the mass part",
+        ),
+    ],
+)
+def test_damping_that_does_not_fit_is_refused_by_key(overrides, message):
+    with pytest.raises(SceneError, match=message):
+        read_scene("liver", overrides)
+
+
+def test_the_mass_part_suits_every_integrator_and_both_parts_the_default():
+    both = [RAYLEIGH, "damping.mass=3 s^-1", "damping.stiffness=2 ms"]
+    assert read_scene("liver", both).damping.stiffness == 2e-3
+    only_mass = [RAYLEIGH, "damping.mass=3", "lattice.integrator=implicit-midpoint"]
+    assert read_scene("liver", only_mass).damping.mass == 3.0
+
+
+def test_a_point_has_no_rayleigh_damping():
+    with pytest.raises(SceneError, match=r"damping\.kind: a single point"):
+        read_scene("paper", [RAYLEIGH, "damping.mass=3"])
+
+
+def test_what_springs_and_damping_do_not_use_is_left_out_of_the_resolved_scene():
+    table = resolved(read_scene("liver", [MESH, RAYLEIGH, "damping.mass=3"]))
+    assert not table["lattice"].keys() & {"spacing", "flexion", "body_diagonals", "law"}
+    assert table["damping"].keys() == {"kind", "mass", "stiffness", "reference_spacing"}
+    assert resolved(read_scene("liver"))["damping"].keys() == {"kind", "ratio", "reference_spacing"}
 
 
 def test_scenes_are_frozen():

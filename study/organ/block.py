@@ -17,8 +17,12 @@ def cell_counts(size: tuple[float, float, float], element_size: float) -> NDArra
 
 
 def block_mesh(size: tuple[float, float, float], element_size: float) -> TetrahedralMesh:
-    """Block [0, size] [m] of cells no longer than `element_size`, each cut into six (Kuhn)."""
-    counts = cell_counts(size, element_size)
+    """Block [0, size] [m] of cells no longer than `element_size`."""
+    return block_of_cells(size, cell_counts(size, element_size))
+
+
+def block_of_cells(size: tuple[float, float, float], counts: NDArray[np.int64]) -> TetrahedralMesh:
+    """Block [0, size] [m] of so many cells along each axis, each cut into six (Kuhn)."""
     axes = [np.linspace(0.0, s, n + 1) for s, n in zip(size, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(counts + 1)

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.tetrahedra import boundary, mean_edge, refined, volumes
 from study.organ import liver
-from study.organ.block import block_mesh, cell_counts
+from study.organ.block import block_of_cells, cell_counts
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import Body, ImplicitBody, MeshBody
+from study.organ.projection import onto_surface
 from study.scene import Organ
 
-COARSENING = 4.0 / 3.0
-"""Element size of the coarser mesh, which shows the reference's discretisation error."""
-LEAST_COARSENING = 1.2
+Projection = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+FINER = 4.0 / 3.0
+"""Ratio of the element sizes of a level and the next finer one, where it is free."""
+BLOCK_PARTS = 4
 REFINE_ABOVE = 1.3
 """A user's mesh is refined while its mean edge exceeds this many element sizes."""
 MAX_TETRAHEDRA = 60_000
@@ -26,21 +32,29 @@ TETRAHEDRA_PER_CUBE = 12
 
 
 @dataclass(frozen=True)
-class Geometry:
-    """`mesh` for the finite elements and all integrals; `coarser`, one for its error, if any.
+class Level:
+    """A mesh of the organ, and the size of its elements up to a factor that all levels share."""
 
-    `coarsening`: ratio of their element sizes; `surface`: boundary of `mesh`; `body`: the exact
-    shape if it is known, else the mesh; `volume` [m^3] of `mesh`; `notes`: what was found, repaired
-    or assumed.
+    mesh: TetrahedralMesh
+    size: float
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """`mesh` for all integrals, level 0 of the finite elements; `surface`: its boundary.
+
+    `level`: meshes of the same organ, finer as the number grows, or None where there is none;
+    `body`: the exact shape if it is known, else the mesh; `project`: onto its surface, if it is
+    known and curved; `volume` [m^3] of `mesh`; `notes`: what was found, repaired or assumed.
     """
 
     mesh: TetrahedralMesh
-    coarser: TetrahedralMesh | None
+    level: Callable[[int], Level | None]
     surface: SurfaceMesh
     body: Body
     volume: float
-    coarsening: float
     notes: tuple[str, ...] = ()
+    project: Projection | None = None
 
 
 def build(organ: Organ, element_size: float) -> Geometry:
@@ -58,12 +72,17 @@ def build(organ: Organ, element_size: float) -> Geometry:
 
 
 def _block(size: tuple[float, float, float], element_size: float) -> Geometry:
-    """A block; its coarser mesh must be coarser along each axis, or it would tell nothing."""
-    mesh = block_mesh(size, element_size)
-    fine, coarse = (cell_counts(size, h) for h in (element_size, COARSENING * element_size))
-    ratio = float((fine / coarse).min())
-    coarser = block_mesh(size, COARSENING * element_size) if ratio >= LEAST_COARSENING else None
-    return _geometry(mesh, coarser, MeshBody(mesh), coarsening=ratio)
+    """A block; all axes are cut into as many parts more from level to level, from 2 to 4 and on."""
+    parts = cell_counts(size, BLOCK_PARTS * element_size)
+
+    @cache
+    def level(k: int) -> Level | None:
+        count = BLOCK_PARTS + k
+        if count < 2 or 6 * count**3 * np.prod(parts) > MAX_TETRAHEDRA:
+            return None
+        return Level(block_of_cells(size, count * parts), 1.0 / count)
+
+    return _geometry(level)
 
 
 def _check_count(volume: float, element_size: float) -> None:
@@ -80,14 +99,19 @@ def _check_count(volume: float, element_size: float) -> None:
 def _liver(volume: float, element_size: float) -> Geometry:
     body = ImplicitBody(lambda points: liver.signed_function(points, volume))
     box = liver.bounding_box(volume)
-    mesh = stuff(body.signed, *box, element_size)
-    coarser = stuff(body.signed, *box, COARSENING * element_size)
+
+    @cache
+    def level(k: int) -> Level | None:
+        size = element_size / FINER**k
+        if TETRAHEDRA_PER_CUBE * volume / size**3 > MAX_TETRAHEDRA:
+            return None
+        return Level(stuff(body.signed, *box, size), size)
+
     note = (
         f"The built-in liver ({volume * 1e3:.2f} L) is a smooth test shape with two lobes, not an "
-        "anatomy; the finite-element mesh approximates its curved surface by flat facets and holds "
-        f"{volumes(mesh).sum() * 1e3:.2f} L."
+        "anatomy; its quadratic finite elements are curved along the surface."
     )
-    return _geometry(mesh, coarser, body, (note,))
+    return _geometry(level, body, (note,), partial(onto_surface, body.signed))
 
 
 def _from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
@@ -95,30 +119,48 @@ def _from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
     from study.mesh.tetrahedralise import tetrahedralise
 
     loaded, report = load_mesh(path, unit)
-    notes = list(report.notes)
     if isinstance(loaded, SurfaceMesh):
         filled, more = tetrahedralise(loaded, element_size)
-        coarsely, _ = tetrahedralise(loaded, COARSENING * element_size)
-        return _geometry(filled, coarsely, MeshBody(filled), (*notes, *more))
-    mesh: TetrahedralMesh = loaded
-    coarser: TetrahedralMesh | None = None
-    while (
-        mean_edge(mesh) > REFINE_ABOVE * element_size and 8 * len(mesh.tetrahedra) < MAX_TETRAHEDRA
-    ):
-        mesh, coarser = refined(mesh), mesh
-        notes.append(
-            f"Tetrahedra refined to {len(mesh.tetrahedra)} (mean edge {mean_edge(mesh) * 1e3:.1f} "
-            "mm) so that quadratic elements follow the load."
+        coarsely, _ = tetrahedralise(loaded, FINER * element_size)
+        # Each filling takes half a minute, so there are no more levels.
+        levels = {0: Level(filled, element_size), -1: Level(coarsely, FINER * element_size)}
+        return _geometry(levels.get, MeshBody(filled), (*report.notes, *more))
+    return _refined(loaded, element_size, report.notes)
+
+
+def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]) -> Geometry:
+    """A user's mesh, refined by halves until its elements are as small as asked."""
+    meshes, found = [given], list(notes)
+    while mean_edge(meshes[-1]) > REFINE_ABOVE * element_size and _can_refine(meshes[-1]):
+        meshes.append(refined(meshes[-1]))
+        found.append(
+            f"Tetrahedra refined to {len(meshes[-1].tetrahedra)} (mean edge "
+            f"{mean_edge(meshes[-1]) * 1e3:.1f} mm) so that quadratic elements follow the load."
         )
-    return _geometry(mesh, coarser, MeshBody(mesh), tuple(notes), coarsening=2.0)
+    base = len(meshes) - 1
+
+    def level(k: int) -> Level | None:
+        while len(meshes) <= base + k and _can_refine(meshes[-1]):
+            meshes.append(refined(meshes[-1]))
+        at = base + k
+        return Level(meshes[at], 0.5**at) if 0 <= at < len(meshes) else None
+
+    return _geometry(level, MeshBody(meshes[base]), tuple(found))
+
+
+def _can_refine(mesh: TetrahedralMesh) -> bool:
+    return 8 * len(mesh.tetrahedra) < MAX_TETRAHEDRA
 
 
 def _geometry(
-    mesh: TetrahedralMesh,
-    coarser: TetrahedralMesh | None,
-    body: Body,
+    level: Callable[[int], Level | None],
+    body: Body | None = None,
     notes: tuple[str, ...] = (),
-    coarsening: float = COARSENING,
+    project: Projection | None = None,
 ) -> Geometry:
+    base = level(0)
+    if base is None:
+        raise ValueError("the organ has no mesh")
+    mesh = base.mesh
     volume = float(volumes(mesh).sum())
-    return Geometry(mesh, coarser, boundary(mesh), body, volume, coarsening, notes)
+    return Geometry(mesh, level, boundary(mesh), body or MeshBody(mesh), volume, notes, project)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fuzzy.assumptions import assumptions as fuzzy_assumptions
 from study.run.estimates import settings
 from study.run.outcome import Outcome
-from study.scene import Scene
+from study.scene import Scene, SpringLaw
 
 
 def assumptions(scene: Scene, outcome: Outcome) -> list[str]:
@@ -61,33 +63,81 @@ def _organ(scene: Scene) -> list[str]:
         "There is no gravity: the shape given is the shape at rest.",
     ]
     if set(scene.models) & {"basafa", "msm"}:
-        found.append(
-            "Face diagonals have sqrt(2) times the force constants of edges, and springs on the "
-            "surface carry the share of the cells they belong to; otherwise the lattice would be "
-            "anisotropic and up to 38 % too stiff."
-        )
+        found.append(_layout(scene))
         found.append(
             "Nodal damping acts against the ground, as in the paper, and so resists rigid motion."
         )
     if "fem" in scene.models:
+        damping = (
+            "the mass-proportional damping of eq. (2) at the reference modulus"
+            if scene.damping.kind == "eq-2"
+            else "the Rayleigh damping of the fuzzy-tuned models"
+        )
         found.append(
-            "The finite-element reference is linear in strain and has the mass-proportional "
-            "damping of eq. (2) at the reference modulus. Comparison with it is code to code, not "
-            "validation against an experiment."
+            f"The finite-element reference is linear in strain and has {damping}. Comparison with "
+            "it is code to code, not validation against an experiment."
         )
     return found
 
 
+def _layout(scene: Scene) -> str:
+    if scene.lattice.springs == "tetrahedra":
+        return (
+            "Springs run along the edges of the finite-element mesh, each with k = E V / L^2, V "
+            "the volume of the tetrahedra round it (Van Gelder 1998). That is the modulus E only "
+            "where edges point evenly in all directions: modulus, Poisson ratio and anisotropy "
+            "are those of the mesh, and refining it does not cure them."
+        )
+    return (
+        "Face diagonals have sqrt(2) times the force constants of edges, and springs on the "
+        "surface carry the share of the cells they belong to; otherwise the lattice would be "
+        "anisotropic and up to 38 % too stiff."
+    )
+
+
 def _springs(scene: Scene) -> list[str]:
     return [
-        "The fuzzy-tuned springs are linear, eq. (1); the estimate is read as Young's modulus E. "
-        + _calibration(scene),
-        f"Damping by eq. (2) with w = sqrt(k/m), zeta = {scene.damping.ratio:g}, k and m taken at "
-        "the reference spacing.",
+        f"{_law(scene)}; the estimate is read as Young's modulus E. " + _calibration(scene),
+        _damping(scene),
     ]
 
 
+def _law(scene: Scene) -> str:
+    law = scene.lattice.law
+    if law is None:
+        return "The fuzzy-tuned springs are linear, eq. (1)"
+    before, after = _slopes_at_rest(law)
+    return (
+        f"The fuzzy-tuned springs follow {len(law.strain)} points of the scene, which the paper "
+        "does not have, from the stiffness of the estimate: at rest they have "
+        f"{after:g} times that in tension and {before:g} times that in compression"
+    )
+
+
+def _slopes_at_rest(law: SpringLaw) -> tuple[float, float]:
+    """Relative stiffness just below and just above no strain."""
+    rest, slopes = law.strain.index(0.0), np.diff(law.relative_tension) / np.diff(law.strain)
+    return float(slopes[max(rest - 1, 0)]), float(slopes[min(rest, len(slopes) - 1)])
+
+
+def _damping(scene: Scene) -> str:
+    damping = scene.damping
+    if damping.kind == "eq-2":
+        return (
+            f"Damping by eq. (2) with w = sqrt(k/m), zeta = {damping.ratio:g}, k and m taken at "
+            "the reference spacing."
+        )
+    return (
+        f"Rayleigh damping C = alpha M + beta K with alpha = {damping.mass:g} 1/s and beta = "
+        f"{damping.stiffness:g} s in place of eq. (2), K each model's own stiffness, support "
+        "included; the part beta K is a dashpot on each spring, cell and foundation and leaves "
+        "rigid motion of the body itself free."
+    )
+
+
 def _calibration(scene: Scene) -> str:
+    if scene.lattice.springs == "tetrahedra":
+        return "There is no volume term, as in the paper."
     if not scene.lattice.volume_term:
         return (
             "k = 0.4 E h is the calibration of the cubic lattice, whose Poisson ratio is 1/4; "

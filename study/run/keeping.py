@@ -1,4 +1,4 @@
-"""What is kept on disk of the lattice runs while they run: states to go on from, fields."""
+"""What is kept on disk of the runs while they run: states to go on from, fields."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.assembly import Assembly
 from msm.checkpoint import Checkpoint
 from study.fields import Mesh, recording
 
@@ -35,14 +34,11 @@ def checkpoint(keeping: Keeping | None, name: str) -> Checkpoint | None:
 
 
 @contextmanager
-def recorded(
-    keeping: Keeping | None, name: str, assembly: Assembly, times: Floats
-) -> Iterator[OnSample]:
+def recorded(keeping: Keeping | None, name: str, mesh: Mesh, times: Floats) -> Iterator[OnSample]:
     """What a run tells its samples, so that its fields end up in NAME.vtkhdf if they are wanted."""
     if keeping is None or keeping.fields is None:
         yield lambda *_: None
         return
-    mesh = Mesh(assembly.lattice.nodes, assembly.lattice.cells)
     raw = keeping.state / f"{name}.frames"
     path = keeping.fields / f"{name}.vtkhdf"
     with recording(path, mesh, times, raw, resume=keeping.resume) as frames:

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msm import model as lattice_model
+from msm import tetrahedra
 from msm.calibration import POISSON_RATIO, reference_stiffness
 from msm.checkpoint import Checkpoint
 from msm.damping import Damping, eq_2, eq_9
 from msm.integrators import INTEGRATORS
-from msm.lattice import CellLattice
-from msm.laws import Basafa, Hooke
+from msm.lattice import Lattice
+from msm.laws import Basafa, Hooke, Law, initial_stiffness, piecewise
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Step
 from msm.volume import volume_term
+from study.fields import Mesh
 from study.progress import Advance, Progress
 from study.run.keeping import Keeping, OnSample, checkpoint, recorded
 from study.run.outcome import Outcome, model_record
@@ -40,25 +42,32 @@ class Contender:
 
 
 def contenders(
-    scene: Scene, lattice: CellLattice, estimates: dict[str, Estimate]
+    scene: Scene, lattice: Lattice, estimates: dict[str, Estimate]
 ) -> Iterator[Contender]:
     """The lattice models that the scene names."""
     if "basafa" in scene.models:
-        yield benchmark(scene)
+        yield benchmark(scene, lattice.spacing)
     if "msm" in scene.models:
         for system, estimate in estimates.items():
             yield fuzzy_tuned(scene, lattice, system, estimate.estimate)
 
 
-def fuzzy_tuned(scene: Scene, lattice: CellLattice, system: str, modulus: float) -> Contender:
-    """Linear springs of eq. (1) for a modulus [Pa], with the volume term if the scene has it."""
-    material = elastic(lattice, modulus, poisson_ratio(scene))
-    return Contender(
-        f"msm-{system}", replace(material, damping=node_damping(scene, modulus)), modulus
-    )
+def fuzzy_tuned(scene: Scene, lattice: Lattice, system: str, modulus: float) -> Contender:
+    """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""
+    linear = elastic(lattice, modulus, poisson_ratio(scene))
+    k = initial_stiffness(linear.law)
+    law = spring_law(scene, k)
+    material = replace(linear, law=law, damping=node_damping(scene, modulus))
+    return Contender(f"msm-{system}", material, modulus * (initial_stiffness(law) / k))
 
 
-def elastic(lattice: CellLattice, modulus: float, nu: float) -> Material:
+def spring_law(scene: Scene, k: float) -> Law:
+    """Linear springs of eq. (1), k [N/m], or the scene's law in proportion to them."""
+    law = scene.lattice.law
+    return Hooke(k) if law is None else piecewise(law.strain, k * np.array(law.relative_tension))
+
+
+def elastic(lattice: Lattice, modulus: float, nu: float) -> Material:
     """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
     law = Hooke(reference_stiffness(modulus, lattice.spacing, nu))
     return Material(law, volume_term(lattice, modulus, nu) if nu > POISSON_RATIO else None)
@@ -69,20 +78,31 @@ def poisson_ratio(scene: Scene) -> float:
     return scene.tissue.poisson_ratio if scene.lattice.volume_term else POISSON_RATIO
 
 
-def benchmark(scene: Scene) -> Contender:
-    """Eqs. (5)-(9), Table II carried from the reference spacing to the lattice's.
+def benchmark(scene: Scene, spacing: float) -> Contender:
+    """Eqs. (5)-(9), Table II carried from the reference spacing to the lattice's [m].
 
     K (h / h_0)^2 keeps the modulus 2.5 K_1 / h_0^2, gamma (h / h_0)^3 the damping per mass.
     """
-    h, h_0, table = scene.lattice.spacing, scene.damping.reference_spacing, scene.basafa
+    h, h_0, table = spacing, scene.damping.reference_spacing, scene.basafa
     per_length = (h / h_0) ** 2 / h
     law = Basafa(table.k1 * per_length, table.k2 * per_length, table.x_c)
     damping = eq_9(table.gamma_0, table.gamma_1, reference_mass(scene))
     return Contender("basafa", Material(law, damping=damping), 2.5 * table.k1 / h_0**2)
 
 
+def damping_rates(scene: Scene) -> tuple[float, float]:
+    """Alpha [1/s] and beta [s] of the reference: Rayleigh's, or eq. (2) at its modulus."""
+    found = node_damping(scene, scene.tissue.youngs_modulus)
+    return found.gamma_0, found.beta
+
+
 def node_damping(scene: Scene, modulus: float) -> Damping:
-    """Eq. (2) for a node of the lattice at the reference spacing, so that h does not change it."""
+    """Rayleigh's damping, or eq. (2) for springs of a modulus [Pa].
+
+    Eq. (2) is taken for a node at the reference spacing, so that h does not change it.
+    """
+    if scene.damping.kind == "rayleigh":
+        return Damping(scene.damping.mass, beta=scene.damping.stiffness)
     k = reference_stiffness(modulus, scene.damping.reference_spacing, poisson_ratio(scene))
     return eq_2(scene.damping.ratio, k, reference_mass(scene))
 
@@ -93,7 +113,15 @@ def reference_mass(scene: Scene) -> float:
 
 
 def assemble(scene: Scene, posed: Posed) -> Assembly:
-    """The lattice over the organ, which all its models share."""
+    """The lattice over the organ, or on its mesh, which all its models share."""
+    if scene.lattice.springs == "tetrahedra":
+        return tetrahedra.assemble(
+            posed.geometry.mesh,
+            posed.surface_rule,
+            scene.tissue.density,
+            posed.foundation,
+            posed.tool,
+        )
     return lattice_model.assemble(
         posed.geometry.body,
         posed.surface_rule,
@@ -155,11 +183,11 @@ def _run(
     progress: Progress,
     keeping: Keeping | None,
 ) -> None:
-    step = asked_step(scene)
-    name = contender.name
+    step, name = asked_step(scene), contender.name
+    mesh = Mesh(assembly.lattice.nodes, assembly.lattice.cells)
     with (
         progress.stage(name) as advance,
-        recorded(keeping, name, assembly, posed.observation.times) as on_sample,
+        recorded(keeping, name, mesh, posed.observation.times) as on_sample,
     ):
         kept = checkpoint(keeping, name)
         run = _march(scene, posed, assembly, contender, step, advance, kept, on_sample)
@@ -171,16 +199,15 @@ def _run(
         "smallest_time_step_s": run.smallest_step,
         "repeated_steps": run.repeated_steps,
         "integrator": scene.lattice.integrator,
-        "poisson_ratio": POISSON_RATIO
-        if contender.material.volume is None
-        else poisson_ratio(scene),
+        "poisson_ratio": _poisson_ratio_of(scene, contender),
         "critical_time_step_s": _finite(run.critical_time_step),
         "smallest_step_margin": _finite(run.margin),
         "steps": run.steps,
         "wall_s": run.wall,
         "small_strain_modulus_pa": contender.modulus,
-        "node_mass_kg": scene.tissue.density * scene.lattice.spacing**3,
+        "node_mass_kg": _node_mass(scene, assembly),
         "damping_rate_per_s": contender.material.damping.gamma_0,
+        "stiffness_damping_s": contender.material.damping.beta,
         "largest_spring_strain": run.largest_strain,
         "inverted_cells": run.inverted_cells,
     }
@@ -192,6 +219,20 @@ def _run(
             half = _march(scene, posed, assembly, contender, halved, advance, kept).trajectory
         order = INTEGRATORS[scene.lattice.integrator].order
         outcome.add_time_step_errors(record, posed.probes, run.trajectory, half, order)
+
+
+def _poisson_ratio_of(scene: Scene, contender: Contender) -> float | None:
+    """Of a lattice model; None where the mesh decides, and not the springs."""
+    if scene.lattice.springs == "tetrahedra":
+        return None
+    return POISSON_RATIO if contender.material.volume is None else poisson_ratio(scene)
+
+
+def _node_mass(scene: Scene, assembly: Assembly) -> float:
+    """Of an inner node of the cubic lattice, or the mean of a mesh [kg]."""
+    if scene.lattice.springs == "tetrahedra":
+        return float(assembly.mass.mean())
+    return scene.tissue.density * scene.lattice.spacing**3
 
 
 def asked_step(scene: Scene) -> Step:

@@ -11,7 +11,6 @@ from fem_reference import model as fem
 from fem_reference.elasticity import Body
 from msm import model as lattice_model
 from msm.calibration import POISSON_RATIO
-from msm.lattice import interpolation
 from msm.model import Assembly
 from study.progress import Progress
 from study.run.comparison import best_factor, relative_l2
@@ -42,13 +41,15 @@ def lattice_limits(
         field = _at_rest(scene, assembly, POISSON_RATIO, points)
         truth = fem.static_field(body, points)
         tissue = replace(scene.tissue, poisson_ratio=POISSON_RATIO)
-        quarter = fem.build(posed.geometry.mesh, tissue, posed.foundation, posed.tool)
+        project = posed.geometry.project
+        quarter = fem.build(body.mesh, tissue, posed.foundation, posed.tool, project=project)
         truth_at_quarter = fem.static_field(quarter, points)
     factor = best_factor(field, truth, volumes)
     nu = scene.tissue.poisson_ratio
-    lifted = _at_rest(scene, assembly, nu, points) if nu > POISSON_RATIO else None
+    can_lift = nu > POISSON_RATIO and scene.lattice.springs == "lattice"
+    lifted = _at_rest(scene, assembly, nu, points) if can_lift else None
     outcome.extra["lattice_limits"] = {
-        "spacing_m": scene.lattice.spacing,
+        "spacing_m": assembly.lattice.spacing,
         "poisson_ratio": scene.tissue.poisson_ratio,
         "relative_l2_at_quarter": relative_l2(field, truth_at_quarter, volumes),
         "relative_l2": relative_l2(field, truth, volumes),
@@ -64,4 +65,4 @@ def _at_rest(scene: Scene, assembly: Assembly, nu: float, points: Floats) -> Flo
     """Displacement [m] (q, 3) of the lattice with the reference modulus and this Poisson ratio."""
     material = elastic(assembly.lattice, scene.tissue.youngs_modulus, nu)
     nodal = lattice_model.static_displacement(assembly, material)
-    return np.asarray(interpolation(assembly.lattice, points)[0] @ nodal)
+    return np.asarray(assembly.lattice.interpolation(points)[0] @ nodal)

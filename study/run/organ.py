@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from study.mesh.tetrahedra import mean_edge
 from study.progress import Progress
 from study.run.outcome import Outcome
 from study.run.posed import Posed
@@ -26,7 +27,7 @@ def run_organ(
     keeping: Keeping | None = None,
 ) -> Outcome:
     """Run the finite elements, the benchmark and one lattice per estimate."""
-    from study.run.lattices import assemble, node_damping, run_lattices
+    from study.run.lattices import assemble, run_lattices
 
     outcome = Outcome(notes=list(posed.geometry.notes))
     outcome.extra["dimensionless"] = dimensionless(scene, posed)
@@ -37,8 +38,7 @@ def run_organ(
     if "fem" in scene.models:
         from study.run.reference import run_reference
 
-        rate = node_damping(scene, scene.tissue.youngs_modulus).gamma_0
-        body = run_reference(scene, posed, rate, outcome, progress)
+        body = run_reference(scene, posed, outcome, progress, keeping)
         if "msm" in scene.models:
             from study.run.limits import lattice_limits
 
@@ -46,6 +46,13 @@ def run_organ(
     if has_lattice:
         run_lattices(scene, posed, assembly, estimates, outcome, progress, keeping)
     return outcome
+
+
+def spacing(scene: Scene, posed: Posed) -> float:
+    """Spacing of the lattice, or mean edge of the mesh that springs run along [m]."""
+    if scene.lattice.springs == "tetrahedra":
+        return mean_edge(posed.geometry.mesh)
+    return scene.lattice.spacing
 
 
 def dimensionless(scene: Scene, posed: Posed) -> dict[str, float]:
@@ -57,6 +64,6 @@ def dimensionless(scene: Scene, posed: Posed) -> dict[str, float]:
         "volume_m3": posed.geometry.volume,
         "sag_rho_g_l_over_e": scene.tissue.density * GRAVITY * extent / modulus,
         "tool_pressure_over_e": scene.tool.force / (np.pi * radius**2) / modulus,
-        "tool_radius_over_spacing": radius / scene.lattice.spacing,
+        "tool_radius_over_spacing": radius / spacing(scene, posed),
         "tool_radius_over_element_size": radius / scene.reference.element_size,
     }

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from study.scene import Scene
 from study.trajectory import Trajectory
 
+STRAIN_LIMIT = 0.05
+"""Largest strain of the linear reference above which it is not to be trusted."""
 TIME_STEP_LIMITS = {"displacement": 0.01, "velocity": 0.05}
 TINY = 1e-300
 

@@ -2,92 +2,238 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fem_reference import model as fem
-from fem_reference.dynamics import ORDER
+from fem_reference.dynamics import ORDER, Damping
 from fem_reference.elasticity import Body
+from study.fields import Mesh
+from study.organ.geometry import Level
 from study.progress import Progress
-from study.run.comparison import relative_l2
-from study.run.outcome import Outcome, curve_errors, model_record
+from study.run.convergence import FORMAL_ORDER, Estimate, discretisation_error
+from study.run.keeping import Keeping, recorded
+from study.run.large_strain import compare_large_strain
+from study.run.lattices import damping_rates
+from study.run.outcome import Outcome, model_record
 from study.run.posed import Posed
 from study.scene import Scene
-from study.trajectory import Trajectory
 
-MESH_ORDER = 2
-"""Assumed in the mesh error: that of flat facets on a curved organ.
+COARSER = 2
+"""Meshes below that of the scene, as many as there are: three show the order of convergence."""
+FINER = 4
+"""Levels above it that an accuracy may take."""
+LARGEST_JUMP = 0.6
+"""Of the element size at once: sizes far apart do not show the order."""
+TRUNCATION_LIMIT = 0.01
+KINDS = ("displacement", "velocity")
 
-Quadratic elements are of a higher order inside and of a lower one at edges of the support: the
-estimate is an indication, good to a factor of a few on coarse meshes, and no bound.
-"""
+
+@dataclass(frozen=True)
+class Solved:
+    """The reference on one mesh."""
+
+    level: Level
+    body: Body
+    found: fem.Reference
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors of the finest mesh: of each control point's curves by kind, of the field."""
+
+    by_probe: dict[str, dict[str, Estimate]]
+    field: Estimate
+
+    def worst(self, kind: str) -> float:
+        """Largest error of a control point's curve."""
+        return max(one[kind].error for one in self.by_probe.values())
 
 
 def run_reference(
-    scene: Scene, posed: Posed, damping_rate: float, outcome: Outcome, progress: Progress
+    scene: Scene,
+    posed: Posed,
+    outcome: Outcome,
+    progress: Progress,
+    keeping: Keeping | None = None,
 ) -> Body:
-    """Run the reference into the outcome; `damping_rate` [1/s] is its mass-proportional damping."""
-    with progress.stage("fem: assembly"):
-        body = fem.build(posed.geometry.mesh, scene.tissue, posed.foundation, posed.tool)
-    with progress.stage("fem") as advance:
-        steps = scene.reference.steps_per_sample
-        arguments = (body, damping_rate, posed.factor, posed.observation)
-        found = fem.run(*arguments, steps, on_progress=advance)
-    outcome.runs["fem"] = found.trajectory
-    record = model_record("fem", scene, found.trajectory) | {
+    """Run the reference into the outcome on meshes that show its error; the finest body."""
+    solved = _first(scene, posed, progress)
+    errors = _mesh_errors(posed, solved)
+    while _too_coarse(scene, errors):
+        finer = _finer(scene, posed, solved[-1].level, errors)
+        if finer is None:
+            break
+        solved.append(_solved(scene, posed, finer, progress))
+        errors = _mesh_errors(posed, solved)
+    best = solved[-1]
+    outcome.runs["fem"] = best.found.trajectory
+    record = _record(scene, best)
+    outcome.models.append(record)
+    _keep_fields(keeping, posed, best, outcome)
+    _add_mesh_errors(scene, solved, errors, outcome, record)
+    _add_time_errors(scene, posed, solved[0], outcome, record, progress)
+    scenes_own = next(one.body for one in solved if one.level is posed.geometry.level(0))
+    compare_large_strain(scene, posed, scenes_own, outcome, record, progress)
+    return best.body
+
+
+def _first(scene: Scene, posed: Posed, progress: Progress) -> list[Solved]:
+    """On the scene's mesh and those coarser, the coarsest first."""
+    levels = [posed.geometry.level(k) for k in range(-COARSER, 1)]
+    return [_solved(scene, posed, level, progress) for level in levels if level is not None]
+
+
+def _finer(scene: Scene, posed: Posed, last: Level, errors: Errors | None) -> Level | None:
+    """The level expected to be accurate enough, or the finest there is, if it is finer."""
+    share, found = 1.0, None
+    if errors is not None and scene.reference.accuracy is not None:
+        excess = errors.worst("displacement") / scene.reference.accuracy
+        share = max(excess ** (-1.0 / max(FORMAL_ORDER.values())), LARGEST_JUMP)
+    for level in filter(None, map(posed.geometry.level, range(1, FINER + 1))):
+        if level.size < last.size and (found is None or found.size > share * last.size):
+            found = level
+    return found
+
+
+def _solved(scene: Scene, posed: Posed, level: Level, progress: Progress) -> Solved:
+    name = f"fem: {len(level.mesh.tetrahedra)} tetrahedra"
+    with progress.stage(f"{name}, assembly"):
+        body = build(scene, posed, level)
+    with progress.stage(name) as advance:
+        damping, method = Damping(*damping_rates(scene)), _method(scene)
+        arguments = (body, damping, posed.factor, posed.observation, method)
+        return Solved(level, body, fem.run(*arguments, on_progress=advance))
+
+
+def build(scene: Scene, posed: Posed, level: Level) -> Body:
+    """The body of a scene on one of its meshes."""
+    chosen = scene.reference
+    where = (posed.foundation, posed.tool, chosen.element, posed.geometry.project)
+    return fem.build(level.mesh, scene.tissue, *where, chosen.method)
+
+
+def _method(scene: Scene, times: int = 1) -> fem.Method:
+    """The scene's method, with so many times its steps."""
+    chosen = scene.reference
+    return fem.Method(chosen.method, times * chosen.steps_per_sample, chosen.modes)
+
+
+def _keep_fields(keeping: Keeping | None, posed: Posed, best: Solved, outcome: Outcome) -> None:
+    """The motion of the vertices of the finest mesh, if it is wanted."""
+    if keeping is None or keeping.fields is None:
+        return
+    superposed, mesh = best.found.superposed, best.level.mesh
+    if superposed is None:
+        outcome.notes.append(
+            "Fields of fem are kept of a superposition only, not of steps in time."
+        )
+        return
+    afresh = replace(keeping, resume=False)
+    shown, times = Mesh(mesh.points, mesh.tetrahedra), posed.observation.times
+    with recorded(afresh, "fem", shown, times) as on_sample:
+        for sample in range(len(times)):
+            u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in superposed.state(sample))
+            on_sample(sample, u, v)
+
+
+def _record(scene: Scene, solved: Solved) -> dict[str, Any]:
+    found, superposed = solved.found, solved.found.superposed
+    alpha, beta = damping_rates(scene)
+    return model_record("fem", scene, found.trajectory) | {
         "nodes": found.nodes,
         "elements": found.elements,
+        "element": found.element,
+        "unknowns": solved.body.unknowns,
+        "method": scene.reference.method,
         "time_step_s": found.time_step,
         "critical_time_step_s": None,  # unconditionally stable
         "steps": found.steps,
+        "subspace_vectors": None if superposed is None else superposed.subspace.load.size,
+        "truncation_error": None if superposed is None else superposed.truncation_error,
         "wall_s": found.wall,
-        "damping_rate_per_s": damping_rate,
+        "damping_rate_per_s": alpha,
+        "stiffness_damping_s": beta,
         "largest_strain": found.largest_strain,
     }
-    outcome.models.append(record)
-    _add_errors(scene, posed, body, damping_rate, outcome, record, progress)
-    return body
 
 
-def _add_errors(
+def _mesh_errors(posed: Posed, solved: Sequence[Solved]) -> Errors | None:
+    """Errors of the finest mesh by those before it, if there are any."""
+    if len(solved) < 2:
+        return None
+    sizes = [one.level.size for one in solved]
+    formal = FORMAL_ORDER[solved[-1].found.element]
+    runs = [one.found.trajectory for one in solved]
+    by_probe = {
+        probe: {
+            kind: discretisation_error([getattr(r, kind)[:, i] for r in runs], sizes, formal)
+            for kind in KINDS
+        }
+        for i, probe in enumerate(posed.probes)
+    }
+    fields = [run.volume_field[0] for run in runs]
+    volumes = posed.volume_rule.weights
+    return Errors(by_probe, discretisation_error(fields, sizes, formal, volumes))
+
+
+def _too_coarse(scene: Scene, errors: Errors | None) -> bool:
+    wanted = scene.reference.accuracy
+    return wanted is not None and (errors is None or errors.worst("displacement") > wanted)
+
+
+def _add_mesh_errors(
+    scene: Scene,
+    solved: Sequence[Solved],
+    errors: Errors | None,
+    outcome: Outcome,
+    record: dict[str, Any],
+) -> None:
+    record["mesh_levels"] = [
+        {
+            "size": one.level.size / solved[-1].level.size,
+            "elements": one.found.elements,
+            "unknowns": one.body.unknowns,
+            "wall_s": one.found.wall,
+        }
+        for one in solved
+    ]
+    if errors is None:
+        outcome.notes.append(
+            "The finite-element reference has no other mesh of this organ to compare with: its "
+            "discretisation error is not estimated."
+        )
+        return
+    for key, part in (("mesh_error", "error"), ("mesh_order", "observed")):
+        record[f"{key}_by_probe"] = {
+            probe: {kind: getattr(one, part) for kind, one in kinds.items()}
+            for probe, kinds in errors.by_probe.items()
+        }
+    record["mesh_error"] = {"field_peak": errors.field.error} | {k: errors.worst(k) for k in KINDS}
+    record["mesh_order"] = {"field_peak": errors.field.observed}
+    if scene.reference.accuracy is not None and _too_coarse(scene, errors):
+        outcome.notes.append(
+            f"reference.accuracy asks for {100 * scene.reference.accuracy:.2g} %; the finest mesh "
+            f"reaches {100 * errors.worst('displacement'):.2g} %."
+        )
+
+
+def _add_time_errors(
     scene: Scene,
     posed: Posed,
-    body: Body,
-    damping_rate: float,
+    coarsest: Solved,
     outcome: Outcome,
     record: dict[str, Any],
     progress: Progress,
 ) -> None:
-    """Errors by Richardson's estimate, from a coarser mesh and from halved steps on it."""
-    geometry = posed.geometry
-    if geometry.coarser is None:
-        outcome.notes.append(
-            "The finite-element reference has no coarser mesh of this organ to compare with: its "
-            "discretisation error is not estimated."
-        )
-    whole, steps = outcome.runs["fem"], scene.reference.steps_per_sample
-    if geometry.coarser is not None:
-        with progress.stage("fem: coarser mesh") as advance:
-            body = fem.build(geometry.coarser, scene.tissue, posed.foundation, posed.tool)
-            arguments = (body, damping_rate, posed.factor, posed.observation)
-            whole = fem.run(*arguments, steps, on_progress=advance).trajectory
-    arguments = (body, damping_rate, posed.factor, posed.observation)
+    """The error of the steps is taken on the coarsest mesh, by halving them there."""
     with progress.stage("fem: halved steps") as advance:
-        half = fem.run(*arguments, 2 * steps, on_progress=advance).trajectory
+        arguments = (coarsest.body, Damping(*damping_rates(scene)), posed.factor)
+        method = _method(scene, times=2)
+        half = fem.run(*arguments, posed.observation, method, advance).trajectory
+    whole = coarsest.found.trajectory
     outcome.add_time_step_errors(record, posed.probes, whole, half, ORDER)
-    if geometry.coarser is not None:
-        _add_mesh_error(posed, record, outcome.runs["fem"], whole)
-
-
-def _add_mesh_error(
-    posed: Posed, record: dict[str, Any], fine: Trajectory, coarse: Trajectory
-) -> None:
-    """Relative error of the fine run: its difference to the coarse one over r^2 - 1."""
-    share = 1.0 / (posed.geometry.coarsening**MESH_ORDER - 1.0)
-    volumes = posed.volume_rule.weights
-    by_probe = curve_errors(share, posed.probes, coarse, fine)
-    record["mesh_error_by_probe"] = by_probe
-    record["mesh_error"] = {
-        "field_peak": share * relative_l2(coarse.volume_field[0], fine.volume_field[0], volumes),
-        "displacement": max(errors["displacement"] for errors in by_probe.values()),
-        "velocity": max(errors["velocity"] for errors in by_probe.values()),
-    }
+    if record["truncation_error"] is not None:
+        meaning = "largest relative L2 change of a curve by the last quarter of the subspace"
+        outcome.add_check("fem: subspace", record["truncation_error"], TRUNCATION_LIMIT, meaning)

@@ -14,15 +14,12 @@ from study.results import SCHEMA_VERSION, Results
 from study.run import estimates as fuzzy_side
 from study.run.assumptions import assumptions
 from study.run.comparison import Lens, band_rows, curve_rows, error_rows, similarity_rows
-from study.run.outcome import Outcome
+from study.run.outcome import STRAIN_LIMIT, Outcome
 from study.scene import Scene
 from study.scene_file import resolved, write_scene
 
 if TYPE_CHECKING:
     from study.run.keeping import Keeping
-
-STRAIN_LIMIT = 0.05
-"""Above it the report warns that the linear reference is stretched."""
 
 
 def is_point(scene: Scene) -> bool:
@@ -93,6 +90,14 @@ def _tables(lens: Lens, outcome: Outcome) -> dict[str, Any]:
     }
 
 
+def _at_large_strain(record: dict[str, Any]) -> str:
+    found = record.get("hyperelastic")
+    if found is None:
+        return ""
+    share = 100 * found["field_difference"]
+    return f", and at rest it differs by {share:.1f} % from a {found['law']} solid"
+
+
 def _warnings(outcome: Outcome) -> list[str]:
     warnings = []
     for record in outcome.models:
@@ -100,8 +105,8 @@ def _warnings(outcome: Outcome) -> list[str]:
         if strain is not None and strain > STRAIN_LIMIT:
             warnings.append(
                 f"The largest strain of the linear reference is {100 * strain:.1f} %; above "
-                f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted. Reduce tool.force or "
-                "enlarge tool.radius."
+                f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(record)}. "
+                "Reduce tool.force or enlarge tool.radius."
             )
         if record["status"] == "diverged":
             warnings.append(

@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.bench_lattice
 
-prints the figures and writes tests/data/real_time.csv; it takes ten minutes and 4 GB, and a C
+prints the figures and writes reports/data/real_time.csv; it takes ten minutes and 4 GB, and a C
 compiler for the first part. Each figure is the least of several repeats, which others on the
 machine disturb least, and their median. What is compared is measured in turns.
 
@@ -51,7 +51,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 HERE = Path(__file__).parent
-TABLE = HERE.parent / "data" / "real_time.csv"
+TABLE = HERE.parents[1] / "reports" / "data" / "real_time.csv"
 RATIOS = (0.45, 0.49)
 SPACINGS = (0.012, 0.010, 0.008, 0.02 / 3, 0.005)
 FRACTION = 0.8

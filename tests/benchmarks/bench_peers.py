@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.bench_peers
 
-writes tests/data/peers.csv, a row per lattice spacing and contender; it takes about ten minutes
+writes reports/data/peers.csv, a row per lattice spacing and contender; it takes about ten minutes
 and wants `pip install newton mujoco` (what is not installed is left out, with a line saying so).
 
 All contenders hold the same block by its base, push it by the same nodal forces, and damp it to
@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 Truth = tuple[Converged, Floats, Floats]
 """Finite elements at points [m] (q, 3) of volumes [m^3] (q,)."""
 
-TABLE = Path(__file__).parents[1] / "data" / "peers.csv"
+TABLE = Path(__file__).parents[2] / "reports" / "data" / "peers.csv"
 SPACINGS = (0.04 / 3, 0.01, 0.02 / 3)
 LOAD = 0.02
 """Share of the load of `field_error`: the lattice departs from its linear self by 0.2 %."""

@@ -1,0 +1,1 @@
+"""The discrete problem in the files of other codes, so that they can solve it again."""

@@ -1,0 +1,149 @@
+"""CalculiX input decks (Dhondt, CalculiX CrunchiX manual 2.20): static and dynamic.
+
+The foundation couples its nodes. Per direction its matrix S is springs of -S_ij between nodes i
+and j (SPRING2) and of the row's sum to the ground (SPRING1): exact, also where a constant is
+negative. Its Rayleigh damping has them in it, as the reference's has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.dynamics import Damping
+from fem_reference.exchange.problem import DIRECTIONS, Problem
+
+Floats = NDArray[np.float64]
+
+ELEMENT_NAME = {4: "C3D4", 10: "C3D10"}
+FIELD = 20
+SET_NAME = "SPRINGS"
+MODEL = ("*INCLUDE, INPUT=mesh.inp", "*INCLUDE, INPUT=foundation.inp")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Steps of a motion from rest by HHT with `alpha`, and its Rayleigh damping.
+
+    `factors` of the load at 0, `step` [s], 2 `step`, ...; the first is zero, for CalculiX takes the
+    first acceleration under load otherwise than HHT. All nodes are printed after every `kept` steps
+    and after the last.
+    """
+
+    step: float
+    factors: Floats
+    damping: Damping
+    alpha: float
+    kept: int
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        return len(self.factors) - 1
+
+    def factor(self, times: Floats) -> Floats:
+        """Factor of the load at times [s], as CalculiX interpolates it."""
+        return np.interp(times, self.step * np.arange(len(self.factors)), self.factors)
+
+    def prints(self, step: int) -> bool:
+        """Whether all nodes are printed after a step."""
+        return step > 0 and (step % self.kept == 0 or step == self.count)
+
+
+def files(problem: Problem, motion: Motion | None = None) -> dict[str, str]:
+    """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion."""
+    named = {
+        "mesh.inp": _lines(_mesh(problem, motion)),
+        "foundation.inp": _lines(_foundation(problem)),
+        "load.inp": _lines(_load(problem)),
+        "static.inp": _lines(_static()),
+    }
+    if motion is not None:
+        named["dynamic.inp"] = _lines(_dynamic(motion))
+    return named
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    """As many digits as CalculiX reads: it takes 20 characters."""
+    text = f"{value:.13e}"
+    return text if len(text) <= FIELD else f"{value:.12e}"
+
+
+def _mesh(problem: Problem, motion: Motion | None) -> Iterator[str]:
+    yield "*NODE, NSET=ALL"
+    for number, (x, y, z) in enumerate(problem.nodes, 1):
+        yield f"{number}, {_number(x)}, {_number(y)}, {_number(z)}"
+    yield f"*ELEMENT, TYPE={ELEMENT_NAME[problem.elements.shape[1]]}, ELSET=BODY"
+    for number, nodes in enumerate(problem.elements + 1, 1):
+        yield ", ".join(map(str, (number, *nodes)))
+    tissue = problem.tissue
+    yield from ("*MATERIAL, NAME=TISSUE", "*ELASTIC")
+    yield f"{_number(tissue.youngs_modulus)}, {_number(tissue.poisson_ratio)}"
+    yield from ("*DENSITY", _number(tissue.density))
+    if motion is not None:
+        mass, stiffness = _number(motion.damping.mass), _number(motion.damping.stiffness)
+        yield f"*DAMPING, ALPHA={mass}, BETA={stiffness}"
+    yield "*SOLID SECTION, ELSET=BODY, MATERIAL=TISSUE"
+
+
+def _foundation(problem: Problem) -> Iterator[str]:
+    number = len(problem.elements)
+    for index, ((constant, ends, direction), members) in enumerate(_sets(problem).items(), 1):
+        yield f"*ELEMENT, TYPE=SPRING{ends}, ELSET={SET_NAME}{index}"
+        for nodes in members:
+            number += 1
+            yield ", ".join(map(str, (number, *nodes)))
+        yield f"*SPRING, ELSET={SET_NAME}{index}"
+        yield ", ".join([str(direction)] * ends)
+        yield constant
+
+
+def _sets(problem: Problem) -> dict[tuple[str, int, int], list[tuple[int, ...]]]:
+    """Springs by what one set has in common: constant, number of nodes, direction."""
+    found: dict[tuple[str, int, int], list[tuple[int, ...]]] = {}
+    for nodes, constant in springs(problem):
+        for direction in range(1, DIRECTIONS + 1):
+            found.setdefault((_number(constant), len(nodes), direction), []).append(nodes)
+    return found
+
+
+def springs(problem: Problem) -> Iterator[tuple[tuple[int, ...], float]]:
+    """Nodes, from 1, and constant [N/m] of each spring of the foundation in one direction."""
+    S = problem.support.tocoo()
+    for i, j, value in zip(S.coords[0], S.coords[1], S.data, strict=True):
+        if i < j and value != 0.0:
+            yield (int(i) + 1, int(j) + 1), -float(value)
+    for i, total in enumerate(problem.support.sum(axis=1)):
+        if total != 0.0:
+            yield (i + 1,), float(total)
+
+
+def _load(problem: Problem) -> Iterator[str]:
+    for node, direction in np.argwhere(problem.load != 0.0):
+        yield f"{node + 1}, {direction + 1}, {_number(problem.load[node, direction])}"
+
+
+def _static() -> Iterator[str]:
+    yield from MODEL
+    yield from ("*STEP", "*STATIC", "*CLOAD", "*INCLUDE, INPUT=load.inp")
+    yield from ("*NODE PRINT, NSET=ALL", "U", "*END STEP")
+
+
+def _dynamic(motion: Motion) -> Iterator[str]:
+    yield from MODEL
+    times = motion.step * np.arange(len(motion.factors))
+    yield "*AMPLITUDE, NAME=HISTORY"
+    for time, factor in zip(times, motion.factors, strict=True):
+        yield f"{_number(time)}, {_number(factor)}"
+    yield f"*STEP, INC={len(motion.factors)}"
+    yield f"*DYNAMIC, DIRECT, ALPHA={motion.alpha:g}"
+    yield f"{_number(motion.step)}, {_number(times[-1])}"
+    yield from ("*CLOAD, AMPLITUDE=HISTORY", "*INCLUDE, INPUT=load.inp")
+    yield from (f"*NODE PRINT, NSET=ALL, FREQUENCY={motion.kept}", "U", "*END STEP")

@@ -1,0 +1,54 @@
+"""VTU, which ParaView reads: the mesh with its curved edges, and fields on its nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import (
+    VTK_QUADRATIC_TETRA,
+    VTK_TETRA,
+    vtkCellArray,
+    vtkUnstructuredGrid,
+)
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+from fem_reference.exchange.problem import Problem
+
+Floats = NDArray[np.float64]
+
+CELL_TYPES = {4: VTK_TETRA, 10: VTK_QUADRATIC_TETRA}
+
+
+def text(problem: Problem, displacement: Floats) -> str:
+    """A .vtu file with the displacement [m] (n, 3), load [N] and support density [Pa/m]."""
+    fields = {
+        "displacement": displacement,
+        "load": problem.load,
+        "support_density": problem.support_density,
+    }
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(_grid(problem, fields))
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return str(writer.GetOutputString())
+
+
+def _grid(problem: Problem, fields: Mapping[str, Floats]) -> vtkUnstructuredGrid:
+    corners = problem.elements.shape[1]
+    places, connectivity = vtkPoints(), vtkCellArray()
+    places.SetData(numpy_to_vtk(problem.nodes, deep=True))  # type: ignore[no-untyped-call] # VTK has no types here
+    flat = np.ascontiguousarray(problem.elements).ravel()
+    connectivity.SetData(corners, numpy_to_vtkIdTypeArray(flat, deep=True))  # type: ignore[no-untyped-call] # VTK has no types here
+    grid = vtkUnstructuredGrid()
+    grid.SetPoints(places)
+    grid.SetCells(CELL_TYPES[corners], connectivity)
+    for name, values in fields.items():
+        array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)  # type: ignore[no-untyped-call] # VTK has no types here
+        array.SetName(name)
+        grid.GetPointData().AddArray(array)
+    return grid

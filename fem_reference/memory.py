@@ -1,0 +1,56 @@
+"""What a body takes of memory, before it is assembled."""
+
+from __future__ import annotations
+
+import os
+
+from fem_reference.elasticity import chosen_element
+from study.mesh.kinds import TetrahedralMesh
+from study.mesh.tetrahedra import edges
+from study.scene import Tissue
+
+BYTES_PER_UNKNOWN = {"p1": 30_000, "p2": 10_000, "taylor-hood": 13_000}
+"""At the peak of assembly and iterative solution, measured at 20 000 to 100 000 unknowns."""
+FACTORS = 15.0
+"""Bytes of the factors are this times unknowns^(5/3), measured at 20 000 and 43 000."""
+SHARE = 0.7
+"""Of the memory that is free."""
+
+
+def unknowns(mesh: TetrahedralMesh, element: str) -> int:
+    """Unknowns of the body on a mesh, displacements and pressures."""
+    vertices = len(mesh.points)
+    if element == "p1":
+        return 3 * vertices
+    pressures = vertices if element == "taylor-hood" else 0
+    return 3 * (vertices + len(edges(mesh.tetrahedra))) + pressures
+
+
+def needed(count: int, element: str, *, stepping: bool) -> float:
+    """Bytes for so many unknowns; stepping in time factors the matrix."""
+    return BYTES_PER_UNKNOWN[element] * count + (FACTORS * count ** (5.0 / 3.0) if stepping else 0)
+
+
+def available() -> float:
+    """Bytes of memory that are free."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # not told on this system
+        return float("inf")
+
+
+def refuse_too_large(
+    mesh: TetrahedralMesh, tissue: Tissue, element: str, *, stepping: bool
+) -> None:
+    """ValueError with the size of elements that would fit."""
+    name = chosen_element(element, tissue.poisson_ratio)
+    count = unknowns(mesh, name)
+    limit, wanted = SHARE * available(), needed(count, name, stepping=stepping)
+    if wanted > limit:
+        larger = (wanted / limit) ** (0.2 if stepping else 1.0 / 3.0)
+        advice = "; reference.method ritz-vectors needs far less" if stepping else ""
+        raise ValueError(
+            f"the finite-element mesh has {len(mesh.tetrahedra)} tetrahedra, about {count} "
+            f"unknowns, which need {wanted / 2**30:.1f} GiB of {limit / 2**30:.1f}: make "
+            f"reference.element_size {larger:.2g} times as large, or coarsen organ.mesh{advice}"
+        )

@@ -1,0 +1,209 @@
+"""Hyperelastic bodies at rest: Newton's method along a path of growing load.
+
+A state is handed out only if its forces balance, no element is turned inside out and the tangent is
+positive definite; where that cannot be had, the path ends and says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from fem_reference.elasticity import Body
+from fem_reference.hyperelasticity import Law, LawName, Solid, largest_log_strain, solid
+from study.scene import Tissue
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 1e-8
+"""Of the unbalanced forces relative to the load, in the Euclidean norm."""
+
+MOST_ITERATIONS = 15
+EASY = 5
+"""After as few iterations the next increment of the load is twice as large."""
+
+SMALLEST_INCREMENT = 1 / 32
+"""Of the load asked for; an increment that would have to be smaller ends the path."""
+
+SHORTEST_STEP = 1 / 64
+
+
+@dataclass(frozen=True)
+class State:
+    """A stable rest under `load_factor` times the body's load.
+
+    `displacement` [m]: unknowns of the body, (n,); `largest_strain`: largest absolute principal
+    logarithmic strain, `smallest_volume`: smallest J, both at the integration points; `energy` [J]:
+    stored in tissue and foundation; `residuals`: unbalanced force relative to the load, before each
+    iteration of the last increment and after the last; `iterations`: of all increments since the
+    state before.
+    """
+
+    load_factor: float
+    displacement: Floats
+    largest_strain: float
+    smallest_volume: float
+    energy: float
+    residuals: tuple[float, ...]
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Path:
+    """States at the load factors asked for, as far as they were reached.
+
+    Under large loads a body may have several stable rests; these are the ones the path leads to.
+    `reached`: load factor of the last stable rest found, which need not be one asked for; `failure`
+    says why the path ends there, and is empty if it does not.
+    """
+
+    states: tuple[State, ...]
+    reached: float
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is a state at every load factor asked for."""
+        return not self.failure
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """Where Newton's method ended; a stable rest if `failure` is empty."""
+
+    load_factor: float
+    displacement: Floats
+    residuals: tuple[float, ...]
+    failure: str = ""
+
+    @property
+    def iterations(self) -> int:
+        return len(self.residuals) - 1
+
+
+def solve(
+    body: Body,
+    tissue: Tissue,
+    law: LawName | Law = "neo-hookean",
+    load_factors: Sequence[float] = (1.0,),
+) -> Path:
+    """States of rest under multiples of the body's load, reached from none in the order given.
+
+    ValueError for an unknown law, a body with a pressure field, or a load factor of zero.
+    """
+    if not (np.isfinite(load_factors).all() and np.all(load_factors)):
+        raise ValueError(f"load_factors: {tuple(load_factors)} must be finite and not zero")
+    problem = solid(body, tissue, law)
+    at = _Rest(0.0, np.zeros(len(body.load)), (0.0,))
+    states: list[State] = []
+    for factor in load_factors:
+        at, iterations, failure = _load_up(problem, at, factor)
+        if failure:
+            return Path(tuple(states), at.load_factor, failure)
+        states.append(_state(problem, at, iterations))
+    return Path(tuple(states), at.load_factor, "")
+
+
+def _state(problem: Solid, at: _Rest, iterations: int) -> State:
+    u = at.displacement
+    F = problem.deformation(u)
+    return State(
+        at.load_factor,
+        u,
+        largest_log_strain(F),
+        float(np.linalg.det(F).min()),
+        problem.energy(u),
+        at.residuals,
+        iterations,
+    )
+
+
+def _load_up(problem: Solid, at: _Rest, target: float) -> tuple[_Rest, int, str]:
+    """The rest at the target, or the last before it, the iterations spent, and why it ended."""
+    increment, iterations = target - at.load_factor, 0
+    while at.load_factor != target:
+        left = target - at.load_factor
+        goal = target if abs(increment) >= abs(left) else at.load_factor + increment
+        found = _rest(problem, at.displacement, goal)
+        iterations += found.iterations
+        if not found.failure:
+            at = found
+            increment *= 2.0 if found.iterations <= EASY else 1.0
+            continue
+        increment = 0.5 * (goal - at.load_factor)
+        if abs(increment) < SMALLEST_INCREMENT * abs(target):
+            return at, iterations, f"{found.failure} at {goal:.4g} times the load"
+    return at, iterations, ""
+
+
+def _rest(problem: Solid, start: Floats, factor: float) -> _Rest:
+    """Newton's method at one load."""
+    load, u = factor * problem.load, start
+    residuals: list[float] = []
+    failure = "no balance of forces"
+    while len(residuals) <= MOST_ITERATIONS:
+        unbalanced = load - problem.internal_force(u)
+        residuals.append(float(np.linalg.norm(unbalanced) / np.linalg.norm(load)))
+        factors = _factorised(problem.tangent(u))
+        if residuals[-1] <= TOLERANCE:
+            # On the way an indefinite tangent is no harm; at rest the body would leave it.
+            failure = "" if _definite(factors) else "the body gives way"
+            break
+        direction = _solution(factors, unbalanced)
+        length = _step_length(problem, load, u, direction, float(unbalanced @ direction))
+        if length == 0.0:
+            failure = "no way towards balance"
+            break
+        u = u + length * direction
+    return _Rest(factor, u, tuple(residuals), failure)
+
+
+def _step_length(problem: Solid, load: Floats, u: Floats, direction: Floats, pull: float) -> float:
+    """Largest of 1, 1/2, 1/4, ... of Newton's step that the body can take; 0 if there is none.
+
+    No element may turn inside out, and the unbalanced forces may not turn against the step by more
+    than half of what they pulled before (`pull`). Energy would be lost in rounding near the rest.
+    """
+    length = 1.0 if pull > 0.0 else 0.0
+    while length > 0.0:
+        there = u + length * direction
+        if np.linalg.det(problem.deformation(there)).min() > 0.0:
+            pull_there = float((load - problem.internal_force(there)) @ direction)
+            if pull_there >= -0.5 * pull:
+                break
+        length = 0.5 * length if length > SHORTEST_STEP else 0.0
+    return length
+
+
+def _factorised(matrix: csc_array) -> Any:
+    """Sparse factors by symmetric elimination, whose pivots have the signs of the eigenvalues.
+
+    None if the matrix is singular.
+    """
+    try:
+        return splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:
+        return None
+
+
+def _solution(factors: Any, force: Floats) -> Floats:
+    """Newton's step [m]; none where the tangent is singular."""
+    return np.zeros_like(force) if factors is None else np.asarray(factors.solve(force))
+
+
+def _definite(factors: Any) -> bool:
+    """Whether the matrix is positive definite: all pivots on the diagonal and positive."""
+    if factors is None:
+        return False
+    return bool((factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all())

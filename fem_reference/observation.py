@@ -1,0 +1,44 @@
+"""What is seen of a body: displacement at points, its strain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from fem_reference.elasticity import Body
+from fem_reference.grid import NEWTON_TOLERANCE, CurvedMapping
+from study.mesh.locate import locate
+
+Floats = NDArray[np.float64]
+
+
+def evaluation(body: Body, points: Floats) -> csr_array:
+    """Matrix that takes values at nodes to values at points [m] (q, 3)."""
+    basis = body.nodes
+    cells, barycentric = locate(body.mesh, points)
+    local = np.ascontiguousarray(barycentric[:, 1:].T)[:, :, None]
+    if isinstance(basis.mapping, CurvedMapping):
+        found, off = basis.mapping.located(points.T[:, :, None], cells)
+        # The few points beyond a strongly bent face keep their straight coordinates.
+        local = np.where(off < NEWTON_TOLERANCE, found, local)
+    values = [
+        np.asarray(basis.elem.gbasis(basis.mapping, local, k, tind=cells)[0])[..., 0]
+        for k in range(basis.Nbfun)
+    ]
+    columns = basis.element_dofs[:, cells]
+    rows = np.broadcast_to(np.arange(len(points)), columns.shape)
+    entries = (np.concatenate(values), (rows.ravel(), columns.ravel()))
+    return csr_array(coo_array(entries, shape=(len(points), basis.N)))
+
+
+def at_points(matrix: csr_array, u: Floats) -> Floats:
+    """Displacement [m] (q, 3) at the points of an evaluation matrix."""
+    return np.asarray(matrix @ u.reshape(-1, 3))
+
+
+def largest_strain(body: Body, u: Floats) -> float:
+    """Largest absolute principal strain at the integration points."""
+    gradient = np.stack([np.asarray(body.nodes.interpolate(u[d::3]).grad) for d in range(3)])
+    strain = 0.5 * (gradient + np.swapaxes(gradient, 0, 1))
+    return float(np.abs(np.linalg.eigvalsh(np.moveaxis(strain, (0, 1), (-2, -1)))).max())

@@ -1,0 +1,40 @@
+"""What is kept of a body's motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.elasticity import Body
+from fem_reference.observation import at_points, evaluation, largest_strain
+from study.trajectory import Observation, empty_trajectory
+
+Floats = NDArray[np.float64]
+
+
+class Recorder:
+    """Writes what is observed into the arrays of a trajectory.
+
+    `strain`: largest absolute principal strain in the frames kept so far.
+    """
+
+    def __init__(self, body: Body, observation: Observation) -> None:
+        self.body, self.observation = body, observation
+        self.at_probes = evaluation(body, observation.probes)
+        self.in_volume = evaluation(body, observation.volume_points)
+        self.on_surface = evaluation(body, observation.surface_points)
+        self.trajectory = empty_trajectory(observation)
+        self.strain = 0.0
+
+    def motion(self, sample: int, displacement: Floats, velocity: Floats) -> None:
+        """Keep displacement [m] and velocity [m/s] (probes, 3) at one sample."""
+        self.trajectory.displacement[sample] = displacement
+        self.trajectory.velocity[sample] = velocity
+
+    def field(self, sample: int, u: Floats) -> None:
+        """Keep the field if the sample is one of the frames."""
+        for i, frame in enumerate(self.observation.frames):  # the peak may be the last sample too
+            if frame == sample:
+                self.trajectory.volume_field[i] = at_points(self.in_volume, u)
+                self.trajectory.surface_field[i] = at_points(self.on_surface, u)
+                self.strain = max(self.strain, largest_strain(self.body, u))

@@ -1,0 +1,75 @@
+"""Stiffness of a body, with or without a pressure of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csc_array
+
+from fem_reference.direct import Solve, factorised
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """The pressure p = lambda div u of mixed elements, by its own shape functions.
+
+    `divergence` [m^2] (pressures, n) and `mass` [m^3] (pressures, pressures) integrate them with
+    div u and with each other; `lame` is lambda [Pa], `shear` the shear modulus [Pa].
+    """
+
+    divergence: csc_array
+    mass: csc_array
+    lame: float
+    shear: float
+
+    def of(self, u: Floats) -> Floats:
+        """Nodal pressures [Pa]."""
+        return self.lame * self._solve_mass(self.divergence @ u)
+
+    @cached_property
+    def _solve_mass(self) -> Solve:
+        return factorised(self.mass)
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """K = matrix + lambda B^T M^-1 B, the second term by the divergence and mass of a pressure.
+
+    `matrix` [N/m] (n, n), symmetric; where there is a pressure, only what the shear modulus and the
+    support do.
+    """
+
+    matrix: csc_array
+    pressure: Pressure | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of displacements."""
+        return int(self.matrix.shape[0])
+
+    @property
+    def unknowns(self) -> int:
+        """Number of displacements and pressures."""
+        return self.size + (0 if self.pressure is None else self.pressure.mass.shape[0])
+
+    def __matmul__(self, u: Floats) -> Floats:
+        found: Floats = self.matrix @ u
+        if self.pressure is None:
+            return found
+        return np.asarray(found + self.pressure.divergence.T @ self.pressure.of(u))
+
+    def system(self, mass: csc_array | None = None, share: float = 1.0) -> csc_array:
+        """Symmetric matrix whose solution has the u of (mass + share K) u = f in its first rows.
+
+        Beside a pressure its last rows are those of the pressure over -share.
+        """
+        block = share * self.matrix if mass is None else mass + share * self.matrix
+        if self.pressure is None:
+            return csc_array(block)
+        B, C = share * self.pressure.divergence, (share / self.pressure.lame) * self.pressure.mass
+        return csc_array(block_array([[block, B.T], [B, -C]], format="csc"))

@@ -1,0 +1,1 @@
+"""Problems with known answers, solved by the reference as a scene is: `liver-study verify`."""

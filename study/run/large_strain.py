@@ -1,0 +1,61 @@
+"""How far a linear reference can be trusted: the same body at large strain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fem_reference import model as fem
+from fem_reference.elasticity import Body
+from fem_reference.hyperelasticity import LawName
+from fem_reference.newton import solve
+from fem_reference.observation import at_points, evaluation
+from fem_reference.solvers import solve_static
+from study.progress import Progress
+from study.run.comparison import relative_l2
+from study.run.outcome import STRAIN_LIMIT, Outcome
+from study.run.posed import Posed
+from study.scene import Scene
+
+
+def compare_large_strain(
+    scene: Scene,
+    posed: Posed,
+    body: Body,
+    outcome: Outcome,
+    record: dict[str, Any],
+    progress: Progress,
+) -> None:
+    """Record what finite strain changes at rest under the full load, where strains are large.
+
+    Linear and hyperelastic solution are taken on the same mesh, so that its error nearly cancels.
+    """
+    law = scene.reference.large_strain
+    if law == "none" or record["largest_strain"] <= STRAIN_LIMIT:
+        return
+    with progress.stage(f"fem: {law}"):
+        found = _difference(scene, posed, body, law)
+    if isinstance(found, str):
+        outcome.notes.append(f"No {law} solution at the peak load: {found}.")
+    else:
+        record["hyperelastic"] = found
+
+
+def _difference(scene: Scene, posed: Posed, body: Body, law: LawName) -> dict[str, Any] | str:
+    """The comparison, or why there is none."""
+    if body.element == "taylor-hood":
+        where = (posed.foundation, posed.tool, "p2", posed.geometry.project)
+        body = fem.build(body.mesh, scene.tissue, *where)
+    try:
+        path = solve(body, scene.tissue, law)
+    except ValueError as error:
+        return str(error)
+    if not path.converged:
+        return f"{path.failure} (reached {100 * path.reached:.0f} % of the load)"
+    state, seen = path.states[-1], evaluation(body, posed.observation.volume_points)
+    linear, finite = (at_points(seen, u) for u in (solve_static(body), state.displacement))
+    return {
+        "law": law,
+        "field_difference": relative_l2(linear, finite, posed.volume_rule.weights),
+        "largest_strain": state.largest_strain,
+        "unknowns": body.unknowns,
+    }

@@ -1,0 +1,385 @@
+"""The reference as the study runs it: methods, meshes for its error, accuracy, refusals."""
+
+import dataclasses
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fem_reference import iterative as module
+from fem_reference import memory
+from fem_reference import model as fem
+from fem_reference import superposition as superposition_module
+from fem_reference.direct import factorised
+from fem_reference.dynamics import Damping
+from fem_reference.elasticity import chosen_element, discretise
+from fem_reference.iterative import iterative, rigid_motions
+from fem_reference.observation import at_points, evaluation
+from fem_reference.solvers import solve_static
+from fem_reference.subspace import eigenvectors, empty, extended, superposition
+from study.mesh.tetrahedra import volumes
+from study.organ.block import block_mesh
+from study.organ.geometry import build as build_geometry
+from study.progress import Silent
+from study.run import reference
+from study.run.outcome import Outcome
+from study.run.posed import pose
+from study.scene import Organ, Reference, Tissue
+from study.scene_file import SceneError, read_scene
+from tests.test_limits import changed
+
+DAMPING = Damping(mass=40.0, stiffness=4e-3)
+
+
+@pytest.fixture(scope="module")
+def body(small_posed):
+    return discretise(small_posed.geometry.mesh, Tissue(), small_posed.foundation, small_posed.tool)
+
+
+def relative(found, exact):
+    return np.linalg.norm(found - exact) / np.linalg.norm(exact)
+
+
+# --- solvers -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("element", "nu"), [("p1", 0.3), ("p2", 0.45), ("taylor-hood", 0.49), ("taylor-hood", 0.49999)]
+)
+def test_iterations_reach_the_solution_of_the_factors(element, nu, small_posed):
+    tissue = Tissue(poisson_ratio=nu)
+    where = (small_posed.foundation, small_posed.tool)
+    found = discretise(small_posed.geometry.mesh, tissue, *where, element)
+    padding = np.zeros(found.unknowns - found.load.size)
+    whole = np.concatenate([found.load, padding])
+    exact = factorised(found.stiffness.system())(whole)[: found.load.size]
+    assert relative(iterative(found, 1e-11)(found.load), exact) < 1e-8
+    assert relative(found.stiffness @ exact, found.load) < 1e-9
+
+
+@pytest.mark.parametrize(("element", "nu"), [("p2", 0.45), ("taylor-hood", 0.4999)])
+def test_iterations_do_not_grow_as_the_mesh_is_refined(element, nu, small_posed, monkeypatch):
+    counts = []
+    for size in (0.01, 0.005):
+        where = (small_posed.foundation, small_posed.tool, element)
+        one = discretise(block_mesh((0.06, 0.04, 0.03), size), Tissue(poisson_ratio=nu), *where)
+        counts.append(iterations(one, monkeypatch))
+    assert counts[1] < 1.3 * counts[0]
+    if element != "p2":
+        return
+    monkeypatch.setattr(
+        module, "preconditioner", lambda b: lambda r: r / b.stiffness.matrix.diagonal()
+    )
+    assert iterations(one, monkeypatch) > 2 * counts[1]  # negative control
+
+
+def iterations(body, monkeypatch):
+    """Applications of the preconditioner until a residual of 1e-8."""
+    calls, make = [], module.preconditioner
+
+    def counting(of):
+        inner = make(of)
+        return lambda r: (calls.append(1), inner(r))[1]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "preconditioner", counting)
+        iterative(body, 1e-8)(body.load)
+    return len(calls)
+
+
+def test_many_linear_unknowns_go_through_multigrid(body, monkeypatch):
+    direct = solve_static(body)
+    monkeypatch.setattr(module, "FACTORED_BELOW", 0)
+    assert relative(iterative(body, 1e-10)(body.load), direct) < 1e-8
+
+
+def test_rigid_motions_cost_no_energy(body):
+    motions = rigid_motions(body.points)
+    free = body.stiffness.matrix - body.support
+    assert np.abs(free @ motions).max() < 1e-9 * np.abs(free.data).max() * np.abs(motions).max()
+    assert np.linalg.matrix_rank(motions) == 6
+
+
+@pytest.mark.parametrize("method", ["direct", "iterative"])
+def test_a_body_held_at_a_point_only_is_refused_or_solved_never_wrong(method, small_posed):
+    """A foundation so weak that the matrix is singular to rounding."""
+    weak = dataclasses.replace(small_posed.foundation, stiffness=1e-14)
+    found = discretise(small_posed.geometry.mesh, Tissue(), weak, small_posed.tool)
+    with pytest.raises(ValueError, match="support"):
+        solve_static(found) if method == "direct" else iterative(found, 1e-10)(found.load)
+
+
+# --- elements ----------------------------------------------------------------------------------
+
+
+def test_the_element_follows_the_poisson_ratio():
+    assert [chosen_element("auto", nu) for nu in (0.3, 0.48, 0.49)] == ["p2", "p2", "taylor-hood"]
+    assert chosen_element("p1", 0.49) == "p1"
+    with pytest.raises(ValueError, match=r"reference\.element"):
+        chosen_element("hex8", 0.3)
+
+
+def test_linear_elements_lock_and_mixed_ones_do_not(small_posed):
+    where = (small_posed.foundation, small_posed.tool)
+    work = {}
+    for nu in (0.3, 0.4999):
+        for element in ("p1", "p2", "taylor-hood"):
+            mesh = small_posed.geometry.mesh
+            one = discretise(mesh, Tissue(poisson_ratio=nu), *where, element)
+            work[element, nu] = one.load @ solve_static(one)
+    left = {e: work[e, 0.4999] / work[e, 0.3] for e in ("p1", "p2", "taylor-hood")}
+    assert left["p1"] < 0.7 * left["taylor-hood"]
+    assert left["p1"] < left["p2"] < left["taylor-hood"]
+
+
+# --- motion ------------------------------------------------------------------------------------
+
+
+def history(times):
+    """A ramp with kinks that are no multiple of the samples, then a wave."""
+    ramp = np.clip(np.asarray(times) / 0.0731, 0.0, 1.0)
+    return ramp * (1.0 + 0.3 * np.sin(9.0 * np.asarray(times)))
+
+
+@pytest.fixture(scope="module")
+def observation(small_posed):
+    times = np.linspace(0.0, 0.5, 26)
+    return dataclasses.replace(small_posed.observation, times=times, frames=(25, 25))
+
+
+@pytest.fixture(scope="module")
+def stepped(body, observation):
+    """TR-BDF2 with steps so short that their error is far below the others'."""
+    return fem.run(body, DAMPING, history, observation, fem.Method("tr-bdf2", 80))
+
+
+@pytest.mark.parametrize(
+    ("method", "displacement", "velocity"),
+    [
+        (fem.Method("ritz-vectors", 4), 2e-4, 3e-3),
+        (fem.Method("modal", 4, modes=60), 2e-3, 2e-2),
+        (fem.Method("tr-bdf2", 20), 5e-4, 5e-3),
+        (fem.Method("hht-alpha", 40), 2e-3, 2e-2),
+    ],
+    ids=lambda m: getattr(m, "name", ""),
+)
+def test_every_method_finds_the_same_motion(
+    method, displacement, velocity, body, observation, stepped
+):
+    found = fem.run(body, DAMPING, history, observation, method)
+    a, b = found.trajectory, stepped.trajectory
+    assert relative(a.displacement, b.displacement) < displacement
+    assert relative(a.velocity, b.velocity) < velocity
+    assert relative(a.volume_field, b.volume_field) < displacement
+    assert (a.displacement[0] == 0).all()
+    assert (found.superposed is None) == (method.name in fem.STEPPING)
+
+
+def test_a_damping_left_out_is_seen(body, observation, stepped):
+    """Negative control of the above, for either coefficient."""
+    for wrong in (Damping(40.0, 0.0), Damping(0.0, 4e-3)):
+        found = fem.run(body, wrong, history, observation).trajectory
+        assert relative(found.velocity, stepped.trajectory.velocity) > 0.02
+
+
+def test_the_truncation_that_is_stated_is_above_the_true_one(body, observation, monkeypatch):
+    full = fem.run(body, DAMPING, history, observation)
+    monkeypatch.setattr(superposition_module, "TRUNCATION", 0.05)
+    short = fem.run(body, DAMPING, history, observation)
+    a, b = short.superposed, full.superposed
+    assert a.subspace.load.size < b.subspace.load.size
+    true = relative(short.trajectory.velocity[:, 0], full.trajectory.velocity[:, 0])
+    assert true < a.truncation_error < 0.05
+    assert b.truncation_error < 1e-3
+
+
+def test_a_load_held_for_long_ends_at_rest(body, observation):
+    late = dataclasses.replace(observation, times=np.linspace(0.0, 60.0, 26))
+    found = fem.run(body, DAMPING, np.ones_like, late).trajectory
+    rest = at_points(evaluation(body, observation.probes), solve_static(body))
+    assert relative(found.displacement[-1], rest) < 1e-9
+    truncated = fem.run(body, DAMPING, np.ones_like, late, fem.Method("modal", modes=2)).trajectory
+    assert relative(truncated.displacement[-1], rest) < 1e-9  # the static vector is among them
+
+
+def test_modes_are_those_of_the_pencil(body):
+    from scipy.linalg import eigh
+
+    count, solve = 6, factorised(body.stiffness.matrix)
+    K, M = body.stiffness.matrix.toarray(), body.mass.toarray()
+    exact = eigh(K, M, eigvals_only=True, subset_by_index=(0, count - 1))
+    vectors = eigenvectors(body, solve, count)[:, 1:]
+    rates = [(v @ (K @ v)) / (v @ (M @ v)) for v in vectors.T]
+    assert np.sort(rates) == pytest.approx(exact, rel=1e-8)
+
+
+def test_a_mode_under_a_linear_load_is_integrated_exactly(body):
+    """One Ritz vector: u = y v with y'' + c y' + w y = g t has a closed form."""
+    one = extended(body, empty(body.load.size), solve_static(body))
+    w, g = one.stiffness[0, 0], one.load[0]
+    c, times = 3.0, np.linspace(0.0, 1.0, 4)
+    y, rate = superposition(one, Damping(c), lambda t: t, times)
+    a = g / w
+    root = np.sqrt(w - c * c / 4)
+    # y = a t - a c / w + e^(-ct/2) (A cos + B sin), at rest at the start.
+    A = a * c / w
+    B = (A * c / 2 - a) / root
+    decay = np.exp(-c * times / 2)
+    wave = A * np.cos(root * times) + B * np.sin(root * times)
+    assert y[:, 0] == pytest.approx(a * times - A + decay * wave, rel=1e-9, abs=1e-12 * a)
+    slope = root * (B * np.cos(root * times) - A * np.sin(root * times)) - c / 2 * wave
+    assert rate[:, 0] == pytest.approx(a + decay * slope, rel=1e-8, abs=1e-9 * a)
+
+
+def test_an_unknown_method_is_refused(body, observation):
+    with pytest.raises(ValueError, match="ritz-vectors, modal"):
+        fem.run(body, DAMPING, history, observation, fem.Method("newmark"))
+
+
+# --- memory ------------------------------------------------------------------------------------
+
+
+def test_a_body_that_memory_cannot_hold_is_refused_with_what_fits(monkeypatch):
+    mesh = block_mesh((0.1, 0.08, 0.06), 0.005)
+    monkeypatch.setattr(memory, "available", lambda: 2e8)
+    with pytest.raises(ValueError, match=r"GiB.*reference\.element_size") as refusal:
+        memory.refuse_too_large(mesh, Tissue(), "auto", stepping=False)
+    (factor,) = re.findall(r"element_size ([\d.]+) times", str(refusal.value))
+    fits = block_mesh((0.1, 0.08, 0.06), 0.005 * float(factor) * 1.2)
+    memory.refuse_too_large(fits, Tissue(), "auto", stepping=False)
+    with pytest.raises(ValueError, match="ritz-vectors needs far less"):
+        memory.refuse_too_large(fits, Tissue(), "auto", stepping=True)
+
+
+@pytest.mark.parametrize("element", ["p1", "p2", "taylor-hood"])
+def test_the_unknowns_expected_are_those_that_come(element, small_posed):
+    mesh = block_mesh((0.06, 0.04, 0.03), 0.006)
+    found = discretise(mesh, Tissue(), small_posed.foundation, small_posed.tool, element)
+    assert memory.unknowns(mesh, element) == found.unknowns
+
+
+# --- meshes and the error that they show -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "organ", [Organ(shape="block"), Organ(shape="liver")], ids=["block", "liver"]
+)
+def test_levels_are_one_organ_ever_finer(organ):
+    geometry = build_geometry(organ, 0.03)
+    levels = [geometry.level(k) for k in range(-2, 3)]
+    assert geometry.mesh is levels[2].mesh
+    for coarse, fine in pairwise(levels):
+        assert fine.size < coarse.size
+        growth = len(fine.mesh.tetrahedra) / len(coarse.mesh.tetrahedra)
+        assert growth == pytest.approx((coarse.size / fine.size) ** 3, rel=0.25)
+    exact = volumes(levels[-1].mesh).sum()
+    assert abs(volumes(levels[0].mesh).sum() / exact - 1) < 0.2
+    far = next(k for k in range(3, 40) if geometry.level(k) is None)
+    assert far < 20  # a limit, before memory ends
+
+
+def with_reference(scene, **keys):
+    points = {"tool": scene.control_points["tool"]}
+    changes = {"models": ("fem",), "control_points": points}
+    return dataclasses.replace(changed(scene, reference=keys), **changes)
+
+
+def run(scene):
+    posed, outcome = pose(scene), Outcome()
+    reference.run_reference(scene, posed, outcome, Silent())
+    return outcome.models[0], outcome
+
+
+def test_an_accuracy_is_reached_by_finer_meshes_and_the_finest_is_the_reference(small_scene):
+    first, _ = run(with_reference(small_scene))
+    wanted = 0.8 * first["mesh_error"]["displacement"]
+    second, outcome = run(with_reference(small_scene, accuracy=wanted))
+    assert second["mesh_error"]["displacement"] <= wanted
+    assert second["unknowns"] > first["unknowns"]
+    assert len(second["mesh_levels"]) > len(first["mesh_levels"]) == 3
+    assert second["mesh_levels"][-1]["unknowns"] == second["unknowns"]
+    assert not any("accuracy" in note for note in outcome.notes)
+
+
+def test_an_accuracy_out_of_reach_is_said(small_scene, monkeypatch):
+    monkeypatch.setattr(reference, "FINER", 1)
+    record, outcome = run(with_reference(small_scene, accuracy=1e-4))
+    assert len(record["mesh_levels"]) == 4
+    assert any("the finest mesh reaches" in note for note in outcome.notes)
+
+
+def test_the_stated_error_holds_against_a_much_finer_mesh(small_scene, monkeypatch):
+    """An estimate with a safety factor: at least 0.8 of the true error, at every control point."""
+    record, outcome = run(with_reference(small_scene))
+    monkeypatch.setattr(reference, "COARSER", 0)
+    _, fine = run(with_reference(small_scene, element_size=0.005))
+    a, b = (one.runs["fem"].displacement for one in (outcome, fine))
+    for i, stated in enumerate(record["mesh_error_by_probe"].values()):
+        true = relative(a[:, i], b[:, i])
+        assert stated["displacement"] > 0.8 * true
+        assert stated["displacement"] < 20 * true
+
+
+def test_a_strained_reference_is_compared_with_a_hyperelastic_solid(small_scene):
+    pressed = changed(small_scene, tool={"force": 1.0})
+    record, _ = run(with_reference(pressed))
+    assert record["largest_strain"] > 0.05
+    assert record["hyperelastic"]["law"] == "neo-hookean"
+    assert 0.005 < record["hyperelastic"]["field_difference"] < 0.3
+    without, _ = run(with_reference(pressed, large_strain="none"))
+    gentle, _ = run(with_reference(small_scene))
+    assert "hyperelastic" not in without
+    assert "hyperelastic" not in gentle
+
+
+def test_a_hyperelastic_solid_that_gives_way_is_a_note_and_no_number(small_scene):
+    crushed = changed(small_scene, tool={"force": 20.0})
+    record, outcome = run(with_reference(crushed, large_strain="st-venant-kirchhoff"))
+    assert "hyperelastic" not in record
+    assert any("No st-venant-kirchhoff solution" in note for note in outcome.notes)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("reference.element=hex8", "reference.element"),
+        ("reference.method=euler", "reference.method"),
+        ("reference.accuracy=0", "reference.accuracy"),
+        ("reference.accuracy=2", "reference.accuracy"),
+        ("reference.large_strain=mooney", "reference.large_strain"),
+        ("tissue.poisson_ratio=0.5", "tissue.poisson_ratio"),
+    ],
+)
+def test_bad_keys_are_named(keys, message):
+    with pytest.raises(SceneError, match=re.escape(message)):
+        read_scene("block", [keys])
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.49999])
+def test_the_ends_of_the_poisson_ratio_give_numbers_with_errors(small_scene, nu):
+    tissue = dataclasses.replace(small_scene.tissue, poisson_ratio=nu)
+    record, outcome = run(with_reference(dataclasses.replace(small_scene, tissue=tissue)))
+    assert record["element"] == ("p2" if nu == 0 else "taylor-hood")
+    assert np.isfinite(outcome.runs["fem"].displacement).all()
+    assert record["mesh_error"]["field_peak"] < 0.2
+
+
+def test_results_carry_the_error_and_what_it_came_from(small_results):
+    record = small_results.numbers["models"][0]
+    assert record["name"] == "fem"
+    assert [level["size"] for level in record["mesh_levels"]] == pytest.approx([2.0, 4 / 3, 1.0])
+    assert record["mesh_order"].keys() == {"field_peak"}
+    assert record["mesh_order_by_probe"].keys() == record["mesh_error_by_probe"].keys()
+    assert record["truncation_error"] < 0.01
+
+
+def test_scene_and_study_agree_on_what_there_is():
+    """The scene's names are those of the reference."""
+    from typing import get_args
+
+    from study.scene import ElementName, MethodName
+
+    assert set(get_args(MethodName)) == set(fem.METHODS)
+    assert set(get_args(ElementName)) == {"auto", "p1", "p2", "taylor-hood"}
+    assert Reference().method == fem.Method().name
