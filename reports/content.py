@@ -5,14 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from reports import fuzzy_tables, summary, tables
-from reports.digits import fixed, percent, short, words
+from reports.beforehand import beforehand
+from reports.differences import own_error, resolved
+from reports.digits import fixed, short, words
 from reports.motion_figures import shown_probes
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
+from reports.reference import is_built_in_liver, reference
 from reports.rule_view import view_names
+from reports.verification import verification
 from study.results import Results
 
-SCENE_COLUMNS = 3
+SCENE_COLUMNS = 4
 
 
 def document(results: Results) -> dict[str, Any]:
@@ -25,7 +29,8 @@ def document(results: Results) -> dict[str, Any]:
         "glance": summary.glance(results),
         "summary": summary.sentences(results),
         "has_reference": any(record["name"] == "fem" for record in numbers["models"]),
-        "is_built_in_liver": _is_built_in_liver(numbers["scene"]),
+        "has_own_error": own_error(results) is not None,
+        "is_built_in_liver": is_built_in_liver(numbers["scene"]),
         "scene": tables.balanced(_scene(results), SCENE_COLUMNS),
         "estimates": tables.estimate_rows(results),
         "stiffness_sets": fuzzy_tables.set_rows(results),
@@ -44,13 +49,16 @@ def document(results: Results) -> dict[str, Any]:
         "paper_spread": fixed(TABLE_III_SPREAD, 4),
         "formulas": tables.formula_rows(),
         "errors": tables.error_rows(results),
-        "limits": _limits(numbers.get("lattice_limits")),
+        "limits": _limits(results),
         "models": tables.model_rows(results),
         "numerics": tables.numerics_rows(results),
+        "reference": reference(results),
         "checks": tables.check_rows(results),
         "assumptions": [words(text) for text in numbers["assumptions"]],
         "notes": [words(text) for text in numbers["notes"]],
         "provenance": tables.provenance_rows(results),
+        "beforehand": beforehand(results),
+        "verification": verification(results),
     }
 
 
@@ -61,20 +69,17 @@ def _scene(results: Results) -> list[dict[str, Any]]:
     return tables.scene_groups(results) + derived
 
 
-def _is_built_in_liver(scene: dict[str, Any]) -> bool:
-    organ = scene.get("organ", {})
-    return organ.get("shape") == "liver" and organ.get("mesh") is None
-
-
-def _limits(found: dict[str, float] | None) -> dict[str, str] | None:
+def _limits(results: Results) -> dict[str, str] | None:
     """What the spring lattice cannot do, printed."""
+    found = results.numbers.get("lattice_limits")
     if not found:
         return None
+    error = own_error(results)
     return {
         "spacing": f"{fixed(1e3 * found['spacing_m'], 1)} mm",
         "poisson_ratio": f"{found['poisson_ratio']:g}",
-        "at_quarter": percent(found["relative_l2_at_quarter"]),
-        "whole": percent(found["relative_l2"]),
+        "at_quarter": resolved(found["relative_l2_at_quarter"], error),
+        "whole": resolved(found["relative_l2"], error),
         "factor": fixed(found["best_factor"], 3),
-        "left": percent(found["relative_l2_at_best_factor"]),
+        "left": resolved(found["relative_l2_at_best_factor"], error),
     }

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from reports import canvas
 from reports.appearance import look
-from reports.digits import fixed
-from reports.summary import field_errors
+from reports.differences import field_errors, own_error, resolved
 from study.results import Results
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BAR_HEIGHT = 0.19
 FRAME_HEIGHT = 0.55
+OWN_ERROR_COLOUR = "#eeeeee"
 LIMIT_COLOURS = ("#bbbbbb", "#888888", "#555555")
 
 Bar = tuple[str, float, float | None, str]
@@ -41,24 +46,37 @@ def bars(results: Results) -> list[Bar]:
 
 def difference_figure(results: Results) -> bytes | None:
     """Bars of the relative L2 difference in per cent, or None if nothing was compared."""
-    found = bars(results)
+    found, error = bars(results), own_error(results)
     if not found:
         return None
     with canvas.style():
         figure = canvas.sheet(FRAME_HEIGHT + BAR_HEIGHT * len(found))
         axes = figure.subplots()
-        for i, (_, whole, left, colour) in enumerate(found):
-            axes.barh(i, 100 * whole, height=0.62, color=colour, alpha=0.8)
-            text = f"{fixed(100 * whole, 1)} %"
-            if left is not None:
-                axes.plot([100 * left] * 2, [i - 0.31, i + 0.31], color="black", linewidth=1.6)
-                text += f"   (at best factor {fixed(100 * left, 1)} %)"
-            axes.annotate(
-                text, (100 * whole, i), (4, 0), textcoords="offset points", va="center", fontsize=7
-            )
+        if error is not None:
+            axes.axvspan(0.0, 100 * error, color=OWN_ERROR_COLOUR, linewidth=0, zorder=0.5)
+            axes.axvline(100 * error, color="black", linewidth=0.6, linestyle=":", zorder=0.6)
+        for i, bar in enumerate(found):
+            _draw(axes, i, bar, error)
         axes.set_yticks(range(len(found)), [bar[0] for bar in found])
         axes.invert_yaxis()
         axes.set(xlabel="relative L2 difference from the finite elements [%]")
         axes.set_xlim(0.0, 1.45 * 100 * max(bar[1] for bar in found))
         axes.grid(visible=False, axis="y")
         return canvas.svg(figure)
+
+
+def _draw(axes: Axes, i: int, bar: Bar, error: float | None) -> None:
+    _, whole, left, colour = bar
+    axes.barh(i, 100 * whole, height=0.62, color=colour, alpha=0.8)
+    if left is not None:
+        axes.plot([100 * left] * 2, [i - 0.31, i + 0.31], color="black", linewidth=1.6)
+    end = 100 * max(whole, error or 0.0)
+    place: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 7}
+    axes.annotate(label(bar, error), (end, i), (4, 0), **place)
+
+
+def label(bar: Bar, error: float | None) -> str:
+    """What stands beside a bar, where `error` is that of the finite elements."""
+    _, whole, left, _ = bar
+    best = "" if left is None else f"   (at best factor {resolved(left, error)})"
+    return resolved(whole, error) + best

@@ -43,6 +43,19 @@ def percent(share: float, digits: int = 3) -> str:
     return f"{fixed(value, 1) if abs(value) >= 0.1 ** (digits - 2) else significant(value, 2)} %"
 
 
+def with_error(value: float, error: float) -> str:
+    """A number and its estimated error, to the first digit of the error: "12.3 ± 0.1"."""
+    if error == 0.0:
+        return significant(value)
+    decimals = max(0, -int(f"{_finite(error):.0e}".split("e")[1]))
+    return f"{fixed(value, decimals)} ± {fixed(error, decimals)}"
+
+
+def count(value: int) -> str:
+    """A count in groups of three digits."""
+    return f"{value:,}".replace(",", "\u202f")
+
+
 def spread(values: list[str]) -> str:
     """The first and the last of some printed numbers: "a to b", or one if they print alike."""
     first, last = values[0], values[-1]

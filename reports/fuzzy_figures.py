@@ -20,14 +20,15 @@ Floats = NDArray[np.float64]
 
 KILO = 1e-3
 SET_LOOKS: tuple[tuple[str, Any], ...] = (
-    ("#009E73", (0, (5, 1, 1, 1))),
+    ("#999933", (0, (5, 1, 1, 1))),
     ("#0072B2", "-"),
     ("#E69F00", (0, (4, 1.2))),
-    ("#882255", (0, (1.2, 1))),
+    ("#4D4D4D", (0, (1.2, 1))),
 )
+"""From mild to severe; none of the colours is that of a system, which share the output's panel."""
 SET_NAMES = {"F1": 0, "F2": 1, "F3": 2, "F4": 3, "mild": 1, "moderate": 2, "severe": 3}
 """Look of a stage in every panel; an output set has that of the stage it starts with."""
-SURFACE_HEIGHT = 3.7
+SURFACE_HEIGHT = 3.3
 PANEL_HEIGHT = 1.6
 TICKS = 4
 COLUMNS = 3

@@ -82,6 +82,7 @@ def verdicts(results: Results, reference: str, probe: str) -> Iterator[Verdict]:
         compared = [records.get(model, {}) for model in (reference, best, runner_up)]
         parts = [_step_error(record, probe, column[0]) for record in compared]
         parts.append(_mesh_error(compared[0], probe, column[0]))
+        parts.append(compared[0].get("truncation_error") or 0.0)  # none without a subspace
         known = [part for part in parts if part is not None]
         yield Verdict(
             reference=reference,

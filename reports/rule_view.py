@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 Arrays = Mapping[str, NDArray[Any]]
 
 PREFIX = "view."
-ROW_HEIGHT = 0.3
-OUTPUT_HEIGHT = 0.85
+ROW_HEIGHT = 0.27
+OUTPUT_HEIGHT = 0.78
 FRAME_HEIGHT = 0.72
 FRAME = {"left": 0.075, "right": 0.985, "wspace": 0.12}
 OUTPUT_COLUMN = 1.3

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from reports.appearance import look, reference_name, system_name, system_of
+from reports.differences import field_errors, own_error, resolved
 from reports.digits import (
     DASH,
     PA_PER_KPA,
@@ -14,6 +15,7 @@ from reports.digits import (
     quantity,
     significant,
     spread,
+    with_error,
     words,
 )
 from reports.fuzzy_tables import sensitivity_sentences
@@ -32,6 +34,8 @@ GLANCE = (
     "status",
 )
 ALWAYS = ("model", "status")
+LAWS = {"neo-hookean": "neo-Hookean", "st-venant-kirchhoff": "Saint Venant-Kirchhoff"}
+MILLI = 1e3
 
 
 def glance(results: Results) -> dict[str, Any]:
@@ -46,20 +50,45 @@ def glance(results: Results) -> dict[str, Any]:
 def _glance_row(results: Results, record: dict[str, Any]) -> list[str]:
     name = record["name"]
     modulus, reference = young_modulus(results, record), _reference_modulus(results)
-    probe = tool_probe(results)
-    largest = peak(results, name, probe) if probe and record["status"] == "finished" else None
     errors = field_errors(results).get((name, "fem"), {})
+    own = own_error(results)
     wall = record.get("wall_s")
     return [
         look(name).label,
         DASH if modulus is None else fixed(modulus / PA_PER_KPA, 2),
         DASH if modulus is None else fixed(modulus / reference, 2),
-        DASH if largest is None else significant(1e3 * largest),
-        _percent(errors.get("field-relative-l2-peak")),
-        _percent(errors.get("field-relative-l2-peak-at-best-factor")),
+        _peak_at_tool(results, record),
+        _own(own) if name == "fem" else _difference(errors.get("field-relative-l2-peak"), own),
+        _difference(errors.get("field-relative-l2-peak-at-best-factor"), own),
         DASH if not wall else significant(record["simulated_s"] / wall, 2),
         status(record),
     ]
+
+
+def _peak_at_tool(results: Results, record: dict[str, Any]) -> str:
+    probe = tool_probe(results)
+    if probe is None or record["status"] != "finished":
+        return DASH
+    return printed_peak(results, record, probe)
+
+
+def printed_peak(results: Results, record: dict[str, Any], probe: str) -> str:
+    """Largest displacement [mm] at a probe, with the error of that curve by the mesh if known."""
+    largest = peak(results, record["name"], probe)
+    if largest is None:
+        return DASH
+    there = record.get("mesh_error_by_probe", {}).get(probe)
+    if not there:
+        return significant(MILLI * largest)
+    return with_error(MILLI * largest, MILLI * largest * there["displacement"])
+
+
+def _own(error: float | None) -> str:
+    return DASH if error is None else f"± {percent(error)}"
+
+
+def _difference(share: float | None, error: float | None) -> str:
+    return DASH if share is None else resolved(share, error)
 
 
 def young_modulus(results: Results, record: dict[str, Any]) -> float | None:
@@ -78,14 +107,6 @@ def status(record: dict[str, Any]) -> str:
         return str(record["status"])
     when = record.get("diverged_at_s")
     return "diverged" if when is None else f"diverged at {significant(when)} s"
-
-
-def field_errors(results: Results) -> dict[tuple[str, str], dict[str, float]]:
-    """Differences of the whole field by (model, reference) and quantity."""
-    found: dict[tuple[str, str], dict[str, float]] = {}
-    for model, reference, name, value in results.tables["errors"]:
-        found.setdefault((str(model), str(reference)), {})[str(name)] = float(value)
-    return found
 
 
 def sentences(results: Results) -> list[str]:
@@ -131,7 +152,8 @@ def _fields(results: Results) -> Iterator[str]:
     }
     if found:
         ranked = sorted(found, key=lambda model: found[model])
-        parts = [f"{look(model).label} {percent(found[model])}" for model in ranked]
+        error = own_error(results)
+        parts = [f"{look(model).label} {resolved(found[model], error)}" for model in ranked]
         yield (
             "Field: at peak load the displacement over the whole organ differs from that of the "
             f"finite elements by, in relative L2, {', '.join(parts)}."
@@ -141,19 +163,24 @@ def _fields(results: Results) -> Iterator[str]:
 def _limits(results: Results) -> Iterator[str]:
     limits = results.numbers.get("lattice_limits")
     if limits:
+        places = {
+            "relative_l2": f"at Poisson ratio {limits['poisson_ratio']:g}",
+            "relative_l2_at_best_factor": "at best factor",
+            "relative_l2_at_quarter": "against Poisson ratio 0.25",
+            "relative_l2_with_volume_term": (
+                "with one volume term per cell, which frees the Poisson ratio"
+            ),
+        }
+        error = own_error(results)
+        parts = [
+            f"{resolved(limits[key], error)} {place}"
+            for key, place in places.items()
+            if limits.get(key) is not None
+        ]
         yield (
-            "Limit of the springs: at rest and with the exact modulus the lattice still differs by "
-            f"{percent(limits['relative_l2'])} at Poisson ratio {limits['poisson_ratio']:g}; the "
-            f"best factor leaves {percent(limits['relative_l2_at_best_factor'])}. Against "
-            f"Poisson ratio 0.25 it is {percent(limits['relative_l2_at_quarter'])}."
-            f"{_with_volume_term(limits.get('relative_l2_with_volume_term'))}"
+            "Limit of the springs: at rest and with the exact modulus the lattice's field still "
+            f"differs, in relative L2: {', '.join(parts)}."
         )
-
-
-def _with_volume_term(left: float | None) -> str:
-    if left is None:
-        return ""
-    return f" One volume term per cell, which frees the Poisson ratio, leaves {percent(left)}."
 
 
 def _rankings(results: Results) -> Iterator[str]:
@@ -190,7 +217,10 @@ def _elsewhere(results: Results, reference: str, probe: str) -> str:
         return ""
     ranked = sorted(dict.fromkeys(leaders), key=lambda model: -leaders.count(model))
     parts = [f"{look(model).label} {leaders.count(model)}" for model in ranked]
-    return f" Highest at the other control points, of {len(found)} scores: {', '.join(parts)}."
+    return (
+        f" Highest at the other control points, of {len(found)} scores: {', '.join(parts)}. "
+        f"{_resolution(found)}"
+    )
 
 
 def _resolution(found: list[Verdict]) -> str:
@@ -214,10 +244,13 @@ def _reference(results: Results) -> Iterator[str]:
         return
     error = record.get("mesh_error")
     if error:
+        meshes = record.get("mesh_levels")
+        source = f" from {min(len(meshes), 3)} meshes" if meshes else ""
         yield (
-            f"Reference: its own discretisation error is estimated at "
-            f"{percent(error['field_peak'])} of the field at the peak and, where it is largest, "
-            f"{_of_curves(error)}{_at_tool(results, record)}."
+            f"Reference: its own discretisation error is estimated{source} at "
+            f"{percent(error['field_peak'])} of the field at the peak and at most "
+            f"{percent(error['displacement'])} of a displacement and {percent(error['velocity'])} "
+            f"of a velocity curve{_at_tool(results, record)}."
         )
     else:
         yield "Reference: its discretisation error is not estimated."
@@ -227,24 +260,32 @@ def _reference(results: Results) -> Iterator[str]:
         side = "below" if strain < limit else "not below"
         yield (
             f"Its largest strain is {percent(strain)}, {side} the {percent(limit)} up to "
-            "which linear strain is trusted here."
+            f"which linear strain is trusted here.{_beyond(record, strain, limit)}"
         )
 
 
-def _of_curves(error: dict[str, float]) -> str:
-    displacement, velocity = percent(error["displacement"]), percent(error["velocity"])
-    return f"{displacement} of a displacement and {velocity} of a velocity curve"
+def _beyond(record: dict[str, Any], strain: float, limit: float) -> str:
+    """What large deformation changes where linear strain is not trusted, if it was computed."""
+    found = record.get("hyperelastic")
+    if not found or strain <= limit:
+        return ""
+    law = LAWS.get(found["law"], found["law"])
+    return (
+        f" A {law} solid on the same mesh moves otherwise by {percent(found['field_difference'])} "
+        f"of the field at the peak (relative L2; largest logarithmic strain "
+        f"{percent(found['largest_strain'])}): so much of a difference from the linear reference "
+        "may be large deformation, which that leaves out."
+    )
 
 
 def _at_tool(results: Results, record: dict[str, Any]) -> str:
     probe = tool_probe(results)
     there = record.get("mesh_error_by_probe", {}).get(probe)
-    return f"; at control point {words(str(probe))}, {_of_curves(there)}" if there else ""
+    if not there:
+        return ""
+    shares = f"{percent(there['displacement'])} and {percent(there['velocity'])}"
+    return f" ({shares} at control point {words(str(probe))})"
 
 
 def _reference_modulus(results: Results) -> float:
     return float(results.numbers["scene"]["tissue"]["youngs_modulus"].split()[0])
-
-
-def _percent(share: float | None) -> str:
-    return DASH if share is None else percent(share)

@@ -7,8 +7,19 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
 
-from reports.appearance import look, reference_name, system_name, system_of
-from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, quantity, significant, words
+from reports.appearance import look, reference_name, system_name
+from reports.differences import field_errors, own_error, resolved
+from reports.digits import (
+    DASH,
+    PA_PER_KPA,
+    Table,
+    count,
+    fixed,
+    percent,
+    quantity,
+    significant,
+    words,
+)
 from reports.paper import TABLE_III
 from reports.ranking import (
     Column,
@@ -19,12 +30,15 @@ from reports.ranking import (
     tool_probe,
     verdicts,
 )
-from reports.summary import field_errors, status
+from reports.summary import status
 from study.results import Results
 from study.similarity.score import FORMULAS
 
 BEST = "*"
-"""Marks the highest score of the fuzzy systems in a column; the template prints it bold."""
+"""Marks the highest score of the fuzzy systems in a column if its lead is resolved.
+
+The template prints it bold.
+"""
 MEASURE_NAMES = {
     "relative-l2": "relative L2",
     "iso-18571": "ISO 18571",
@@ -44,6 +58,8 @@ DIMENSIONLESS: dict[str, tuple[str, Callable[[float], str]]] = {
 }
 HEADING_ROWS = 2
 """Height of a group's name in rows."""
+KEY, VALUE = 20, 14
+"""Characters that fit on a line of a column of the scene."""
 LEFT_OUT = ("title", "renders")
 FIELD_QUANTITIES = (
     "field-relative-l2-peak",
@@ -51,6 +67,10 @@ FIELD_QUANTITIES = (
     "field-l2-final-over-peak",
     "field-relative-l2-peak-at-best-factor",
 )
+ROUNDING = 1e-8
+"""Share below which an error is that of floating point."""
+AT_PEAK = ("field-relative-l2-peak", "field-relative-l2-peak-at-best-factor")
+"""What the error of the reference's field at the peak may hide."""
 
 
 def estimate_rows(results: Results) -> Table:
@@ -89,14 +109,30 @@ def scene_groups(results: Results) -> list[dict[str, Any]]:
 
 
 def balanced(groups: list[dict[str, Any]], count: int) -> list[list[dict[str, Any]]]:
-    """Groups in order in so many columns of about the same height."""
-    heights = [len(group["rows"]) + HEADING_ROWS for group in groups]
-    middles = [sum(heights[:i]) + 0.5 * height for i, height in enumerate(heights)]
-    places = [int(count * middle / max(sum(heights), 1)) for middle in middles]
-    return [
-        [group for group, place in zip(groups, places, strict=True) if place == column]
-        for column in range(count)
-    ]
+    """Groups in order in so many columns, the tallest of which is as low as can be."""
+    whole = sum(_height(group) for group in groups)
+    limits = range(max(map(_height, groups), default=0), whole + 1)
+    columns = next(c for limit in limits if len(c := _filled(groups, limit)) <= count)
+    return columns + [[]] * (count - len(columns))
+
+
+def _filled(groups: list[dict[str, Any]], limit: int) -> list[list[dict[str, Any]]]:
+    """Columns of groups up to a height, one after the other."""
+    columns: list[list[dict[str, Any]]] = []
+    left = 0
+    for group in groups:
+        if _height(group) > left:
+            columns.append([])
+            left = limit
+        columns[-1].append(group)
+        left -= _height(group)
+    return columns
+
+
+def _height(group: dict[str, Any]) -> int:
+    """Lines that a group takes, about."""
+    rows = (max(-(-len(key) // KEY), -(-len(value) // VALUE)) for key, value in group["rows"])
+    return HEADING_ROWS + sum(rows)
 
 
 def _is_value(value: Any) -> bool:
@@ -145,24 +181,21 @@ def similarity_tables(results: Results) -> list[dict[str, Any]]:
 def _score_groups(
     results: Results, reference: str, heads: list[Column]
 ) -> Iterator[dict[str, Any]]:
+    """Scores by control point; a highest one bears a mark where its lead is resolved."""
     for probe in results.numbers["probes"]:
         scores = score_table(results, reference, probe)
-        rows = [[look(model).label, *_best_marked(scores, model, heads)] for model in scores]
+        found = verdicts(results, reference, probe)
+        winners = {(v.best, v.column) for v in found if v.is_resolved}
+        rows = [
+            [look(model).label, *(_score(row.get(h), is_best=(model, h) in winners) for h in heads)]
+            for model, row in scores.items()
+        ]
         if rows:
             yield {"probe": words(probe), "rows": rows}
 
 
-def _best_marked(
-    scores: dict[str, dict[Column, float]], model: str, heads: list[Column]
-) -> list[str]:
-    """Scores of a model; one above all other fuzzy systems in its column bears a mark."""
-    others = [row for name, row in scores.items() if system_of(name) and name != model]
-    cells = []
-    for head in heads:
-        value, rivals = scores[model].get(head), [row[head] for row in others if head in row]
-        is_best = value is not None and system_of(model) and rivals and value > max(rivals)
-        cells.append(DASH if value is None else fixed(value, 4) + (BEST if is_best else ""))
-    return cells
+def _score(value: float | None, *, is_best: bool) -> str:
+    return DASH if value is None else fixed(value, 4) + (BEST if is_best else "")
 
 
 def verdict_rows(results: Results) -> Table:
@@ -223,11 +256,16 @@ def error_rows(results: Results) -> Table:
         [
             look(reference).label,
             look(model).label,
-            *(percent(values[name]) for name in FIELD_QUANTITIES),
+            *_differences(values, own_error(results, reference)),
             fixed(values["field-best-factor-peak"], 3),
         ]
         for (model, reference), values in field_errors(results).items()
     ]
+
+
+def _differences(values: dict[str, float], error: float | None) -> Iterator[str]:
+    for name in FIELD_QUANTITIES:
+        yield resolved(values[name], error if name in AT_PEAK else None)
 
 
 def model_rows(results: Results) -> Table:
@@ -254,8 +292,8 @@ def _model_row(record: dict[str, Any]) -> list[str]:
     ]
 
 
-def _integer(count: int | None) -> str:
-    return DASH if count is None else f"{count:,}".replace(",", "\u202f")
+def _integer(number: int | None) -> str:
+    return DASH if number is None else count(number)
 
 
 def numerics_rows(results: Results) -> Table:
@@ -269,8 +307,12 @@ def _numerics_row(record: dict[str, Any]) -> list[str]:
     shares = [record.get("time_step_error"), record.get("time_step_error_velocity")]
     shares += [mesh.get(name) for name in ("displacement", "velocity", "field_peak")]
     shares.append(record.get("largest_strain", record.get("largest_spring_strain")))
-    cells = [DASH if share is None else percent(share) for share in shares]
+    cells = [DASH if share is None else _share(share) for share in shares]
     return [look(record["name"]).label, *cells, _integer(record.get("inverted_cells"))]
+
+
+def _share(share: float) -> str:
+    return percent(share) if share == 0.0 or share >= ROUNDING else f"< {percent(ROUNDING)}"
 
 
 def check_rows(results: Results) -> Table:

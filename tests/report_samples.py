@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
+import typst
 
+from reports import report
+from reports.content import document
 from study.results import Results, Row
 from study.similarity.score import MEASURES
 
@@ -16,6 +23,29 @@ SOFTNESS = dict(zip(MODELS, (1.0, 2.0, 0.70, 0.80, 0.69), strict=True))
 ESTIMATES = {"mamdani": 13.9e3, "sugeno": 12e3, "interval-type-2": 14e3}
 PROBES = ["tool", "far"]
 SAMPLES = 20
+# The record of a reference whose error is known by three meshes; `_record` has that of older runs.
+THREE_MESHES: dict[str, Any] = {
+    "element": "p2",
+    "unknowns": 7803,
+    "method": "ritz-vectors",
+    "subspace_vectors": 57,
+    "truncation_error": 0.0004,
+    "mesh_levels": [
+        {"size": 2.0, "elements": 100, "unknowns": 1215, "wall_s": 0.9},
+        {"size": 1.5, "elements": 300, "unknowns": 3549, "wall_s": 1.3},
+        {"size": 1.0, "elements": 800, "unknowns": 7803, "wall_s": 3.5},
+    ],
+    "mesh_error_by_probe": {
+        "tool": {"displacement": 0.01, "velocity": 0.012},
+        "far": {"displacement": 0.02, "velocity": 0.05},
+    },
+    "mesh_order": {"field_peak": 1.6},
+    "mesh_order_by_probe": {
+        "tool": {"displacement": 0.8, "velocity": 3.4},
+        "far": {"displacement": 2.5, "velocity": None},
+    },
+}
+TEXT = re.compile(r'"text": ?("(?:[^"\\]|\\.)*")')
 POINTS = 0.05 * np.array(
     [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
 )
@@ -37,6 +67,33 @@ def results_of(
     }
     arrays = {"fields": _fields(models, len(probes)), "fuzzy": _fuzzy_arrays()}
     return Results("", _numbers(models, probes, title), tables, arrays)
+
+
+def with_meshes(models: list[str] | None = None, **changes: Any) -> Results:
+    """Results whose reference has three meshes, with some of its record changed."""
+    results = results_of(models)
+    results.numbers["models"][0] |= THREE_MESHES | changes
+    return results
+
+
+def bare(results: Results | None = None) -> dict[str, Any]:
+    """Content of a report without figures."""
+    results = replace(results or results_of(), arrays={})
+    results.numbers.pop("lattice_limits", None)  # the text on them refers to a figure
+    return document(results) | {"drawing": None}
+
+
+def printed(content: dict[str, Any]) -> list[str]:
+    """Every text in the figures and strong words of the document that typst lays out."""
+
+    def query(path: str, *, root: str, ignore_system_fonts: bool) -> bytes:
+        given: Any = {"root": root, "ignore_system_fonts": ignore_system_fonts}
+        return "".join(typst.query(path, kind, **given) for kind in ("figure", "strong")).encode()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typst, "compile", query)
+        text = report.compile_pdf(content, {"motion": []}).decode()
+    return [json.loads(piece) for piece in TEXT.findall(text)]
 
 
 def _numbers(models: list[str], probes: list[str], title: str) -> dict[str, Any]:

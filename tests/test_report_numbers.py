@@ -7,12 +7,33 @@ from dataclasses import replace
 
 import pytest
 
-from reports.digits import fixed, percent, quantity, short, significant, spread, words
+from reports.appearance import LOOKS
+from reports.content import document
+from reports.difference_figure import bars, label
+from reports.digits import (
+    count,
+    fixed,
+    percent,
+    quantity,
+    short,
+    significant,
+    spread,
+    with_error,
+    words,
+)
+from reports.fuzzy_figures import SET_LOOKS
 from reports.motion_figures import peak
 from reports.paper import TABLE_III, TABLE_III_SPREAD
 from reports.ranking import tool_probe, verdicts
 from reports.summary import glance, sentences
-from reports.tables import balanced, formula_rows, paper_rows, similarity_tables, verdict_rows
+from reports.tables import (
+    balanced,
+    error_rows,
+    formula_rows,
+    paper_rows,
+    similarity_tables,
+    verdict_rows,
+)
 from study.similarity.score import FORMULAS
 from tests.report_samples import FUZZY, SOFTNESS, results_of, score_of
 
@@ -59,6 +80,26 @@ def test_percentages(value, text):
 )
 def test_quantities_of_a_scene(text, shown):
     assert quantity(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (12.34, 0.1, "12.3 ± 0.1"),
+        (12.34, 0.0123, "12.34 ± 0.01"),
+        (12.34, 0.096, "12.3 ± 0.1"),  # 0.096 is 0.1 to one digit
+        (0.2, 0.31, "0.2 ± 0.3"),
+        (123.4, 12.0, "123 ± 12"),
+        (-0.5, 0.02, "−0.50 ± 0.02"),
+        (1.234567, 0.0, "1.23"),
+    ],
+)
+def test_a_number_stops_at_the_first_digit_of_its_error(value, error, text):
+    assert with_error(value, error) == text
+
+
+def test_counts_stand_in_groups_of_three_digits():
+    assert count(1234567) == "1\u202f234\u202f567"
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -151,6 +192,98 @@ def test_the_highest_fuzzy_score_of_a_column_is_marked_and_no_other():
     assert not any(cell.endswith("*") for row in rows.values() for cell in row)
 
 
+def test_a_highest_score_whose_lead_is_not_resolved_is_not_marked():
+    """The same scores with a reference that is wrong by 20 % in displacement alone."""
+    results = results_of()
+    results.numbers["models"][0]["mesh_error"]["displacement"] = 0.20
+    table = similarity_tables(results)[0]
+    row = next(row[1:] for row in table["groups"][0]["rows"] if row[0] == "MSM Sugeno")
+    marked = [cell.endswith("*") for cell in row]
+    counts = {curve["name"]: curve["count"] for curve in table["curves"]}
+    velocity = counts["displacement"] + counts["velocity"]
+    assert not any(marked[: counts["displacement"]])
+    assert all(marked[counts["displacement"] : velocity])
+    assert not any(marked[velocity:])  # a loop has the larger error of the two
+
+
+def differences(own: float | None):
+    """What is printed where differences are 0.4, and 0.25 at best factor, if `own` is the error."""
+    results = results_of()
+    record = results.numbers["models"][0]
+    record["mesh_error"] = None if own is None else record["mesh_error"] | {"field_peak": own}
+    return results
+
+
+@pytest.mark.parametrize(
+    ("own", "whole", "at_best"),
+    [
+        (None, "40.0 %", "25.0 %"),
+        (0.03, "40.0 %", "25.0 %"),
+        (0.25, "40.0 %", "25.0 %"),  # resolved: not smaller than the error
+        (0.3, "40.0 %", "not resolved (< 30.0 %)"),
+        (0.41, "not resolved (< 41.0 %)", "not resolved (< 41.0 %)"),
+    ],
+)
+def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own, whole, at_best):
+    results = differences(own)
+    table = glance(results)
+    rows = {row[0]: dict(zip(table["header"], row, strict=True)) for row in table["rows"]}
+    sugeno = rows["MSM Sugeno"]
+    assert (sugeno["field differs from FE"], sugeno["at best factor"]) == (whole, at_best)
+    assert f"MSM Sugeno {whole}" in " ".join(sentences(results))
+    row = next(row for row in error_rows(results) if row[:2] == ["Finite elements", "MSM Sugeno"])
+    assert row[2:] == [whole, "50.0 %", "10.0 %", at_best, "1.300"]
+    bar = next(bar for bar in bars(results) if bar[0] == "MSM Sugeno, at the peak")
+    assert label(bar, own) == f"{whole}   (at best factor {at_best})"
+
+
+def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
+    said = " ".join(sentences(results_of(["fem", *FUZZY])))
+    assert said.count("Of these leads 7 above the numerical error of the curves.") == 2
+    results = results_of(["fem", *FUZZY])
+    results.numbers["models"][0]["mesh_error_by_probe"] = {
+        "far": {"displacement": 0.2, "velocity": 0.2}
+    }
+    said = " ".join(sentences(results))
+    assert said.count("Of these leads 7 above the numerical error of the curves.") == 1
+    assert said.count("Of these leads 7 not resolved.") == 1
+
+
+def test_the_error_of_the_finite_elements_hides_no_difference_from_the_benchmark():
+    row = next(row for row in error_rows(differences(0.41)) if row[0] == "Basafa benchmark")
+    assert row[2] == "40.0 %"
+
+
+def test_the_limits_of_the_springs_are_compared_with_that_error_too():
+    """The samples' lattice differs by 0.05 at Poisson ratio 1/4, by 0.24 at its own."""
+    results = differences(0.06)
+    assert document(results)["limits"]["at_quarter"] == "not resolved (< 6.0 %)"
+    assert document(results)["limits"]["whole"] == "24.0 %"
+    said = " ".join(sentences(results))
+    assert "24.0 % at Poisson ratio 0.45, 23.0 % at best factor" in said
+    assert "not resolved (< 6.0 %) against Poisson ratio 0.25" in said
+    assert "5.0 % against Poisson ratio 0.25" in " ".join(sentences(differences(0.03)))
+
+
+def test_the_reference_shows_its_own_error_in_place_of_a_difference():
+    column = glance(results_of())["header"].index("field differs from FE")
+    assert glance(results_of())["rows"][0][column] == "± 3.0 %"
+    assert glance(differences(None))["rows"][0][column] == "–"
+
+
+def test_a_peak_has_its_error_where_that_is_known_at_the_control_point():
+    """The reference peaks near 1 mm; its curve is wrong by 2 % at the tool."""
+    results = results_of()
+    record = results.numbers["models"][0]
+    column = glance(results)["header"].index("peak at tool [mm]")
+    largest = 1e3 * peak(results, "fem", "tool")
+    assert glance(results)["rows"][0][column] == significant(largest)
+    record["mesh_error_by_probe"] = {"tool": {"displacement": 0.02, "velocity": 0.5}}
+    shown = [row[column] for row in glance(results)["rows"]]
+    assert shown[0] == f"{fixed(largest, 2)} ± 0.02"
+    assert not any("±" in cell for cell in shown[1:])
+
+
 def test_the_tools_control_point_is_the_nearest_not_the_first():
     results = results_of(probes=["far", "near"])
     assert tool_probe(results) == "far"  # the samples put the first one under the tool
@@ -177,6 +310,11 @@ def test_table_iii_stands_beside_the_range_of_all_measures():
     assert pytest.approx(0.0049) == TABLE_III_SPREAD
     assert max(TABLE_III, key=TABLE_III.__getitem__) == "interval-type-2"
     assert SOFTNESS["msm-sugeno"] > SOFTNESS["msm-mamdani"]
+
+
+def test_no_stage_has_the_colour_of_a_model():
+    """The output's panel shows both."""
+    assert not {colour for colour, _ in SET_LOOKS} & {look.colour for look in LOOKS.values()}
 
 
 def test_every_measure_has_its_formula():

@@ -1,0 +1,162 @@
+"""The reference's meshes, method and error are printed as the run recorded them."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from reports import reference as section
+from reports import report
+from reports.content import document
+from reports.digits import fixed
+from reports.ranking import verdicts
+from reports.summary import sentences
+from reports.tables import numerics_rows
+from study.run import convergence
+from study.scene import ElementName, MethodName
+from tests.report_samples import THREE_MESHES, bare, printed, results_of, with_meshes
+
+LEVELS = THREE_MESHES["mesh_levels"]
+
+
+def found(**changes):
+    return section.reference(with_meshes(**changes))
+
+
+def test_each_control_point_has_its_peak_error_and_order():
+    """Orders of 0.8 and 3.4, and none, give way to what the estimate takes in their place."""
+    assert found()["errors"] == [
+        ["tool", "1.00 ± 0.01", "1.0 %", "0.8, 1 taken", "1.2 %", "3.4, 3 taken"],
+        ["far", "1.00 ± 0.02", "2.0 %", "2.5", "5.0 %", "none, 1 taken"],
+        ["whole field at the peak", "–", "3.0 %", "1.6", "–", "–"],
+    ]
+
+
+def test_the_order_of_the_elements_bounds_that_of_the_error():
+    far = found(element="p1")["errors"][1]
+    assert far[3] == "2.5, 2 taken"
+    assert found(element="p1")["formal_order"] == "2"
+
+
+def test_meshes_are_listed_from_coarse_to_fine():
+    assert found()["levels"][0] == ["2.00", "100", "1\u202f215", "0.90"]
+    assert found()["levels"][-1] == ["1.00", "800", "7\u202f803", "3.5"]
+
+
+def test_with_two_meshes_the_order_is_assumed():
+    two = found(mesh_levels=LEVELS[1:])
+    assert (two["formal_order"], two["safety"]) == ("", "3")
+    assert [row[3] for row in two["errors"]] == ["2 assumed"] * 3
+
+
+def test_the_estimate_is_described_as_the_run_makes_it():
+    for name in ("SAFETY", "SAFETY_ASSUMED", "ASSUMED_ORDER", "LEAST_ORDER", "FORMAL_ORDER"):
+        assert getattr(section, name) == getattr(convergence, name)
+
+
+@pytest.mark.parametrize("element", get_args(ElementName)[1:])
+@pytest.mark.parametrize("method", get_args(MethodName))
+def test_element_and_method_are_said_in_words(element, method):
+    stepping = {"subspace_vectors": None, "truncation_error": None}
+    steps = stepping if method in section.STEPPING else {}
+    said = found(element=element, method=method, **steps)["how"]
+    assert section.ELEMENTS[element] in said
+    shown = {
+        "ritz-vectors": "57 load-dependent Ritz vectors",
+        "modal": "56 modes of vibration",
+        "tr-bdf2": "1\u202f000 implicit steps of TR-BDF2, 1.00 ms",
+        "hht-alpha": "implicit steps of HHT-α",
+    }
+    assert shown[method] in said
+    assert ("0.040 %" in said) is (method not in section.STEPPING)
+
+
+@pytest.mark.parametrize(
+    ("element", "organ", "curved"),
+    [
+        ("p2", {"shape": "liver"}, True),
+        ("taylor-hood", {"shape": "liver", "mesh": None}, True),
+        ("p1", {"shape": "liver"}, False),
+        ("p2", {"shape": "block"}, False),
+        ("p2", {"shape": "liver", "mesh": "mine.stl"}, False),
+    ],
+)
+def test_only_quadratic_elements_of_the_built_in_liver_are_said_to_be_curved(
+    element, organ, curved
+):
+    results = with_meshes(element=element)
+    results.numbers["scene"]["organ"] = organ
+    assert ("curved along the organ's surface" in section.reference(results)["how"]) is curved
+
+
+@pytest.mark.parametrize(
+    ("levels", "shown"),
+    [(LEVELS, "the three finest"), (LEVELS[1:], "an assumed order"), (LEVELS[2:], None)],
+)
+def test_the_document_says_how_many_meshes_the_error_comes_from(levels, shown):
+    changes = {} if shown else {"mesh_error": None, "mesh_error_by_probe": {}}
+    content = bare(with_meshes(mesh_levels=levels, **changes))
+    said = " ".join(" ".join(printed(content)).split())
+    assert "Meshes of the reference." in said
+    for text in ("the three finest", "an assumed order"):
+        assert (text in said) is (text == shown)
+    assert report.compile_pdf(content, {"motion": []}).startswith(b"%PDF")
+
+
+def test_an_older_run_has_no_section_of_it():
+    assert document(results_of())["reference"] is None
+    assert "Meshes of the reference." not in " ".join(printed(bare()))
+    assert document(results_of(["basafa"]))["reference"] is None
+
+
+def test_the_first_page_says_how_many_meshes_the_error_comes_from():
+    assert "error is estimated from 3 meshes at 3.0 %" in " ".join(sentences(with_meshes()))
+    assert "error is estimated at 3.0 %" in " ".join(sentences(results_of()))
+
+
+HYPERELASTIC = {
+    "law": "neo-hookean",
+    "field_difference": 0.034,
+    "largest_strain": 0.081,
+    "unknowns": 7803,
+}
+
+
+@pytest.mark.parametrize(
+    ("strain", "record", "said"),
+    [
+        (0.06, {"hyperelastic": HYPERELASTIC}, True),
+        (0.06, {"hyperelastic": None}, False),
+        (0.06, {}, False),
+        (0.05, {"hyperelastic": HYPERELASTIC}, False),  # the limit itself is trusted
+    ],
+)
+def test_large_deformation_is_said_where_linear_strain_is_not_trusted(strain, record, said):
+    text = " ".join(sentences(with_meshes(largest_strain=strain, **record)))
+    whole = "A neo-Hookean solid on the same mesh moves otherwise by 3.4 % of the field at the peak"
+    assert (whole in text) is said
+    assert ("large deformation" in text) is said
+
+
+def test_what_a_subspace_leaves_out_counts_as_numerical_error():
+    curve = next(verdicts(with_meshes(), "fem", "tool"))
+    assert curve.error == pytest.approx(0.01 + 3 * 0.001 + 0.0004)
+    stepped = with_meshes(truncation_error=None)
+    assert next(verdicts(stepped, "fem", "tool")).error == pytest.approx(0.013)
+    assert next(verdicts(stepped, "fem", "tool")).is_whole
+
+
+def test_an_error_of_rounding_is_not_printed_as_a_number():
+    exact = numerics_rows(with_meshes(time_step_error=9.2e-14))[0]
+    assert exact[1] == "< 1.0·10⁻⁶ %"
+    assert numerics_rows(with_meshes(time_step_error=2e-8))[0][1] == "2.0·10⁻⁶ %"
+
+
+def test_a_planted_error_reaches_the_page():
+    """Negative control of what is printed."""
+    planted = {"tool": {"displacement": 0.777, "velocity": 0.012}}
+    content = bare(with_meshes(mesh_error_by_probe=planted))
+    assert "77.7 %" in printed(content)
+    assert "77.7 %" not in printed(bare(with_meshes()))
+    assert fixed(77.7, 1) not in str(found())
