@@ -59,6 +59,10 @@ class Reference:
     largest_strain: float
     superposed: Superposed | None = None
 
+    def rest(self, body: Body) -> Floats:
+        """Displacement [m] (n,) of the body at rest under the full load."""
+        return solve_static(body) if self.superposed is None else self.superposed.subspace.rest()
+
 
 def build(
     mesh: TetrahedralMesh,

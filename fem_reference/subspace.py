@@ -31,6 +31,10 @@ class Subspace:
     stiffness: Floats
     load: Floats
 
+    def rest(self) -> Floats:
+        """Displacement [m] (n,) at rest under the load, exact where it lies in the subspace."""
+        return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, self.load))
+
     def leading(self, size: int) -> Subspace:
         """The subspace of the first vectors."""
         return Subspace(self.vectors[:, :size], self.stiffness[:size, :size], self.load[:size])

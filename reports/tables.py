@@ -54,7 +54,7 @@ DIMENSIONLESS: dict[str, tuple[str, Callable[[float], str]]] = {
     "sag_rho_g_l_over_e": ("sag under own weight, ρ g L / E", significant),
     "tool_pressure_over_e": ("mean tool pressure / E", significant),
     "tool_radius_over_spacing": ("tool radius / lattice spacing", significant),
-    "tool_radius_over_element_size": ("tool radius / element size", significant),
+    "tool_radius_over_element_size": ("tool radius / element size asked", significant),
 }
 HEADING_ROWS = 2
 """Height of a group's name in rows."""

@@ -115,6 +115,8 @@ def _make_report(folder: Path) -> None:
 
 
 def _print_summary(results: Results, folder: Path) -> None:
+    from reports.differences import own_error, resolved
+
     numbers = results.numbers
     for warning in numbers["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
@@ -127,7 +129,8 @@ def _print_summary(results: Results, folder: Path) -> None:
         )
     for model, reference, quantity, value in results.tables["errors"]:
         if quantity == "field-relative-l2-peak":
-            print(f"{model} against {reference}: field differs by {100 * float(value):.1f} %")
+            share = resolved(float(value), own_error(results, str(reference)))
+            print(f"{model} against {reference}: field difference {share}")
     pdf = folder / "report.pdf"
     print(f"results in {folder}" + (f", report {pdf}" if pdf.exists() else ""))
 

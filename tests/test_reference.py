@@ -232,6 +232,12 @@ def test_a_mode_under_a_linear_load_is_integrated_exactly(body):
     assert rate[:, 0] == pytest.approx(a + decay * slope, rel=1e-8, abs=1e-9 * a)
 
 
+@pytest.mark.parametrize("method", fem.METHODS)
+def test_every_method_knows_the_rest_under_the_full_load(method, body, observation):
+    found = fem.run(body, DAMPING, history, observation, fem.Method(method, modes=5))
+    assert relative(found.rest(body), solve_static(body)) < 1e-8
+
+
 def test_an_unknown_method_is_refused(body, observation):
     with pytest.raises(ValueError, match="ritz-vectors, modal"):
         fem.run(body, DAMPING, history, observation, fem.Method("newmark"))

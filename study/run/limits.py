@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.elasticity import Body
+from fem_reference.observation import at_points, evaluation
 from msm import model as lattice_model
 from msm.calibration import POISSON_RATIO
 from msm.model import Assembly
@@ -17,6 +17,7 @@ from study.run.comparison import best_factor, relative_l2
 from study.run.lattices import elastic
 from study.run.outcome import Outcome
 from study.run.posed import Posed
+from study.run.reference import Solved
 from study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -25,7 +26,7 @@ Floats = NDArray[np.float64]
 def lattice_limits(
     scene: Scene,
     posed: Posed,
-    body: Body,
+    solved: Solved,
     assembly: Assembly,
     outcome: Outcome,
     progress: Progress,
@@ -39,7 +40,8 @@ def lattice_limits(
     points, volumes = posed.volume_rule.points, posed.volume_rule.weights
     with progress.stage("limits of the lattice at rest"):
         field = _at_rest(scene, assembly, POISSON_RATIO, points)
-        truth = fem.static_field(body, points)
+        body = solved.body
+        truth = at_points(evaluation(body, points), solved.found.rest(body))
         tissue = replace(scene.tissue, poisson_ratio=POISSON_RATIO)
         project = posed.geometry.project
         quarter = fem.build(body.mesh, tissue, posed.foundation, posed.tool, project=project)

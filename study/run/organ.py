@@ -38,11 +38,11 @@ def run_organ(
     if "fem" in scene.models:
         from study.run.reference import run_reference
 
-        body = run_reference(scene, posed, outcome, progress, keeping)
+        solved = run_reference(scene, posed, outcome, progress, keeping)
         if "msm" in scene.models:
             from study.run.limits import lattice_limits
 
-            lattice_limits(scene, posed, body, assembly, outcome, progress)
+            lattice_limits(scene, posed, solved, assembly, outcome, progress)
     if has_lattice:
         run_lattices(scene, posed, assembly, estimates, outcome, progress, keeping)
     return outcome

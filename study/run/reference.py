@@ -57,8 +57,8 @@ def run_reference(
     outcome: Outcome,
     progress: Progress,
     keeping: Keeping | None = None,
-) -> Body:
-    """Run the reference into the outcome on meshes that show its error; the finest body."""
+) -> Solved:
+    """Run the reference into the outcome on meshes that show its error; that on the finest."""
     solved = _first(scene, posed, progress)
     errors = _mesh_errors(posed, solved)
     while _too_coarse(scene, errors):
@@ -76,7 +76,7 @@ def run_reference(
     _add_time_errors(scene, posed, solved[0], outcome, record, progress)
     scenes_own = next(one.body for one in solved if one.level is posed.geometry.level(0))
     compare_large_strain(scene, posed, scenes_own, outcome, record, progress)
-    return best.body
+    return best
 
 
 def _first(scene: Scene, posed: Posed, progress: Progress) -> list[Solved]:
