@@ -1,0 +1,70 @@
+"""Which sources a module executes, found by reading its imports and not by running them."""
+
+from __future__ import annotations
+
+import ast
+import functools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+DYNAMIC = ("import_module", "__import__", "iter_modules", "walk_packages", "run_module")
+"""A source with one of these words may load modules by a name that no source states."""
+
+
+def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
+    """Sources under these folders that a module can come to import, itself included, by name.
+
+    Imports within functions count. A module that may load others by name is taken to load all of
+    its package.
+    """
+    found: dict[str, Path] = {}
+    waiting = {module}
+    while waiting:
+        name = waiting.pop()
+        path = _file(name, roots)
+        if path is not None and name not in found:
+            found[name] = path
+            waiting |= set(_parents(name)) | _named(name, path)
+    return found
+
+
+def _file(name: str, roots: Sequence[Path]) -> Path | None:
+    """Source of a module; None for what is elsewhere, and for names that are no modules."""
+    places = [root.joinpath(*name.split(".")) for root in roots]
+    candidates = [(place / "__init__.py", place.with_name(f"{place.name}.py")) for place in places]
+    return next((path for pair in candidates for path in pair if path.is_file()), None)
+
+
+def _parents(name: str) -> Iterator[str]:
+    parts = name.split(".")
+    yield from (".".join(parts[:depth]) for depth in range(1, len(parts)))
+
+
+@functools.cache
+def _named(name: str, path: Path) -> frozenset[str]:
+    """Names that a source imports, and those of its package if it may load any of them."""
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text, filename=str(path))
+    names = {found for node in ast.walk(tree) for found in _imported(node, package)}
+    if any(word in text for word in DYNAMIC):
+        names |= set(_members(package, path.parent))
+    return frozenset(names)
+
+
+def _imported(node: ast.AST, package: str) -> Iterator[str]:
+    """Absolute names in an import; of `from a import b` both a and a.b, as b may be a module."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        above = package.rsplit(".", node.level - 1)[0] if node.level else ""
+        base = ".".join(filter(None, (above, node.module)))
+        yield base
+        yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _members(package: str, folder: Path) -> Iterator[str]:
+    """Every module of a package and of those within it."""
+    for path in folder.rglob("*.py"):
+        parts = path.relative_to(folder).with_suffix("").parts
+        yield ".".join([package, *(part for part in parts if part != "__init__")])

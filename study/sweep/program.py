@@ -1,0 +1,79 @@
+"""What a result depends on beside its arguments: sources, data and the libraries that compute."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from study.sweep.canonical import digest
+from study.sweep.imports import reached
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("study", "fem_reference", "msm", "fuzzy")
+DATA = {".csv", ".toml"}
+LIBRARIES = (
+    "llvmlite",
+    "meshio",
+    "numba",
+    "numpy",
+    "pyamg",
+    "pytetwild",
+    "scikit-fem",
+    "scikit-fuzzy",
+    "scipy",
+    "similaritymeasures",
+    "vtk",
+)
+
+
+@functools.cache
+def program(module: str) -> str:
+    """SHA-256 of what a function of this module can execute and read.
+
+    That is the module, all sources that it imports, directly or not, all data files of the
+    packages, and the versions of libraries: rather a run too many than a stale result. Found once
+    in a process, so that a sweep keeps to the program it started with. ValueError if there is no
+    such module.
+    """
+    sources = reached(module, (_root(module), ROOT))
+    files = {name: _sha256(path) for name, path in sources.items()}
+    return digest([files, _data(), _versions()])
+
+
+def _root(module: str) -> Path:
+    """The folder that a module is found in, without running it."""
+    try:
+        found = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        found = None
+    if found is None or found.origin is None:
+        raise ValueError(f"{module}: no such module; name a function as package.module:function")
+    origin = Path(found.origin)
+    return origin.parents[module.count(".") + (origin.name == "__init__.py")]
+
+
+def _data() -> dict[str, str]:
+    """SHA-256 of each data file of the packages."""
+    paths = [path for package in PACKAGES for path in (ROOT / package).rglob("*")]
+    return {
+        path.relative_to(ROOT).as_posix(): _sha256(path) for path in paths if path.suffix in DATA
+    }
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _versions() -> dict[str, str | None]:
+    return {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
+
+
+def _version(library: str) -> str | None:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,107 @@
+"""Run tasks that have no result yet, here or on workers, and keep each result as it comes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from study.sweep.attempt import Attempt, Status, attempt
+from study.sweep.canonical import canonical
+from study.sweep.program import program
+from study.sweep.store import Store
+from study.sweep.tally import Tally, Tell, silent
+from study.sweep.task import Task
+
+
+@dataclass(frozen=True)
+class How:
+    """Where a sweep runs: in this process, on `workers` local ones, or on those of a `scheduler`.
+
+    `scheduler`: address of a running Dask scheduler, such as "tcp://host:8786".
+    """
+
+    workers: int = 0
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meant."""
+        if self.workers < 0:
+            raise ValueError(f"workers: {self.workers} is negative; give 0 to run in this process")
+        if self.workers and self.scheduler is not None:
+            raise ValueError("workers and scheduler: give one; a scheduler has its own workers")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a task ended, after `wall` seconds.
+
+    "done" with its `value`; "failed" if it raised, "crashed" if its worker died, with a `message`.
+    """
+
+    task: Task
+    status: Status
+    value: dict[str, Any] | None
+    message: str
+    wall: float
+
+
+def run(
+    tasks: Sequence[Task], store: Store, how: How | None = None, progress: Tell = silent
+) -> list[Outcome]:
+    """Outcomes of all tasks, in their order; only those without a stored result are run.
+
+    A result is stored when it comes, so an interruption costs the runs in flight. Failures and
+    crashes are not stored: their cause may lie outside the task (memory, a signal, a full disk), so
+    starting the sweep again tries each once more. Within a sweep every task has one attempt. In
+    this process a task that crashes takes the sweep with it; what was stored stays.
+    ValueError if the store cannot be written or workers cannot be had.
+    """
+    store.prepare()
+    by_key = {task.key: task for task in tasks}
+    ended = {name: kept for name, task in by_key.items() if (kept := _kept(task, store))}
+    left = {name: task for name, task in by_key.items() if name not in ended}
+    tally, start = Tally(len(by_key), stored=len(ended)), time.perf_counter()
+    progress(tally)
+    with _attempts(tuple(left.values()), how or How()) as attempts:
+        for task, found in attempts:
+            if found.value is not None:
+                store.put(task, found.value, found.wall)
+            ended[task.key] = found
+            tally = tally.counting(found.status == "done", time.perf_counter() - start)
+            progress(tally)
+    return [Outcome(task, *ended[task.key]) for task in tasks]
+
+
+def _kept(task: Task, store: Store) -> Attempt | None:
+    """The stored result of a task as its outcome."""
+    stored = store.get(task)
+    return None if stored is None else Attempt("done", stored.value, "", stored.wall)
+
+
+@contextmanager
+def _attempts(tasks: Sequence[Task], how: How) -> Iterator[Iterator[tuple[Task, Attempt]]]:
+    """Each task with how it ended, as they end; workers are gone when the block ends."""
+    if not tasks or not (how.workers or how.scheduler):
+        yield _here(tasks)
+        return
+    try:
+        from study.sweep.workers import distant, local, one_each
+    except ModuleNotFoundError as missing:
+        raise ValueError(
+            f"workers need the package {missing.name}: pip install -e "
+            '".[workers]"'
+            ", or leave them out to run in this process"
+        ) from None
+    place = distant(how.scheduler) if how.scheduler else local(min(how.workers, len(tasks)))
+    with place as client:
+        yield one_each(client, tasks)
+
+
+def _here(tasks: Sequence[Task]) -> Iterator[tuple[Task, Attempt]]:
+    """Run tasks in this process, one after another."""
+    for task in tasks:
+        arguments = canonical(task.arguments)
+        yield task, attempt(task.function, arguments, program(task.module))

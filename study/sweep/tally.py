@@ -1,0 +1,96 @@
+"""How far a sweep is, and how a person is told: a bar on a terminal, else a line now and then."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class Tally(NamedTuple):
+    """Counts of a sweep: `stored` were there before; `failed` includes the crashed."""
+
+    total: int
+    stored: int = 0
+    done: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+
+    @property
+    def finished(self) -> int:
+        """How many need no more work in this sweep."""
+        return self.stored + self.done + self.failed
+
+    @property
+    def seconds_left(self) -> float | None:
+        """At the rate so far; None before the first run has finished."""
+        ran = self.done + self.failed
+        return self.seconds / ran * (self.total - self.finished) if ran else None
+
+    def counting(self, done: bool, seconds: float) -> Tally:
+        """With one more run, done or not, after so many seconds of the sweep."""
+        return self._replace(
+            done=self.done + done, failed=self.failed + (not done), seconds=seconds
+        )
+
+    def __str__(self) -> str:
+        """For a person."""
+        parts = [f"{self.finished} of {self.total}"]
+        parts += [f"{self.stored} from before"] if self.stored else []
+        parts += [f"{self.failed} failed"] if self.failed else []
+        left = self.seconds_left
+        parts += [f"{duration(left)} left"] if left else []
+        return ", ".join(parts)
+
+
+Tell = Callable[[Tally], None]
+
+SECONDS = 15.0
+"""Between two lines where stderr is no terminal."""
+
+
+def duration(seconds: float) -> str:
+    """A time for a person: "8 s", "3 min", "2.5 h"."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+def silent(_: Tally) -> None:
+    """Tell nothing."""
+
+
+@dataclass
+class Lines:
+    """A line at the beginning, at the end, and every so many seconds between."""
+
+    name: str
+    seconds: float = SECONDS
+    told: float = float("-inf")
+
+    def __call__(self, tally: Tally) -> None:
+        """Tell, if it is time."""
+        now = time.monotonic()
+        if now - self.told >= self.seconds or tally.finished == tally.total:
+            self.told = now
+            print(f"{self.name}: {tally}", file=sys.stderr, flush=True)  # noqa: T201 - its job
+
+
+@contextmanager
+def on_stderr(name: str) -> Iterator[Tell]:
+    """A bar if stderr is a terminal, else lines."""
+    if not sys.stderr.isatty():
+        yield Lines(name)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (TextColumn(name), BarColumn(), TextColumn("{task.fields[tally]}"))
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        bar = bars.add_task(name, tally="")
+        yield lambda tally: bars.update(
+            bar, total=tally.total, completed=tally.finished, tally=str(tally)
+        )

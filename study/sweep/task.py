@@ -1,0 +1,48 @@
+"""One run of a sweep: which function, with which arguments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from study.sweep.canonical import canonical, digest
+from study.sweep.program import program
+
+
+@dataclass(frozen=True)
+class Task:
+    """A function to call, by its name, and its keyword arguments.
+
+    `function`: "package.module:name", of a function at the top of a module that returns a
+    dictionary. `arguments` and that dictionary are plain: what JSON can say, without NaN. Tuples
+    arrive as lists. Of a file that a run reads, give the SHA-256 as an argument as well: a path
+    does not tell that the file has changed. ValueError if they are not plain.
+    """
+
+    function: str
+    arguments: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        """Refuse what could not be run elsewhere."""
+        module, _, name = self.function.partition(":")
+        if not module or not name.isidentifier():
+            raise ValueError(f"{self.function!r}: name a function as package.module:function")
+        try:
+            canonical(self.arguments)
+        except ValueError as error:
+            raise ValueError(f"arguments of {self.function}: {error}") from None
+
+    @property
+    def module(self) -> str:
+        """Name of the function's module."""
+        return self.function.partition(":")[0]
+
+    @property
+    def key(self) -> str:
+        """SHA-256 of function, arguments and program: equal keys, equal results."""
+        return key(self.function, self.arguments, program(self.module))
+
+
+def key(function: str, arguments: dict[str, Any], identity: str) -> str:
+    """Key of a run by the program of this identity (`study.sweep.program`)."""
+    return digest({"function": function, "arguments": arguments, "program": identity})
