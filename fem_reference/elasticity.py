@@ -22,6 +22,7 @@ from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
+from study.mesh.tetrahedra import volumes
 from study.scene import Tissue
 
 Floats = NDArray[np.float64]
@@ -95,12 +96,15 @@ def discretise(
     element: str = "auto",
     project: Projection | None = None,
 ) -> Body:
-    """Assemble the body. ValueError if the tool or the support touches no surface.
+    """Assemble the body.
 
     With `project`, which takes points [m] (n, 3) to the exact surface, quadratic elements are
-    curved along it.
+    curved along it. ValueError if the tool or the support touches no surface, for a Poisson ratio
+    that no solid has, and for a tetrahedron without volume.
     """
     name = chosen_element(element, tissue.poisson_ratio)
+    _check_poisson_ratio(tissue.poisson_ratio)
+    _refuse_flat(mesh)
     grid = straight(mesh) if project is None or name == "p1" else curved(mesh, project)
     one = ELEMENTS[name]()
     surface = skfem.FacetBasis(grid, one, mapping(grid), intorder=FACET_ORDER)
@@ -115,12 +119,29 @@ def discretise(
     return Body(mesh, name, nodes, stiffness, _by_component(mass), support, load)
 
 
+def _check_poisson_ratio(nu: float) -> None:
+    if not -1.0 < nu < 0.5:
+        raise ValueError(
+            f"tissue.poisson_ratio: {nu:g} is not between -1 and 0.5, where a solid has a finite "
+            "and positive stiffness; for tissue that keeps its volume give 0.4999"
+        )
+
+
+def _refuse_flat(mesh: TetrahedralMesh) -> None:
+    flat = np.flatnonzero(volumes(mesh) == 0.0)
+    if len(flat):
+        raise ValueError(
+            f"organ.mesh: {len(flat)} flat tetrahedra, the first number {flat[0]} (0-based); "
+            "remove slivers in the mesher"
+        )
+
+
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
     order = CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else GRADIENT_ORDER[name]
     basis = skfem.Basis(grid, ELEMENTS[name](), mapping(grid), intorder=order)
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    mixed = name == "taylor-hood"
+    mixed = name == "taylor-hood" and lame > 0.0  # p = lambda div u says nothing where lambda is 0
     matrix = _interleaved(_blocks(basis, 0.0 if mixed else lame, mu))
     if not mixed:
         return Stiffness(matrix)

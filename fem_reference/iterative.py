@@ -25,6 +25,7 @@ REFINEMENTS = 6
 STRICTER = {cg: 0.5, minres: 1e-6}
 """Minimal residuals stop by a residual relative to the matrix's norm times the solution's."""
 ROUNDING = 1e-15
+"""Of the sum of magnitudes that make up a residual."""
 FACTORED_BELOW = 6_000
 """Linear unknowns that are solved by factors as fast as by a cycle."""
 
@@ -107,8 +108,10 @@ def _refined(
     """Iterate again on what is left, as minimal residuals stop by a norm of their own."""
     operator = LinearOperator(matrix.shape, matvec=inner, dtype=np.float64)
     found, left, scale = np.zeros_like(load), load, float(np.linalg.norm(load))
+    magnitude = abs(matrix)
     for _ in range(REFINEMENTS):
-        if np.linalg.norm(left) <= tolerance * scale:
+        reachable = ROUNDING * float(np.linalg.norm(magnitude @ np.abs(found)))
+        if np.linalg.norm(left) <= max(tolerance * scale, reachable):
             return found
         wanted = STRICTER[method] * tolerance * scale / float(np.linalg.norm(left))
         more, _ = method(
@@ -118,5 +121,5 @@ def _refined(
         left = load - matrix @ found
     raise ValueError(
         "the finite elements find no rest: the support does not hold the body, or a tetrahedron is "
-        "nearly flat; enlarge support.depth or repair organ.mesh"
+        "nearly flat; enlarge support.depth, raise support.stiffness, or repair organ.mesh"
     )

@@ -45,8 +45,9 @@ class Reference:
 
     `time_step` [s] and `steps`: for a superposition those of the load. `superposed`: how a
     superposition was made, and the motion of all nodes; none of steps in time. `largest_strain`:
-    largest absolute principal strain in the kept frames; linear elasticity is good for a few per
-    cent.
+    largest absolute principal strain in the kept frames, of a superposition also where a control
+    point is farthest out, and `largest_rotation` [rad] likewise; linear elasticity is good for a
+    few per cent of either.
     """
 
     trajectory: Trajectory
@@ -57,6 +58,7 @@ class Reference:
     steps: int
     wall: float
     largest_strain: float
+    largest_rotation: float
     superposed: Superposed | None = None
 
     def rest(self, body: Body) -> Floats:
@@ -136,10 +138,13 @@ def _superposed(
         recorder.motion(sample, *(curve[sample] for curve in found.curves))
     for frame in set(recorder.observation.frames):
         recorder.field(frame, found.state(frame)[0])
+    farthest = np.linalg.norm(found.curves.displacement, axis=2).max(axis=1).argmax()
+    recorder.look(found.state(int(farthest))[0])
     seen = _reference(body, recorder, found.time_step, found.steps, wall)
     return replace(seen, superposed=found)
 
 
 def _reference(body: Body, recorder: Recorder, step: float, steps: int, wall: float) -> Reference:
     sizes = body.node_count, len(body.mesh.tetrahedra), body.element
-    return Reference(recorder.trajectory, *sizes, step, steps, wall, recorder.strain)
+    seen = recorder.strain, recorder.rotation
+    return Reference(recorder.trajectory, *sizes, step, steps, wall, *seen)

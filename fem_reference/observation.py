@@ -39,6 +39,19 @@ def at_points(matrix: csr_array, u: Floats) -> Floats:
 
 def largest_strain(body: Body, u: Floats) -> float:
     """Largest absolute principal strain at the integration points."""
-    gradient = np.stack([np.asarray(body.nodes.interpolate(u[d::3]).grad) for d in range(3)])
-    strain = 0.5 * (gradient + np.swapaxes(gradient, 0, 1))
-    return float(np.abs(np.linalg.eigvalsh(np.moveaxis(strain, (0, 1), (-2, -1)))).max())
+    gradient = _gradient(body, u)
+    strain = 0.5 * (gradient + np.swapaxes(gradient, -2, -1))
+    return float(np.abs(np.linalg.eigvalsh(strain)).max())
+
+
+def largest_rotation(body: Body, u: Floats) -> float:
+    """Largest rotation [rad], as small ones go, at the integration points."""
+    gradient = _gradient(body, u)
+    turn = gradient - np.swapaxes(gradient, -2, -1)
+    return float(np.sqrt((turn**2).sum(axis=(-2, -1)).max() / 8.0))
+
+
+def _gradient(body: Body, u: Floats) -> Floats:
+    """Displacement gradient (cells, points, 3, 3)."""
+    parts = [np.asarray(body.nodes.interpolate(u[d::3]).grad) for d in range(3)]
+    return np.moveaxis(np.stack(parts), (0, 1), (-2, -1))

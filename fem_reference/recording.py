@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.elasticity import Body
-from fem_reference.observation import at_points, evaluation, largest_strain
+from fem_reference.observation import at_points, evaluation, largest_rotation, largest_strain
 from study.trajectory import Observation, empty_trajectory
 
 Floats = NDArray[np.float64]
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 class Recorder:
     """Writes what is observed into the arrays of a trajectory.
 
-    `strain`: largest absolute principal strain in the frames kept so far.
+    `strain` and `rotation` [rad]: the largest of the states looked at so far.
     """
 
     def __init__(self, body: Body, observation: Observation) -> None:
@@ -24,7 +24,7 @@ class Recorder:
         self.in_volume = evaluation(body, observation.volume_points)
         self.on_surface = evaluation(body, observation.surface_points)
         self.trajectory = empty_trajectory(observation)
-        self.strain = 0.0
+        self.strain = self.rotation = 0.0
 
     def motion(self, sample: int, displacement: Floats, velocity: Floats) -> None:
         """Keep displacement [m] and velocity [m/s] (probes, 3) at one sample."""
@@ -37,4 +37,9 @@ class Recorder:
             if frame == sample:
                 self.trajectory.volume_field[i] = at_points(self.in_volume, u)
                 self.trajectory.surface_field[i] = at_points(self.on_surface, u)
-                self.strain = max(self.strain, largest_strain(self.body, u))
+                self.look(u)
+
+    def look(self, u: Floats) -> None:
+        """Take note of how far a state is from small displacements."""
+        self.strain = max(self.strain, largest_strain(self.body, u))
+        self.rotation = max(self.rotation, largest_rotation(self.body, u))

@@ -25,6 +25,7 @@ LOAD_STEPS = 16
 """Per sample: the load is linear between them."""
 GROWTH = 4
 MAX_VECTORS = 80
+TINY = 1e-300
 TRUNCATION = 1e-3
 """Relative L2 change of a control point's motion by the last vectors, at which there are enough."""
 LOOSE = 1e-2
@@ -89,7 +90,7 @@ class Posing:
         whole = self.curves(subspace)
         fewer = self.curves(subspace.leading(max(1, (3 * subspace.load.size) // 4)))
         return max(
-            float(np.linalg.norm(a[:, i] - b[:, i]) / np.linalg.norm(a[:, i]))
+            float(np.linalg.norm(a[:, i] - b[:, i])) / max(float(np.linalg.norm(a[:, i])), TINY)
             for a, b in zip(whole, fewer, strict=True)
             for i in range(a.shape[1])
         )

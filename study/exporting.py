@@ -208,9 +208,9 @@ def _table(moved: Sequence[tuple[float, Floats]], *, timed: bool = True) -> str:
 
 COMPARE = r"""same() {
   paste -d, <(awk 'NF == 4 {print $1","$2","$3","$4}' $1.dat) <(tail -n +2 $1.csv) |
-  awk -F, '$1 != $5 {exit 1}
+  awk -F, '$1 != $5 {print "line " NR ": node " $1 " beside " $5; odd = 1; exit 1}
            {for (i = 2; i < 5; i++) {d += ($i - $(i+4))^2; r += $(i+4)^2}}
-           END {print "relative L2 difference", sqrt(d / r)}'
+           END {if (!odd) print "relative L2 difference", sqrt(d / r)}'
 }"""
 INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration points"}
 

@@ -29,7 +29,8 @@ def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
     lines += [f"note: {note}" for note in posed.geometry.notes]
     lines += [f"{key} = {value:.4g}" for key, value in dimensionless(scene, posed).items()]
     tetrahedra = len(posed.geometry.mesh.tetrahedra)
-    lines.append(f"finite-element mesh: {tetrahedra} tetrahedra")
+    finer = ", refined for reference.accuracy" if scene.reference.accuracy is not None else ""
+    lines.append(f"finite-element mesh: {tetrahedra} tetrahedra{finer}")
     if set(scene.models) & {"basafa", "msm"}:
         lines += _lattice_lines(scene, posed)
     return lines

@@ -13,6 +13,22 @@ if TYPE_CHECKING:
 
 Advance = Callable[[float], None]
 
+_asked: list[int] = []
+
+
+def ask_to_stop(number: int) -> None:
+    """Let the program end at the next stage, as by a signal of that number.
+
+    For an exit that the signal's handler raised where Python swallows exceptions.
+    """
+    _asked.append(number)
+
+
+def stop_if_asked() -> None:
+    """End the program if that was asked for."""
+    if _asked:
+        sys.exit(128 + _asked[0])
+
 
 class Progress(Protocol):
     """Tells a person what is being done."""
@@ -37,6 +53,7 @@ class Lines:
     @contextmanager
     def stage(self, name: str) -> Iterator[Advance]:
         """See Progress."""
+        stop_if_asked()
         start = time.perf_counter()
         yield lambda _: None
         print(f"{name}: {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)  # noqa: T201 - its job
@@ -51,6 +68,7 @@ class Bars:
     @contextmanager
     def stage(self, name: str) -> Iterator[Advance]:
         """See Progress."""
+        stop_if_asked()
         task = self.bars.add_task(name, total=1.0)
         yield lambda share: self.bars.update(task, completed=share)
         self.bars.update(task, completed=1.0)

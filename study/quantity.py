@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # at most four unit names joined by * or /.
 _NUMBER = r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)"
 _UNIT = r"[A-Za-z]{1,12}(\^-?[1-4])?"
-_TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
+_TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>%|({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
 _LONGEST_TEXT = 80
 
 
@@ -73,6 +73,8 @@ def _parsed(text: str, unit: str) -> float:
     example = f'write for example "1 {unit}"' if unit else "write a plain number"
     if match is None:
         raise ValueError(f"not one number with a unit; {example}")
+    if match["unit"] == "%" and not unit:
+        return float(f"{0.01 * float(match['number']):.15g}")
     if not match["unit"]:
         if unit:
             raise ValueError(f"the unit is missing; {example}")

@@ -240,6 +240,7 @@ def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
     yield from _tool_contradictions(scene)
+    yield from _unseen_load(scene)
     if scene.organ.shape == "point" and scene.organ.mesh is None:
         yield from _point_contradictions(scene, table)
     elif scene.organ.mass is not None:
@@ -351,6 +352,17 @@ def _tool_contradictions(scene: Scene) -> Iterator[str]:
     if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
         needed = math.ceil(8 * history.frequency * time.duration)
         yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+
+
+def _unseen_load(scene: Scene) -> Iterator[str]:
+    """A load that comes and goes between samples would leave no trace of itself."""
+    history, time = scene.tool.history, scene.time
+    if history.kind != "ramp-hold-release":
+        return
+    loaded = min(history.ramp + history.hold + history.release, time.duration)
+    if 8 * time.duration > (time.samples - 1) * loaded > 0.0:
+        needed = math.ceil(8 * time.duration / loaded) + 1
+        yield f"time.samples: a load of {loaded:g} s needs 8 samples in it, here {needed}"
 
 
 def _point_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from study import progress
 from study.results import TABLES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -208,3 +209,12 @@ def test_fields_of_all_nodes_are_kept_when_asked_for(tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / "msm-sugeno.vtkhdf").stat().st_size > 1e5
     assert not (tmp_path / ".out.state").exists()
+
+
+def test_an_exit_that_was_swallowed_is_made_up_for_at_the_next_stage(monkeypatch):
+    monkeypatch.setattr(progress, "_asked", [])
+    with progress.Lines().stage("one"):
+        progress.ask_to_stop(15)
+    with pytest.raises(SystemExit) as ended, progress.Lines().stage("two"):
+        pass
+    assert ended.value.code == 143

@@ -139,6 +139,7 @@ def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]
         )
     base = len(meshes) - 1
 
+    @cache
     def level(k: int) -> Level | None:
         while len(meshes) <= base + k and _can_refine(meshes[-1]):
             meshes.append(refined(meshes[-1]))

@@ -22,12 +22,14 @@ Floats = NDArray[np.float64]
 
 SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
-"""With an assumed order, of two meshes."""
+"""Where the order is assumed: of two meshes, and of three that do not converge at one in reach."""
 ASSUMED_ORDER = 2.0
 """Of two meshes: that of flat facets, of edges of a support, and of most user's meshes."""
 LEAST_ORDER = 1.0
 FORMAL_ORDER = {"p1": 2.0, "p2": 3.0, "taylor-hood": 3.0}
 """Of displacement; the estimate never takes more."""
+BEYOND = 0.5
+"""An observed order outside by more shows meshes that are not yet in the range of convergence."""
 FLATTEST, STEEPEST = 1e-6, 12.0
 TINY = 1e-300
 
@@ -49,7 +51,8 @@ def discretisation_error(
 ) -> Estimate:
     """From results (n, 3) on at least two meshes, coarse to fine by element size, in relative L2.
 
-    `weights` (n,) of the points. An order outside 1 to `formal` counts as the nearer of the two.
+    `weights` (n,) of the points. An order outside 1 to `formal` counts as the nearer of the two;
+    well outside, it is an assumed one.
     """
     w = np.ones(len(results[-1])) if weights is None else weights
     steps = [fine - coarse for coarse, fine in pairwise(results)]
@@ -59,10 +62,12 @@ def discretisation_error(
     if len(results) == 2:
         return Estimate(SAFETY_ASSUMED * norms[-1] / (ratio**ASSUMED_ORDER - 1.0), None)
     if _product(steps[-2], steps[-1], w) < 0.0:
-        return Estimate(SAFETY * 0.5 * max(norms[-2:]), None)
+        return Estimate(SAFETY_ASSUMED * 0.5 * max(norms[-2:]), None)
     observed = observed_order(norms[-2], norms[-1], sizes[-3:])
-    order = LEAST_ORDER if observed is None else min(max(observed, LEAST_ORDER), formal)
-    return Estimate(SAFETY * norms[-1] / (ratio**order - 1.0), observed)
+    shown = LEAST_ORDER - 2 * BEYOND if observed is None else observed
+    order = min(max(shown, LEAST_ORDER), formal)
+    safety = SAFETY if abs(shown - order) <= BEYOND else SAFETY_ASSUMED
+    return Estimate(safety * norms[-1] / (ratio**order - 1.0), observed)
 
 
 def _product(a: Floats, b: Floats, weights: Floats) -> float:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from fem_reference import model as fem
-from fem_reference.elasticity import Body
+from fem_reference.elasticity import LOCKING, Body
 from fem_reference.hyperelasticity import LawName
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
 from study.progress import Progress
 from study.run.comparison import relative_l2
-from study.run.outcome import STRAIN_LIMIT, Outcome
+from study.run.outcome import ROTATION_LIMIT, STRAIN_LIMIT, Outcome
 from study.run.posed import Posed
 from study.scene import Scene
 
@@ -27,10 +26,12 @@ def compare_large_strain(
 ) -> None:
     """Record what finite strain changes at rest under the full load, where strains are large.
 
-    Linear and hyperelastic solution are taken on the same mesh, so that its error nearly cancels.
+    Linear and hyperelastic solution are taken on the scene's own mesh. What that mesh costs them is
+    not estimated: near a small tool the difference still grows as the mesh is refined.
     """
     law = scene.reference.large_strain
-    if law == "none" or record["largest_strain"] <= STRAIN_LIMIT:
+    small = record["largest_strain"] <= STRAIN_LIMIT
+    if law == "none" or (small and record["largest_rotation"] <= ROTATION_LIMIT):
         return
     with progress.stage(f"fem: {law}"):
         found = _difference(scene, posed, body, law)
@@ -43,8 +44,7 @@ def compare_large_strain(
 def _difference(scene: Scene, posed: Posed, body: Body, law: LawName) -> dict[str, Any] | str:
     """The comparison, or why there is none."""
     if body.element == "taylor-hood":
-        where = (posed.foundation, posed.tool, "p2", posed.geometry.project)
-        body = fem.build(body.mesh, scene.tissue, *where)
+        return f"elements without a pressure lock at a Poisson ratio above {LOCKING:g}"
     try:
         path = solve(body, scene.tissue, law)
     except ValueError as error:

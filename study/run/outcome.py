@@ -13,6 +13,8 @@ from study.trajectory import Trajectory
 
 STRAIN_LIMIT = 0.05
 """Largest strain of the linear reference above which it is not to be trusted."""
+ROTATION_LIMIT = 0.2
+"""Largest rotation [rad] of it: half its square is a strain that linear elasticity invents."""
 TIME_STEP_LIMITS = {"displacement": 0.01, "velocity": 0.05}
 TINY = 1e-300
 

@@ -14,7 +14,7 @@ from study.results import SCHEMA_VERSION, Results
 from study.run import estimates as fuzzy_side
 from study.run.assumptions import assumptions
 from study.run.comparison import Lens, band_rows, curve_rows, error_rows, similarity_rows
-from study.run.outcome import STRAIN_LIMIT, Outcome
+from study.run.outcome import ROTATION_LIMIT, STRAIN_LIMIT, Outcome
 from study.scene import Scene
 from study.scene_file import resolved, write_scene
 
@@ -68,7 +68,7 @@ def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) 
         "models": outcome.models,
         "checks": outcome.checks,
         "strain_limit": STRAIN_LIMIT,
-        "warnings": _warnings(outcome),
+        "warnings": _warnings(scene, outcome),
         "assumptions": assumptions(scene, outcome),
         "notes": [*fuzzy.notes, *outcome.notes],
         "study_wall_s": time.perf_counter() - started,
@@ -98,7 +98,17 @@ def _at_large_strain(record: dict[str, Any]) -> str:
     return f", and at rest it differs by {share:.1f} % from a {found['law']} solid"
 
 
-def _warnings(outcome: Outcome) -> list[str]:
+def _remedy(scene: Scene) -> str:
+    """What keeps a run from diverging."""
+    lattice = scene.lattice
+    for key, value in (("time_step", lattice.time_step), ("step_rate", lattice.step_rate)):
+        if value is not None:
+            verb = "Shorten" if key == "time_step" else "Raise"
+            return f"{verb} lattice.{key}, or leave it out so that steps follow the limit."
+    return "Reduce lattice.step_fraction or the load."
+
+
+def _warnings(scene: Scene, outcome: Outcome) -> list[str]:
     warnings = []
     for record in outcome.models:
         strain = record.get("largest_strain")
@@ -108,10 +118,23 @@ def _warnings(outcome: Outcome) -> list[str]:
                 f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(record)}. "
                 "Reduce tool.force or enlarge tool.radius."
             )
+        rotation = record.get("largest_rotation")
+        if rotation is not None and rotation > ROTATION_LIMIT:
+            warnings.append(
+                f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
+                "it should not be trusted. Reduce tool.force or hold the organ better."
+            )
+        if record.get("accuracy_missed"):
+            warnings.append(
+                f"reference.accuracy asks for {100 * record['accuracy_missed']:.2g} %; the finest "
+                f"mesh of {record['elements']} tetrahedra, the last within the limit, reaches "
+                f"{100 * record['mesh_error']['displacement']:.2g} %. Ask for less, or simplify "
+                "the organ or its load."
+            )
         if record["status"] == "diverged":
             warnings.append(
                 f"{record['name']} diverged at {record['diverged_at_s']:g} s: it has no scores. "
-                "Reduce lattice.step_fraction or the load."
+                f"{_remedy(scene)}"
             )
         if record.get("inverted_cells"):
             warnings.append(
