@@ -6,6 +6,7 @@ Mamdani is broad and pale so that type-2, which nearly coincides with it, shows 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,3 +63,18 @@ def system_name(system: str) -> str:
 def reference_name(model: str) -> str:
     """Name of a model in "against ..."."""
     return REFERENCE_NAMES.get(model, look(model).label)
+
+
+SERIES_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9")
+SERIES_MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")
+
+
+def series(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Colour and mark, as keyword arguments of `Axes.plot`, of names in the order they appear."""
+    return {
+        name: {
+            "color": SERIES_COLOURS[i % len(SERIES_COLOURS)],
+            "marker": SERIES_MARKS[i % len(SERIES_MARKS)],
+        }
+        for i, name in enumerate(dict.fromkeys(names))
+    }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from importlib import resources
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from reports.differences import resolved
@@ -26,7 +27,7 @@ def beforehand(results: Results) -> dict[str, Any] | None:
 
     A table that is missing is left out.
     """
-    if not any(record.get("springs", 0) > 1 for record in results.numbers["models"]):
+    if not has_lattice(results):
         return None
     shapes = {
         "field_error": field_error,
@@ -38,9 +39,17 @@ def beforehand(results: Results) -> dict[str, Any] | None:
     return found or None
 
 
-def read(name: str) -> list[Line]:
-    """Lines of a table by the names of its columns; none if it is missing."""
-    file = FOLDER.joinpath(f"{name}.csv")
+def has_lattice(results: Results) -> bool:
+    """Whether a model of the run is a lattice and not a single mass point."""
+    return any(record.get("springs", 0) > 1 for record in results.numbers["models"])
+
+
+def read(name: str, folder: Traversable | None = None) -> list[Line]:
+    """Lines of a table by the names of its columns; none if it is missing.
+
+    Without a folder, of the tables that come with the program.
+    """
+    file = (folder or FOLDER).joinpath(f"{name}.csv")
     if not file.is_file():
         return []
     return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))

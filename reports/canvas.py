@@ -6,6 +6,7 @@ import io
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -68,6 +69,23 @@ def svg(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     return buffer.getvalue()
+
+
+def pdf(figure: Figure) -> bytes:
+    """The figure as PDF without a date."""
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
+    buffer = io.BytesIO()
+    FigureCanvasPdf(figure).print_pdf(buffer, metadata={"CreationDate": None})
+    return buffer.getvalue()
+
+
+def write(figure: Figure, stem: Path) -> list[Path]:
+    """Write the figure as SVG and as PDF; the files."""
+    files = {stem.with_suffix(".svg"): svg(figure), stem.with_suffix(".pdf"): pdf(figure)}
+    for path, content in files.items():
+        path.write_bytes(content)
+    return list(files)
 
 
 def blank(axes: Axes) -> None:

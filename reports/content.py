@@ -8,6 +8,7 @@ from reports import fuzzy_tables, summary, tables
 from reports.beforehand import beforehand
 from reports.differences import own_error, resolved
 from reports.digits import fixed, short, words
+from reports.extremes import extremes
 from reports.motion_figures import shown_probes
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
@@ -59,6 +60,7 @@ def document(results: Results) -> dict[str, Any]:
         "provenance": tables.provenance_rows(results),
         "beforehand": beforehand(results),
         "verification": verification(results),
+        "extremes": extremes(results),
     }
 
 

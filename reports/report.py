@@ -12,6 +12,7 @@ from typing import Any
 
 from reports.content import document
 from reports.difference_figure import difference_figure
+from reports.extremes import extreme_figures
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
@@ -62,6 +63,7 @@ def _plots(results: Results) -> Figures:
     differences = difference_figure(results)
     if differences is not None:
         figures["differences"] = [differences]
+    figures |= {place: [svg] for place, svg in extreme_figures(results).items()}
     return figures
 
 

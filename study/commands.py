@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -21,6 +22,7 @@ EXIT_BAD_INPUT = 2
 app = App(
     name="liver-study",
     help="Fuzzy-tuned mass-spring liver beside finite elements and the Basafa benchmark.",
+    version=lambda: version("liver-study"),
     version_flags=["--version"],
     help_format="plaintext",  # markdown would triple the time of --help
 )
@@ -41,6 +43,9 @@ def main() -> None:
 
 def _leave(number: int, _: FrameType | None) -> NoReturn:
     """Let a termination unwind, so that half-written folders are removed."""
+    from study.progress import ask_to_stop
+
+    ask_to_stop(number)
     sys.exit(128 + number)
 
 
@@ -243,6 +248,153 @@ def verify(
     if out is not None:
         verifying.write_csv(verdicts, out)
     print(verifying.as_json(verdicts) if as_json else "\n".join(verifying.table(verdicts)))
+    if not all(verdict.passed for verdict in verdicts):
+        sys.exit(EXIT_FAILED_CHECK)
+
+
+@app.command
+def tradeoff(
+    scene: str = "liver",
+    *,
+    set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
+    contender: list[str] | None = None,
+    out: Path | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    dry_run: Annotated[bool, Parameter(negative=())] = False,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Measure error and cost of every model of a scene in many settings.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a TOML file.
+    set_
+        Override of the scene, table.key=value. May be repeated.
+    contender
+        Only this one, for example volume-springs. May be repeated.
+    out
+        Folder to write; results/NAME-tradeoff by default. Finished runs are kept beside it.
+    workers
+        Processes that runs are spread over; none by default. Costs are always timed in this one.
+    scheduler
+        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
+    dry_run
+        Say what would be run, and stop.
+    quick
+        Time three turns instead of five.
+    """
+    from study.progress import on_stderr
+    from study.tradeoff import request as asked
+
+    request = asked.Request(
+        scene=scene,
+        overrides=set_ or (),
+        contenders=contender or (),
+        out=out,
+        workers=workers,
+        scheduler=scheduler,
+        quick=quick,
+    )
+    if dry_run:
+        print("\n".join(asked.planned(request)))
+        return
+    from reports import exchange, exchange_answers, exchange_figure
+
+    with on_stderr() as progress:
+        lines = asked.measure(request, progress)
+        with progress.stage("pictures"):
+            pictures = exchange_figure.write_figures(request.folder)
+    found = exchange_answers.sentences(exchange.configurations(request.folder))
+    print("\n".join([*lines, *found, *map(str, pictures)]))
+
+
+@app.command
+def recommend(
+    scene: str = "liver",
+    *,
+    rate: str | None = None,
+    error: str | None = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
+    out: Path | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+) -> None:
+    """Write the scene of the lattice that meets a rate or an error on this machine.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a TOML file.
+    rate
+        States per second that must be ready in real time, for example "60 Hz".
+    error
+        Error of the displacement over the organ to stay below, for example "5 %".
+    set_
+        Override of the scene, table.key=value. May be repeated.
+    out
+        Scene file to write; NAME-60Hz.toml or NAME-5percent.toml by default.
+    workers
+        Processes that runs are spread over; none by default.
+    scheduler
+        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
+    """
+    from study.progress import on_stderr
+    from study.tradeoff import request as asked
+
+    request = asked.Request(
+        scene=scene, overrides=set_ or (), out=out, workers=workers, scheduler=scheduler
+    )
+    with on_stderr() as progress:
+        met, lines = asked.advise(request, rate, error, progress)
+    print("\n".join(lines))
+    if not met:
+        sys.exit(EXIT_FAILED_CHECK)
+
+
+@app.command
+def stability(
+    scene: str = "block",
+    *,
+    out: Path | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    dry_run: Annotated[bool, Parameter(negative=())] = False,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Try every model at its extremes, and hold what comes out to what is known beforehand.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a TOML file, whose own lattice is tried too.
+    out
+        Folder to write; results/NAME-stability by default. Finished cases are kept beside it.
+    workers
+        Processes that cases are spread over; none by default.
+    scheduler
+        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
+    dry_run
+        Say what would be run, and stop.
+    quick
+        Only a part of the cases, half a minute.
+    """
+    from study.stability import request as asked
+    from study.stability import table
+    from study.sweep.tally import on_stderr
+
+    request = asked.Request(scene=scene, out=out, workers=workers, scheduler=scheduler, quick=quick)
+    if dry_run:
+        print(asked.planned(request))
+        return
+    with on_stderr("stability") as progress:
+        verdicts = asked.study(request, progress)
+    from reports.stability_map import write_figures
+
+    print("\n".join(table.lines(verdicts)))
+    print(f"table in {request.folder / table.NAME}")
+    print("\n".join(map(str, write_figures(request.folder))))
     if not all(verdict.passed for verdict in verdicts):
         sys.exit(EXIT_FAILED_CHECK)
 

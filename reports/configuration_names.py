@@ -1,0 +1,60 @@
+"""Contenders of a trade-off study and their settings in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+CONTENDERS = {
+    "springs": "springs alone",
+    "volume-springs": "springs and volume term",
+    "step-sizes": "the same, other steps",
+    "integrators": "the same, other integrators",
+    "basafa": "Basafa benchmark",
+    "finite-elements": "finite elements in steps",
+    "superposition": "superposition",
+}
+SPRINGS = {"True": "springs and volume term", "False": "springs alone"}
+"""Name of a lattice by its setting `volume_term`."""
+NAMES = {
+    "p1": "linear",
+    "p2": "quadratic",
+    "taylor-hood": "Taylor-Hood",
+    "ritz": "Ritz",
+    "xpbd": "XPBD",
+    "runge-kutta-4": "Runge-Kutta",
+}
+WORDS: dict[str, Callable[[str], str]] = {
+    "spacing": lambda value: f"{1e3 * float(value):.3g} mm",
+    "step_fraction": lambda value: f"{value} of the critical step",
+    "step_rate": lambda value: f"{value} Hz steps",
+    "rate": lambda value: f"{value} Hz steps",
+    "element": lambda value: NAMES.get(value, value),
+    "level": lambda value: f"mesh {value.replace('-', '−')}",
+    "integrator": lambda value: NAMES.get(value, value.replace("-", " ")),
+    "vectors": lambda value: NAMES.get(value, value),
+    "count": lambda value: f"{value} vectors",
+}
+
+
+def contender_name(contender: str) -> str:
+    """A contender in legends; one that is not known under its own name."""
+    return CONTENDERS.get(contender, contender)
+
+
+def name_of(contender: str, settings: str) -> str:
+    """A configuration in a sentence, from its settings "key=value key=value"."""
+    known = dict(part.split("=", 1) for part in settings.split())
+    head = SPRINGS.get(known.pop("volume_term", ""), contender_name(contender))
+    return ", ".join([head, *(_said(key, value) for key, value in known.items())])
+
+
+def mark_of(settings: str) -> str:
+    """The setting that tells configurations of one contender apart first: the spacing, the mesh."""
+    known = dict(part.split("=", 1) for part in settings.split())
+    return ", ".join(
+        _said(key, known[key]) for key in ("spacing", "element", "level") if key in known
+    )
+
+
+def _said(key: str, value: str) -> str:
+    return WORDS[key](value) if key in WORDS else f"{key} {value}"

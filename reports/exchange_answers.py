@@ -1,0 +1,89 @@
+"""What a trade-off study answers: the accuracy to be had at a rate, and what more would cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from reports.digits import DASH, Table, percent, significant
+from reports.exchange import (
+    Configuration,
+    best,
+    is_better,
+    next_better,
+    rate_name,
+    rates_of,
+    share,
+    timed,
+)
+
+TOLD = ("60hz", "1khz")
+"""Rates that have a sentence."""
+
+
+def sentences(found: Sequence[Configuration]) -> list[str]:
+    """What can be had at each of the rates told, by models that follow any load."""
+    free = [one for one in timed(found) if one.any_load]
+    return [_sentence(found, free, rate) for rate in TOLD if rate in rates_of(free)]
+
+
+def _sentence(found: Sequence[Configuration], free: list[Configuration], rate: str) -> str:
+    chosen = best(free, rate)
+    if chosen is None:
+        nearest = min(free, key=lambda one: share(one, rate))
+        told = f"nothing that follows any load is in time; the nearest is {_told(nearest, rate)}"
+    else:
+        told = (
+            "the most accurate that follows any load in time, as far as the reference can tell, is "
+            f"{_told(chosen, rate)}; {_next(free, rate, chosen)}"
+        )
+    return f"At {rate_name(rate)} {told}{_known_load(found, rate, chosen)}."
+
+
+def _told(one: Configuration, rate: str) -> str:
+    """A configuration, its error, and its share of a period."""
+    taken = share(one, rate)
+    part = f"{significant(taken, 2)} periods"
+    if taken < 1.0:
+        part = f"{percent(taken, 2)} of the period"
+    return f"{one.name} (error {one.stated_error}, {part})"
+
+
+def _next(free: list[Configuration], rate: str, chosen: Configuration) -> str:
+    better = next_better(free, rate, chosen)
+    if better is None:
+        return "none is more accurate by more than the reference's own error"
+    return f"the next better is {_told(better, rate)}"
+
+
+def _known_load(found: Sequence[Configuration], rate: str, chosen: Configuration | None) -> str:
+    """What a load whose place is known beforehand allows beyond that."""
+    bound = best([one for one in found if not one.any_load], rate)
+    if bound is None or (chosen and not is_better(bound, chosen)):
+        return ""
+    setup = significant(bound.timing.setup, 2)
+    return (
+        f"; where the load's place is known beforehand, {_told(bound, rate)}, set up in {setup} s"
+    )
+
+
+def answers(found: Sequence[Configuration]) -> Table:
+    """Rate, load's place, the most accurate in time, its error, share of the period, set-up [s]."""
+    measured = timed(found)
+    groups = (("any", True), ("known beforehand", False))
+    return [
+        [rate_name(rate), load, *_answer([o for o in measured if o.any_load == any_load], rate)]
+        for load, any_load in groups
+        for rate in rates_of(measured)
+    ]
+
+
+def _answer(group: list[Configuration], rate: str) -> list[str]:
+    chosen = best(group, rate)
+    if chosen is None:
+        return ["none", DASH, DASH, DASH]
+    return [
+        chosen.name,
+        chosen.stated_error,
+        percent(share(chosen, rate), 2),
+        significant(chosen.timing.setup, 2),
+    ]

@@ -1,0 +1,161 @@
+"""Where the models break: the cases of the stability study, counted and put into sentences."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.resources.abc import Traversable
+
+from reports.beforehand import Line, read
+from reports.digits import count, percent, words
+
+NAME = "stability"
+FAILED = "not as expected"
+OUTCOMES = {
+    "value": "value right",
+    "bounded": "bounded",
+    "diverged": "diverged as predicted",
+    "refused": "refused, saying why",
+}
+"""How a case ends, and what that is where it ends as expected."""
+CRITICAL_STEP = "critical step"
+NUMBERED = re.compile(r"(?P<number>\d[\d.]*(?:e[-+]?\d+)?) (?P<what>.+?)(?:: (?P<which>[^:]+))?")
+"""A case's name that begins with a number and may end with an integrator or model."""
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Case:
+    """A line of the table; numbers that there are not are None.
+
+    `tolerance`: of the difference; None for a refusal.
+    """
+
+    family: str
+    name: str
+    outcome: str
+    predicted: float | None
+    measured: float | None
+    difference: float | None
+    tolerance: float | None
+    passed: bool
+    message: str
+
+    @property
+    def judged(self) -> str:
+        """Its column of the matrix."""
+        return OUTCOMES[self.outcome] if self.passed else FAILED
+
+    @property
+    def departure(self) -> float | None:
+        """What was measured over what was predicted, less one."""
+        if not self.predicted or self.measured is None:
+            return None
+        return self.measured / self.predicted - 1.0
+
+
+def cases(folder: Traversable | None = None) -> list[Case]:
+    """Cases of a folder's table, or of the one that comes with the program; none if missing."""
+    return [_case(line) for line in read(NAME, folder)]
+
+
+def _case(line: Line) -> Case:
+    within = re.search(r"within ([-+.\de]+)", line["expected"])
+    return Case(
+        family=line["family"],
+        name=line["case"],
+        outcome=line["outcome"],
+        predicted=_number(line["predicted"]),
+        measured=_number(line["measured"]),
+        difference=_number(line["difference"]),
+        tolerance=float(within[1]) if within else None,
+        passed=line["passed"] == "True",
+        message=line["message"],
+    )
+
+
+def _number(text: str) -> float | None:
+    return float(text) if text else None
+
+
+def matrix(found: Iterable[Case]) -> dict[str, Counter[str]]:
+    """Counts of each column of the matrix, by family."""
+    counts: dict[str, Counter[str]] = {}
+    for case in found:
+        counts.setdefault(case.family, Counter())[case.judged] += 1
+    return counts
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Where a series of cases, told apart by the number that their names begin with, breaks.
+
+    `held`: the largest that did not diverge, None where all did; `broke`: the smallest that did;
+    `those`: which of the integrators or models the two are of.
+    """
+
+    family: str
+    what: str
+    held: float | None
+    broke: float
+    those: tuple[str, ...]
+
+
+def boundaries(found: Iterable[Case]) -> list[Boundary]:
+    """Every series in which a case diverges; integrators that break at the same place together."""
+    series: dict[tuple[str, str, str], list[tuple[float, bool]]] = {}
+    for case in found:
+        split = NUMBERED.fullmatch(case.name)
+        if split and case.outcome in OUTCOMES and case.outcome != "refused":
+            key = (case.family, split["what"], split["which"] or "")
+            series.setdefault(key, []).append((float(split["number"]), case.outcome == "diverged"))
+    shared: dict[tuple[str, str, float | None, float], list[str]] = {}
+    for (family, what, which), ends in series.items():
+        broke = min((number for number, diverged in ends if diverged), default=None)
+        if broke is not None:
+            held = max((n for n, diverged in ends if not diverged and n < broke), default=None)
+            shared.setdefault((family, what, held, broke), []).append(which)
+    return [Boundary(*key, tuple(which)) for key, which in shared.items()]
+
+
+def sentences(found: Sequence[Case]) -> list[str]:
+    """How the cases ended and how well critical steps were predicted; where models break."""
+    told = [_ended(found)]
+    steps = [case for case in found if case.family == CRITICAL_STEP and case.departure is not None]
+    if steps:
+        told.append(_predicted(steps))
+    where = [_broken(boundary) for boundary in boundaries(found)]
+    if where:
+        told.append(f"Where a series of cases breaks: {'; '.join(where)}.")
+    return told
+
+
+def _ended(found: Sequence[Case]) -> str:
+    failed = [case for case in found if not case.passed]
+    families = len(matrix(found))
+    start = f"Of {count(len(found))} cases in {families} families "
+    if not failed:
+        return f"{start}all end as expected."
+    named = "; ".join(f"{case.family}, {words(case.name)}" for case in failed[:MOST_NAMED])
+    more = f" and {len(failed) - MOST_NAMED} more" if len(failed) > MOST_NAMED else ""
+    verb = "does" if len(failed) == 1 else "do"
+    return f"{start}{len(failed)} {verb} not end as expected: {named}{more}."
+
+
+def _predicted(steps: Sequence[Case]) -> str:
+    worst = max(steps, key=lambda case: abs(case.departure or 0.0))
+    return (
+        f"The critical step was measured in {len(steps)} cases; it differs from the predicted one "
+        f"by at most {percent(abs(worst.departure or 0.0))} ({words(worst.name)})."
+    )
+
+
+def _broken(boundary: Boundary) -> str:
+    those = ", ".join(which for which in boundary.those if which)
+    end = f" ({those})" if those else ""
+    if boundary.held is None:
+        return f"{boundary.family}: {boundary.broke:g} {boundary.what} is not completed{end}"
+    held = f"{boundary.held:g} {boundary.what} is completed"
+    return f"{boundary.family}: {held}, {boundary.broke:g} is not{end}"

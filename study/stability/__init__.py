@@ -1,0 +1,1 @@
+"""Where each model breaks: cases at the extremes, each held to a figure known beforehand."""

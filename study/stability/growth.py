@@ -1,0 +1,61 @@
+"""The longest stable step, measured: does a small motion grow or not, by bisection on the step."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.integrators import Integrator
+from msm.laws import Law
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+
+RESOLUTION = 1e-3
+"""Ratio of the two steps, one stable and one not, between which the limit is found, less one."""
+LOOKS = 40
+SMALL = 1e-7
+"""Size of the motion that is let go, in spacings: geometry stays out of it until it has grown."""
+LOST = 1e4
+"""Growth that ends the watch."""
+GROWN = 10.0
+"""Growth from the first to the second half of the watch. What beats below the limit has beaten in
+the first half; what grows by 10 in the second does so by more than 1e-3 a step in 2000."""
+
+
+def longest_stable_step(
+    law: Law, net: Network, method: Integrator, guess: float, about: Floats, steps: int
+) -> float:
+    """Step [s] beyond which motions about the rest `about` [m] (n, 3) grow, near a guess [s]."""
+    low, high = guess / 1.25, guess * 1.25
+    while grows(law, net, method, low, about, steps):
+        low, high = low / 2.0, low
+    while not grows(law, net, method, high, about, steps):
+        low, high = high, high * 2.0
+    while high > (1.0 + RESOLUTION) * low:
+        middle = float(np.sqrt(low * high))
+        if grows(law, net, method, middle, about, steps):
+            high = middle
+        else:
+            low = middle
+    return float(np.sqrt(low * high))
+
+
+def grows(law: Law, net: Network, method: Integrator, dt: float, about: Floats, steps: int) -> bool:
+    """Whether a small random motion about a rest under the full load grows."""
+    noise = np.random.default_rng(0).standard_normal(about.shape)
+    u, v = about + SMALL * net.spacing * noise, np.zeros_like(about)
+    stretch = np.ones((max(1, steps // LOOKS), len(method.at)))
+    sizes = [_size(net, u - about, v, dt)]
+    for _ in range(LOOKS):
+        method.advance(law, net, stretch, dt, u, v)
+        sizes.append(_size(net, u - about, v, dt))
+        if not sizes[-1] < LOST * sizes[0]:
+            return True
+    half = LOOKS // 2
+    return max(sizes[half:]) > GROWN * max(sizes[:half])
+
+
+def _size(net: Network, u: Floats, v: Floats, dt: float) -> float:
+    """Of a motion, in terms of energy."""
+    return float(np.sqrt((net.mass[:, None] * (v**2 + (u / dt) ** 2)).sum()))

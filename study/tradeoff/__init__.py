@@ -1,0 +1,1 @@
+"""Work and precision: how accurate each model is on a scene, and what a simulated second costs."""

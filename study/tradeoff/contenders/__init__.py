@@ -1,0 +1,1 @@
+"""One file per contender, each named in `study.tradeoff.lineup`."""

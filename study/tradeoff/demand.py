@@ -1,0 +1,52 @@
+"""What is demanded of a simulation: a rate, an error, or both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study.quantity import Quantity
+
+RATE = Quantity("Hz", 0.1, 1e5)
+ERROR = Quantity("", 1e-6, 1.0)
+
+
+@dataclass(frozen=True)
+class Demand:
+    """States per second [Hz] in real time, and relative error of the field; one may be open."""
+
+    rate: float | None
+    error: float | None
+
+    def __str__(self) -> str:
+        """For a person."""
+        parts = [] if self.rate is None else [f"{self.rate:g} Hz"]
+        parts += [] if self.error is None else [f"an error of {100 * self.error:g} %"]
+        return " and ".join(parts)
+
+
+def demand(rate: str | None, error: str | None) -> Demand:
+    """From texts such as "60 Hz" and "5 %". ValueError if neither is given or one cannot be."""
+    if rate is None and error is None:
+        raise ValueError('give --rate, for example "60 Hz", or --error, for example "5 %", or both')
+    return Demand(
+        None if rate is None else _read("--rate", rate, RATE, rate),
+        None if error is None else _read("--error", error, ERROR, _share(error)),
+    )
+
+
+def _read(flag: str, given: str, quantity: Quantity, text: str) -> float:
+    try:
+        return quantity.read(text)
+    except ValueError as problem:
+        raise ValueError(f"{flag} {given}: {problem}") from None
+
+
+def _share(text: str) -> str:
+    """A percentage as a share; other text as it is."""
+    number = text.strip().removesuffix("%").strip()
+    if not text.strip().endswith("%"):
+        return text
+    try:
+        return repr(float(number) / 100.0)
+    except ValueError:
+        return text

@@ -1,0 +1,79 @@
+"""How far a configuration is from the reference, where the reference can tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.run.comparison import relative_l2
+from study.sweep.runner import Outcome
+from study.tradeoff.problem import Problem
+from study.tradeoff.reference import Reference
+
+Floats = NDArray[np.float64]
+Status = Literal[
+    "resolved", "not resolved", "diverged", "unstable", "inverted", "failed", "crashed"
+]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative L2 errors of the displacement, None where there is none or it is not resolved.
+
+    `field` over the organ at the peak; `tool` of the curve of the control point at the tool and
+    `worst` of any control point. `status` is that of the field; `message` says what went wrong.
+    """
+
+    status: Status
+    field: float | None = None
+    tool: float | None = None
+    worst: float | None = None
+    message: str = ""
+
+
+def errors(outcome: Outcome, reference: Reference, stated: Problem) -> Errors:
+    """Errors of one run of `study.tradeoff.observation`."""
+    value = outcome.value
+    if outcome.status != "done" or value is None:
+        status: Status = "crashed" if outcome.status == "crashed" else "failed"
+        return Errors(status, message=outcome.message)
+    if value["field"] is None:
+        return Errors("diverged", message=f"at {value['diverged_at_s']:.3g} s")
+    if value["margin"] is not None and value["margin"] < 1.0:
+        return Errors(
+            "unstable", message=f"step {1.0 / value['margin']:.3g} times the critical one"
+        )
+    if value["inverted_cells"]:
+        return Errors("inverted", message=f"{value['inverted_cells']} cells")
+    return _measured(value, reference, stated)
+
+
+def _measured(value: dict[str, Any], reference: Reference, stated: Problem) -> Errors:
+    volumes = stated.posed.volume_rule.weights
+    field = relative_l2(np.reshape(value["field"], (-1, 3)), reference.field, volumes)
+    curves = curve_errors(np.reshape(value["curves"], reference.curves.shape), reference.curves)
+    known = [resolved(c, bar) for c, bar in zip(curves, reference.curve_errors, strict=True)]
+    kept = resolved(field, reference.field_error)
+    return Errors(
+        "not resolved" if kept is None else "resolved",
+        kept,
+        known[stated.tool_probe],
+        max((c for c in known if c is not None), default=None),
+    )
+
+
+def resolved(error: float, bar: float) -> float | None:
+    """The error, or None where it does not exceed that of the reference."""
+    return float(error) if error > bar else None
+
+
+def curve_errors(curves: Floats, reference: Floats) -> Floats:
+    """Relative L2 difference (probes,) of curves (samples, probes, 3)."""
+
+    def size(x: Floats) -> Floats:
+        return np.asarray(np.sqrt((x**2).sum(axis=(0, 2))))
+
+    return size(curves - reference) / size(reference)

@@ -1,0 +1,100 @@
+"""The problem that all contenders solve, as plain data for a run elsewhere and as objects."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.mesh.quadrature import over_volume
+from study.run.posed import Posed, pose
+from study.run.whole import is_point
+from study.scene import Scene
+from study.scene_file import resolved, validate
+
+Floats = NDArray[np.float64]
+
+SAMPLING = 0.05
+"""Interval [s] of samples: a whole number of frames at 60 Hz and of steps at 1 kHz."""
+FEWEST_SAMPLES = 16
+DIGITS = 8
+TIDY_DIGITS = 12
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene posed on its organ; the field is looked at once in each tetrahedron.
+
+    On the built-in liver that moves an error by 2 % of itself against eight points in each.
+    """
+
+    scene: Scene
+    posed: Posed
+
+    @property
+    def tool_probe(self) -> int:
+        """The control point nearest to the tool."""
+        away = self.posed.observation.probes - self.posed.tool.centre
+        return int(np.linalg.norm(away, axis=1).argmin())
+
+
+def sampled(scene: Scene) -> Scene:
+    """The scene at samples that frames and steps of the usual rates divide.
+
+    What is left of its duration beyond them is cut off. A scene too short for that keeps its own.
+    ValueError if it is a single mass point.
+    """
+    if is_point(scene):
+        raise ValueError(
+            'organ.shape: "point" has no displacement field to be accurate in; choose a scene with '
+            "an organ"
+        )
+    count = int(scene.time.duration / SAMPLING * (1.0 + 1e-9))
+    if count + 1 < FEWEST_SAMPLES:
+        return scene
+    return replace(
+        scene, time=replace(scene.time, duration=tidy(count * SAMPLING), samples=count + 1)
+    )
+
+
+def arguments(scene: Scene) -> dict[str, Any]:
+    """The scene as plain values, with the SHA-256 of its mesh file if it has one."""
+    mesh = scene.organ.mesh
+    return {"scene": resolved(scene), "mesh_sha256": None if mesh is None else _sha256(mesh)}
+
+
+def _sha256(path: str) -> str:
+    return sha256(Path(path).read_bytes()).hexdigest()
+
+
+def problem(scene: dict[str, Any], mesh_sha256: str | None) -> Problem:
+    """The problem of `arguments`, kept for the next run. ValueError if its mesh has changed."""
+    # In one order of keys, whichever way it came: control points are numbered by it.
+    return _posed(json.dumps(scene, sort_keys=True), mesh_sha256)
+
+
+@lru_cache(maxsize=2)
+def _posed(scene: str, mesh_sha256: str | None) -> Problem:
+    found = validate(json.loads(scene), "scene")
+    if found.organ.mesh is not None and _sha256(found.organ.mesh) != mesh_sha256:
+        raise ValueError(f"organ.mesh: {found.organ.mesh} has changed since the runs were planned")
+    posed = pose(found)
+    rule = over_volume(posed.geometry.mesh, 1)
+    seen = replace(posed.observation, volume_points=rule.points)
+    return Problem(found, replace(posed, volume_rule=rule, observation=seen))
+
+
+def tidy(value: float) -> float:
+    """The value without the rounding of a product, as it would be written in a scene."""
+    return float(f"{value:.{TIDY_DIGITS}g}")
+
+
+def plain(values: Floats) -> list[float]:
+    """All entries, in eight digits."""
+    return [float(f"{value:.{DIGITS}g}") for value in values.ravel()]

@@ -1,0 +1,113 @@
+"""`tradeoff` and `recommend` as the command line asks for them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.progress import Progress
+from study.scene import Scene
+from study.scene_file import read_scene
+from study.sweep.plan import plan
+from study.sweep.runner import How
+from study.sweep.store import Store
+from study.tradeoff import recommend, table, whole
+from study.tradeoff.demand import Demand, demand
+from study.tradeoff.lineup import configurations
+from study.tradeoff.problem import sampled
+from study.tradeoff.timing import QUICK_REPEATS, REPEATS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """A scene by name or file with overrides, what to write, and where to run."""
+
+    scene: str
+    overrides: Sequence[str] = ()
+    contenders: Sequence[str] = ()
+    out: Path | None = None
+    workers: int = 0
+    scheduler: str | None = None
+    quick: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of the scene, without its folder."""
+        return Path(self.scene).stem
+
+    @property
+    def how(self) -> How:
+        """Where to run."""
+        return How(self.workers, self.scheduler)
+
+    @property
+    def folder(self) -> Path:
+        """Of the table."""
+        return self.out or Path("results") / f"{self.name}-tradeoff"
+
+    def read(self) -> Scene:
+        """The scene."""
+        return read_scene(self.scene, self.overrides)
+
+
+def planned(request: Request) -> list[str]:
+    """What the study would run."""
+    scene = sampled(request.read())
+    chosen = configurations(scene, request.contenders)
+    return [str(plan(whole.tasks(scene, chosen), _store(request.folder)))]
+
+
+def measure(request: Request, progress: Progress) -> list[str]:
+    """Run the study and write its folder; lines for a terminal."""
+    scene, folder = sampled(request.read()), request.folder
+    chosen = configurations(scene, request.contenders)
+    repeats = QUICK_REPEATS if request.quick else REPEATS
+    found = whole.study(scene, chosen, _store(folder), request.how, repeats, progress)
+    whole.write(found, scene, repeats, folder)
+    own = 100 * found.reference["field_error"]
+    return [
+        *table.lines(found.rows),
+        f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %",
+        f"table in {folder / whole.TABLE}",
+    ]
+
+
+def advise(
+    request: Request, rate: str | None, error: str | None, progress: Progress
+) -> tuple[bool, list[str]]:
+    """Whether the demand can be met, and lines; writes the scene if it can."""
+    wanted, given = demand(rate, error), request.read()
+    path = request.out or Path(f"{request.name}-{_suffix(wanted)}.toml")
+    if not path.parent.is_dir():
+        raise ValueError(f"--out {path}: there is no folder {path.parent}; make it first")
+    store = _store(Path("results") / f"{request.name}-tradeoff")
+    found = recommend.recommend(sampled(given), wanted, store, request.how, progress)
+    lines = [*recommend.lines(found), *_busy()]
+    if not found.met:
+        return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
+    path.write_text(recommend.recommended_scene(given, found), encoding="utf-8")
+    return True, [*lines, f"scene in {path}"]
+
+
+def _busy() -> list[str]:
+    """A line where others had the machine too."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    if load <= cores:
+        return []
+    return [
+        f"The machine was busy (load {load:.1f} on {cores} cores): frames that waited for others "
+        "count as slow ones; repeat this when it is idle."
+    ]
+
+
+def _suffix(wanted: Demand) -> str:
+    """Of a file name."""
+    rate = [] if wanted.rate is None else [f"{wanted.rate:g}Hz"]
+    return "-".join(rate + ([] if wanted.error is None else [f"{100 * wanted.error:g}percent"]))
+
+
+def _store(folder: Path) -> Store:
+    """Beside the folder, which is replaced as a whole while finished runs stay."""
+    return Store(folder.with_name(f"{folder.name}-runs"))

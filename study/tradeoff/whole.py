@@ -1,0 +1,154 @@
+"""The study of one scene: errors through a sweep, then costs in this process."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from study.folders import replacing
+from study.progress import Progress
+from study.provenance import provenance
+from study.scene import Scene
+from study.scene_file import write_scene
+from study.sweep.runner import How, Outcome, run
+from study.sweep.store import Store
+from study.sweep.tally import on_stderr
+from study.sweep.task import Task
+from study.tradeoff import observation, reference, table
+from study.tradeoff.contender import Ready
+from study.tradeoff.errors import errors
+from study.tradeoff.lineup import Configuration, contender
+from study.tradeoff.problem import Problem, arguments, problem
+from study.tradeoff.reference import Reference
+from study.tradeoff.table import Cost, Row
+from study.tradeoff.timing import Clock, in_turns
+
+TABLE, RECORD = "tradeoff.csv", "tradeoff.json"
+PICTURES = ("exchange.svg", "exchange.pdf")
+"""Drawn into the folder afterwards."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Rows of the table, and the reference's own record."""
+
+    rows: list[Row]
+    reference: dict[str, Any]
+
+
+def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
+    """The reference's run and one for each configuration."""
+    same = arguments(scene)
+    runs = [{"name": one.contender, "settings": one.settings} for one in chosen]
+    return [
+        Task(reference.FUNCTION, same),
+        *(Task(observation.FUNCTION, same | one) for one in runs),
+    ]
+
+
+def solved(scene: Scene, chosen: Sequence[Configuration], store: Store, how: How) -> list[Outcome]:
+    """The outcome of the reference and of each configuration. ValueError if the first failed."""
+    with on_stderr("errors") as tell:
+        outcomes = run(tasks(scene, chosen), store, how, tell)
+    if outcomes[0].value is None:
+        raise ValueError(f"the reference could not be solved: {outcomes[0].message}")
+    return outcomes
+
+
+def study(
+    scene: Scene,
+    chosen: Sequence[Configuration],
+    store: Store,
+    how: How,
+    repeats: int,
+    progress: Progress,
+    clock: Clock = time.perf_counter,
+) -> Found:
+    """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
+    outcomes = solved(scene, chosen, store, how)
+    stated = problem(**arguments(scene))
+    value = outcomes[0].value or {}
+    known = reference.restored(value, stated)
+    rows = compared(stated, chosen, outcomes[1:], known, repeats, progress, clock)
+    record = {key: value[key] for key in ("element", "unknowns", "field_error", "levels")}
+    by_probe = zip(stated.posed.probes, value["curve_errors"], strict=True)
+    return Found(table.with_fronts(rows), record | {"curve_errors": dict(by_probe)})
+
+
+def compared(
+    stated: Problem,
+    chosen: Sequence[Configuration],
+    outcomes: Sequence[Outcome],
+    known: Reference,
+    repeats: int,
+    progress: Progress,
+    clock: Clock = time.perf_counter,
+) -> list[Row]:
+    """A row per configuration, all that ran timed in turns."""
+    found = [errors(outcome, known, stated) for outcome in outcomes]
+    sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
+    steps = [float((outcomes[k].value or {})["step_s"]) for k in sound]
+    costed = costs(stated, [chosen[k] for k in sound], steps, repeats, progress, clock)
+    by_place = dict(zip(sound, costed, strict=True))
+    return [
+        table.row(one, error, known.field_error, by_place.get(k))
+        for k, (one, error) in enumerate(zip(chosen, found, strict=True))
+    ]
+
+
+def costs(
+    stated: Problem,
+    chosen: Sequence[Configuration],
+    steps: Sequence[float],
+    repeats: int,
+    progress: Progress,
+    clock: Clock = time.perf_counter,
+) -> list[Cost]:
+    """Setup and cost of configurations, at steps [s] that their runs took."""
+    with progress.stage("setting up") as advance:
+        for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
+            _ready(stated, next(one for one in chosen if one.contender == name))
+        ready, setups = [], []
+        for one in chosen:
+            started = clock()
+            ready.append(_ready(stated, one))
+            setups.append(clock() - started)
+            advance(len(ready) / len(chosen))
+    with progress.stage("timing") as advance:
+        timings = in_turns(ready, repeats, clock, advance)
+    return [
+        Cost(one.unknowns, setup, min(step, one.step), timing)
+        for one, setup, step, timing in zip(ready, setups, steps, timings, strict=True)
+    ]
+
+
+def _ready(stated: Problem, one: Configuration) -> Ready:
+    return contender(one.contender).prepare(stated.scene, stated.posed, one.settings)
+
+
+def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
+    """Write table, record and scene; the folder appears, or is replaced, at once."""
+    text = write_scene(scene)
+    record = {
+        "reference": found.reference,
+        "repeats": repeats,
+        "modulus_pa": scene.tissue.youngs_modulus,
+        "load_average": os.getloadavg(),
+        "machine": provenance(text, scene.organ.mesh),
+    }
+    with replacing(folder, _foreign, "trade-off study") as partial:
+        table.write(found.rows, partial / TABLE)
+        content = json.dumps(record, indent=1, allow_nan=False)
+        (partial / RECORD).write_text(content + "\n", encoding="utf-8")
+        (partial / "scene.toml").write_text(text, encoding="utf-8")
+
+
+def _foreign(names: Iterable[str]) -> str | None:
+    """A file that the study did not write."""
+    others = sorted(set(names) - {TABLE, RECORD, "scene.toml", *PICTURES})
+    return others[0] if others else None

@@ -1,0 +1,269 @@
+"""The report says what accuracy costs and where models break as the tables have it, and no more."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from reports import beforehand, exchange_figure, report, stability_map
+from reports.appearance import series
+from reports.exchange import configurations, front, left_out, record
+from reports.exchange_answers import answers, sentences
+from reports.extremes import extreme_figures, extremes
+from reports.stability import FAILED, boundaries, cases, matrix
+from reports.stability import sentences as told
+from tests.report_samples import bare, printed, results_of
+
+DATA = Path(beforehand.__file__).parent / "data"
+RATES = {"60hz": 60.0, "1khz": 1000.0}
+BAR = 0.003
+CASES = """\
+family,case,expected,outcome,predicted,measured,difference,passed,message
+critical step,E 1 Pa: verlet,"value, within 0.005",value,0.002,0.002002,0.001,True,
+critical step,density 9 kg/m3: euler,"value, within 0.005",value,0.002,0.001994,0.003,True,
+collapse,1 times its weight: euler,"bounded, within 0.02",bounded,0,0.01,0.01,True,
+collapse,5 times its weight: euler,"diverged, within 0.15",diverged,1,1,0,True,
+collapse,1 times its weight: verlet,"bounded, within 0.02",bounded,0,0.01,0.01,True,
+collapse,5 times its weight: verlet,"diverged, within 0.15",diverged,1,1,0,True,
+step,a step of zero,"refused, naming step",refused,,,,True,step must be positive
+"""
+
+
+def row(configuration, error, wall, **changes):
+    """A line of the trade-off's table; a frame costs its part of a second."""
+    line = {
+        "contender": "springs",
+        "configuration": configuration,
+        "status": "resolved",
+        "message": "",
+        "any_load": True,
+        "field_error": error,
+        "field_error_bar": BAR,
+        "setup_s": 0.5,
+        "wall_per_s": wall,
+        "wall_per_s_q1": 0.9 * wall,
+        "wall_per_s_q3": 1.2 * wall,
+    }
+    for name, hertz in RATES.items():
+        line |= {
+            f"frame_ms_{name}": 1e3 * wall / hertz,
+            f"slow_frame_ms_{name}": 2e3 * wall / hertz,
+            f"real_time_{name}": 2 * wall <= 1.0,
+        }
+    return line | changes
+
+
+def sample():
+    """Coarse, fine and too slow; one that no load but its own suits; one that diverged."""
+    return [
+        row("spacing=0.02 volume_term=True", 0.11, 0.02),
+        row("spacing=0.01 volume_term=True", 0.04, 0.3),
+        row("spacing=0.005 volume_term=True", 0.02, 0.9),
+        row("spacing=0.01 volume_term=False", 0.24, 0.1, contender="basafa"),
+        row("count=8", "", 0.001, contender="superposition", any_load=False, status="not resolved"),
+        dict.fromkeys(row("", 0, 0), "")
+        | {"contender": "springs", "configuration": "step_rate=500", "status": "diverged"}
+        | {"message": "at 0.12 s", "any_load": True, "field_error_bar": BAR},
+    ]
+
+
+def write(lines, folder):
+    with (folder / "tradeoff.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, lines[0].keys(), lineterminator="\n")
+        table.writeheader()
+        table.writerows(lines)
+    return configurations(folder)
+
+
+@pytest.fixture(name="folder")
+def _folder(tmp_path, monkeypatch):
+    """Tables made up by hand."""
+    write(sample(), tmp_path)
+    known = {"unknowns": 12345, "field_error": BAR}
+    record_ = {"machine": {"processor": "Some processor"}, "reference": known, "repeats": 5}
+    (tmp_path / "tradeoff.json").write_text(json.dumps(record_))
+    (tmp_path / "stability.csv").write_text(CASES)
+    monkeypatch.setattr(beforehand, "FOLDER", tmp_path)
+    return tmp_path
+
+
+def test_the_sentences_name_the_best_in_time_and_what_the_next_costs(folder):
+    first, second = sentences(configurations(folder))
+    assert first == (
+        "At 60 Hz the most accurate that follows any load in time, as far as the reference can "
+        "tell, is springs and volume term, 10 mm (error 4.0 ± 0.3 %, 60.0 % of the period); the "
+        "next better is springs and volume term, 5 mm (error 2.0 ± 0.3 %, 1.8 periods); where the "
+        "load's place is known beforehand, superposition, 8 vectors (error not resolved (< 0.3 %), "
+        "0.20 % of the period), set up in 0.50 s."
+    )
+    assert second.startswith("At 1 kHz")
+
+
+def test_the_sentence_changes_with_the_data(tmp_path):
+    lines = sample()
+    lines[2]["real_time_60hz"] = True
+    sixty, thousand = sentences(write(lines, tmp_path))
+    assert "is springs and volume term, 5 mm (error 2.0 ± 0.3 %" in sixty
+    assert "none is more accurate by more than the reference's own error" in sixty
+    assert "is springs and volume term, 10 mm" in thousand
+
+
+def test_an_accuracy_that_the_reference_cannot_tell_is_not_paid_for(tmp_path):
+    lines = [*sample(), row("spacing=0.009", 0.04 - 0.5 * BAR, 0.45)]
+    assert "is springs and volume term, 10 mm" in sentences(write(lines, tmp_path))[0]
+    lines[-1] |= {"field_error": 0.04 - 1.5 * BAR}  # and one that it can tell is
+    assert "is springs alone, 9 mm" in sentences(write(lines, tmp_path))[0]
+
+
+def test_where_nothing_is_in_time_the_nearest_is_named(tmp_path):
+    lines = [line | {"real_time_1khz": False} for line in sample()]
+    found = write(lines, tmp_path)
+    said = sentences(found)[1]
+    assert "nothing that follows any load is in time; the nearest is springs and volume" in said
+    assert [line[2] for line in answers(found)] == [
+        "springs and volume term, 10 mm",
+        "none",
+        "superposition, 8 vectors",
+        "none",
+    ]
+
+
+def test_a_planted_point_moves_the_front(tmp_path):
+    def settings(lines):
+        return [one.settings.split()[0] for one in front(write(lines, tmp_path))]
+
+    before = ["spacing=0.02", "spacing=0.01", "spacing=0.005"]
+    assert settings(sample()) == before
+    assert settings([*sample(), row("spacing=0.03", 0.05, 0.5)]) == before  # beaten in both
+    planted = row("spacing=0.03", 0.03, 0.05)
+    assert settings([*sample(), planted]) == ["spacing=0.02", "spacing=0.03", "spacing=0.005"]
+
+
+def test_what_has_no_error_has_no_place_and_is_listed(folder):
+    found = configurations(folder)
+    assert left_out(found) == [["springs alone, 500 Hz steps", "diverged", "at 0.12 s"]]
+    svg = exchange_figure.exchange_figure(found)
+    assert b"500 Hz" in svg
+    assert b"diverged at 0.12 s" in svg
+    assert exchange_figure.exchange_figure(found[-1:]) is None
+
+
+def test_marks_tell_contenders_apart_without_colour():
+    looks = series(f"contender {k}" for k in range(7))
+    assert len({look["marker"] for look in looks.values()}) == len(looks)
+
+
+def test_the_figures_of_a_folder_are_drawn_into_it(folder):
+    drawn = [*exchange_figure.write_figures(folder), *stability_map.write_figures(folder)]
+    assert [path.name for path in drawn] == [
+        f"{name}.{kind}"
+        for name in ("exchange", "stability", "critical_step")
+        for kind in ("svg", "pdf")
+    ]
+    assert all(path.stat().st_size > 1000 for path in drawn)
+    first = [path.read_bytes() for path in drawn]
+    exchange_figure.write_figures(folder)
+    stability_map.write_figures(folder)
+    assert [path.read_bytes() for path in drawn] == first
+
+
+def test_a_folder_without_tables_has_no_figures(tmp_path):
+    assert exchange_figure.write_figures(tmp_path) == []
+    assert stability_map.write_figures(tmp_path) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_cases_are_counted_by_family_and_outcome(folder):
+    assert matrix(cases(folder)) == {
+        "critical step": {"value right": 2},
+        "collapse": {"bounded": 2, "diverged as predicted": 2},
+        "step": {"refused, saying why": 1},
+    }
+
+
+def test_a_case_that_failed_is_counted_named_and_drawn_in_alarm(folder):
+    good = stability_map.stability_map(cases(folder))
+    assert stability_map.ALARM.lower().encode() not in good
+    (folder / "stability.csv").write_text(CASES.replace("0.003,True", "0.03,False"))
+    found = cases(folder)
+    assert matrix(found)["critical step"] == {"value right": 1, FAILED: 1}
+    assert told(found)[0] == (
+        "Of 7 cases in 3 families 1 does not end as expected: critical step, density 9 kg/m3: "
+        "euler."
+    )
+    assert stability_map.ALARM.lower().encode() in stability_map.stability_map(found)
+    assert stability_map.ALARM.lower().encode() in stability_map.critical_step_figure(found)
+
+
+def test_the_sentences_say_how_well_steps_are_predicted_and_where_models_break(folder):
+    ended, steps, where = told(cases(folder))
+    assert ended == "Of 7 cases in 3 families all end as expected."
+    assert steps.endswith("by at most 0.3 % (density 9 kg/m3: euler).")
+    assert where == (
+        "Where a series of cases breaks: collapse: 1 times its weight is completed, 5 is not "
+        "(euler, verlet)."
+    )
+
+
+def test_a_series_that_breaks_elsewhere_is_told_apart(folder):
+    changed = CASES.replace("1 times its weight: verlet", "3 times its weight: verlet")
+    (folder / "stability.csv").write_text(changed)
+    found = boundaries(cases(folder))
+    assert [(one.held, one.broke, one.those) for one in found] == [
+        (1.0, 5.0, ("euler",)),
+        (3.0, 5.0, ("verlet",)),
+    ]
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_document_prints_them_and_says_that_they_are_of_no_run():
+    texts = printed(bare())
+    assert "None of these figures are of this run." in texts
+    assert {"springs and volume term, 10 mm", "4.0 ± 0.3 %", "60.0 %"} <= set(texts)
+    measured = extremes(results_of())["exchange"]["measured"]
+    assert measured == (
+        "Measured on Some processor, in 5 turns, against finite elements of 12\u202f345 unknowns, "
+        "whose own error is 0.3 %."
+    )
+    figures = {"motion": []} | {k: [svg] for k, svg in extreme_figures(results_of()).items()}
+    assert report.compile_pdf(bare(), figures).startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("missing", "left"), [("tradeoff", ["stability"]), ("stability", ["exchange"])]
+)
+def test_a_table_that_is_missing_is_left_out(missing, left, folder):
+    (folder / f"{missing}.csv").unlink()
+    assert list(extremes(results_of())) == left
+    drawn = set(extreme_figures(results_of()))
+    assert drawn == ({"exchange"} if missing == "stability" else {"stability", "critical_step"})
+    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+
+
+def test_without_tables_or_without_a_lattice_there_is_no_appendix(folder):
+    assert extremes(results_of(["fem"])) is None
+    assert extreme_figures(results_of(["fem"])) == {}
+    for path in folder.iterdir():
+        path.unlink()
+    assert extremes(results_of()) is None
+    assert record() == {}
+    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+
+
+def test_the_front_is_that_which_the_study_marked():
+    """Of equals the study marks all; the figure steps over the first."""
+    found = configurations(DATA)
+    if not found:
+        pytest.skip("tradeoff.csv does not come with the program")
+    with (DATA / "tradeoff.csv").open(newline="") as file:
+        marked = {
+            f"{line['contender']} {line['configuration']}"
+            for line in csv.DictReader(file)
+            if line["pareto_any_load"] == "True"
+        }
+    ours = {f"{one.contender} {one.settings}" for one in front([o for o in found if o.any_load])}
+    assert ours
+    assert ours <= marked

@@ -1,0 +1,426 @@
+"""`liver-study tradeoff` and `recommend`: errors that are resolved, costs, rates, advice."""
+
+import csv
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference.dynamics import Damping
+from fem_reference.observation import evaluation
+from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
+from study.progress import Silent
+from study.run.lattices import assemble
+from study.scene_file import read_scene
+from study.sweep.runner import How, Outcome
+from study.sweep.store import Store
+from study.sweep.task import Task
+from study.tradeoff import recommend as advice
+from study.tradeoff import table, whole
+from study.tradeoff.body import build
+from study.tradeoff.contender import Ready
+from study.tradeoff.contenders.superposition import transitions
+from study.tradeoff.demand import Demand, demand
+from study.tradeoff.errors import Errors, errors
+from study.tradeoff.lattice import with_settings
+from study.tradeoff.lineup import CONTENDERS, Configuration, configurations, contender
+from study.tradeoff.problem import SAMPLING, arguments, plain, problem, sampled
+from study.tradeoff.rates import Frame, frame
+from study.tradeoff.reference import Reference
+from study.tradeoff.table import Cost
+from study.tradeoff.timing import FEWEST, Timing, in_turns
+
+SMALL = (
+    'organ.size=["60 mm", "40 mm", "30 mm"]',
+    "tool.radius=15 mm",
+    "tool.force=0.05 N",
+    "reference.element_size=8 mm",
+)
+COARSER = (*SMALL, "reference.element_size=12 mm")
+OVERRIDES = [word for override in COARSER for word in ("--set", override)]
+VOLUME = [
+    Configuration("volume-springs", {"spacing": h, "volume_term": True})
+    for h in (0.015, 0.01, 5e-3)
+]
+LINEAR = Configuration("finite-elements", {"element": "p1", "level": -2, "rate": 60.0})
+RITZ = Configuration("superposition", {"vectors": "ritz", "count": 8, "level": -2})
+TOO_LONG = Configuration("step-sizes", {"spacing": 0.01, "volume_term": True, "step_rate": 300.0})
+NO_MESH = Configuration("finite-elements", {"element": "p1", "level": -9, "rate": 60.0})
+CHOSEN = [*VOLUME, LINEAR, RITZ, TOO_LONG, NO_MESH]
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    scene = sampled(read_scene("block", SMALL))
+    store = Store(tmp_path_factory.mktemp("runs"))
+    return whole.study(scene, CHOSEN, store, How(), 2, Silent())
+
+
+@pytest.fixture(scope="module")
+def stated():
+    return problem(**arguments(sampled(read_scene("block", SMALL))))
+
+
+def row_of(found, configuration):
+    return found.rows[CHOSEN.index(configuration)]
+
+
+def test_every_row_has_finite_numbers_or_a_status_that_says_why_not(found):
+    for row in found.rows:
+        assert tuple(row) == table.COLUMNS
+        numbers = [v for v in row.values() if isinstance(v, float)]
+        assert all(math.isfinite(v) and v >= 0.0 for v in numbers)
+        if row["status"] == "resolved":
+            assert row["field_error"] > row["field_error_bar"] > 0.0
+            assert row["wall_per_s"] > 0.0
+        else:
+            assert row["field_error"] is None
+
+
+def test_what_diverged_or_failed_is_told_and_has_neither_score_nor_cost(found):
+    for configuration, status, word in (
+        (TOO_LONG, "diverged", "at "),
+        (NO_MESH, "failed", "level -9"),
+    ):
+        row = row_of(found, configuration)
+        assert row["status"] == status
+        assert word in row["message"]
+        assert [row[c] for c in ("tool_error", "worst_error", "wall_per_s")] == [None] * 3
+        assert row["pareto"] is row["pareto_any_load"] is False
+
+
+def test_refining_the_spacing_lowers_the_error_and_raises_the_cost(found):
+    rows = [row_of(found, one) for one in VOLUME]
+    assert rows[0]["field_error"] > 1.2 * rows[1]["field_error"]
+    assert rows[0]["worst_error"] > 1.2 * rows[1]["worst_error"]
+    steps = [row["step_s"] for row in rows]
+    assert steps == sorted(steps, reverse=True)
+
+
+def test_a_superposition_follows_one_load_and_stays_off_the_front_of_those_that_follow_any(found):
+    assert row_of(found, RITZ)["any_load"] is False
+    assert row_of(found, RITZ)["pareto_any_load"] is False
+    assert any(row["pareto_any_load"] for row in found.rows)
+
+
+def test_the_table_is_read_back_with_all_columns(found, tmp_path):
+    scene = sampled(read_scene("block", SMALL))
+    whole.write(found, scene, 2, tmp_path / "out")
+    with (tmp_path / "out" / whole.TABLE).open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == table.COLUMNS
+    assert [row["status"] for row in rows] == [row["status"] for row in found.rows]
+
+
+def test_every_contender_enters_with_settings_of_its_own():
+    scene = read_scene("block", SMALL)
+    entered = configurations(scene)
+    assert {one.contender for one in entered} == set(CONTENDERS)
+    assert len({(one.contender, one.label) for one in entered}) == len(entered)
+    quarter = read_scene("block", (*SMALL, "tissue.poisson_ratio=0.25"))
+    assert configurations(quarter, ["volume-springs"]) == []
+
+
+def planted(error, wall, *, any_load=True):
+    return {"field_error": error, "wall_per_s": wall, "any_load": any_load, "status": "resolved"}
+
+
+def test_the_front_holds_what_nothing_beats():
+    best, cheap, beaten = planted(0.1, 2.0), planted(0.3, 1.0), planted(0.2, 3.0)
+    twin, hardly_better = planted(0.1, 2.0), planted(0.0995, 2.5)
+    unresolved = planted(None, 0.1) | {"status": "not resolved"}
+    precomputed = planted(0.05, 0.5, any_load=False)
+    rows = table.with_fronts([best, cheap, beaten, twin, hardly_better, unresolved, precomputed])
+    assert [row["pareto"] for row in rows] == [False] * 6 + [True]
+    assert [row["pareto_any_load"] for row in rows] == [
+        True,
+        True,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
+
+
+class Clock:
+    """Time that passes only when a step is taken."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+    def ready(self, seconds):
+        def take(count=1):
+            self.now += seconds * count
+
+        return Ready(take, lambda: np.zeros((1, 3)), 1e-3, 3, take)
+
+
+def test_a_slower_kernel_costs_in_proportion_and_loses_its_place_on_the_front():
+    def rows(second):
+        clock = Clock()
+        timings = in_turns([clock.ready(1e-4), clock.ready(second)], 3, clock)
+        kept = [Errors("resolved", field=0.2), Errors("resolved", field=0.1)]
+        costs = [Cost(3, 0.0, 1e-3, timing) for timing in timings]
+        pairs = zip(kept, costs, strict=True)
+        return table.with_fronts([table.row(VOLUME[0], e, 0.01, c) for e, c in pairs])
+
+    equal, slower = rows(1e-4), rows(3e-4)
+    assert equal[1]["wall_per_s"] == pytest.approx(0.1)
+    assert slower[1]["wall_per_s"] == pytest.approx(3 * equal[1]["wall_per_s"])
+    assert slower[1]["bare_step_us"] == pytest.approx(300.0)
+    assert [row["pareto"] for row in equal] == [False, True]
+    assert [row["pareto"] for row in slower] == [True, True]
+
+
+def test_a_turn_takes_as_many_steps_whatever_disturbs_it():
+    clock = Clock()
+    (timing,) = in_turns([clock.ready(1.0)], 4, clock)
+    assert timing.walls.shape == (4, FEWEST)
+
+
+@pytest.mark.parametrize(
+    ("rate", "step", "substeps"),
+    [(60.0, 1 / 60, 1), (60.0, 0.0166, 2), (60.0, 1e-3, 17), (1000.0, 1e-3, 1), (1000.0, 0.5, 1)],
+)
+def test_a_frame_has_the_fewest_whole_steps_that_are_short_enough(rate, step, substeps):
+    found = frame(rate, step, np.full(100, 1e-5))
+    assert found.substeps == substeps
+    assert found.wall == pytest.approx(substeps * 1e-5)
+    assert found.slow == pytest.approx(found.wall)
+
+
+def test_slow_frames_decide_whether_a_rate_is_kept():
+    walls = np.full(1000, 1e-4)
+    assert frame(1000.0, 1e-3, walls).in_time
+    walls[::10] = 5e-3  # one in ten, so the 95th percentile is of these
+    found = frame(1000.0, 1e-3, walls)
+    assert found.wall == pytest.approx(1e-4)
+    assert found.slow == pytest.approx(5e-3)
+    assert not found.in_time
+
+
+def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
+    found = frame(25.0, 1e-3, np.full(20, 1e-4))
+    assert (found.substeps, found.slow) == (40, None)
+    assert found.wall == pytest.approx(4e-3)
+
+
+@pytest.mark.parametrize(("away", "status"), [(0.019, "not resolved"), (0.021, "resolved")])
+def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, stated):
+    seen = stated.posed.observation
+    field = np.ones((len(seen.volume_points), 3))
+    curves = np.ones((len(seen.times), len(seen.probes), 3))
+    known = Reference(field, curves, 0.02, np.full(len(seen.probes), 0.02))
+    value = {
+        "field": plain((1 + away) * field),
+        "curves": plain((1 + away) * curves),
+        "margin": None,
+        "inverted_cells": 0,
+    }
+    task = Task("study.tradeoff.observation:observe", {})
+    found = errors(Outcome(task, "done", value, "", 0.0), known, stated)
+    assert found.status == status
+    expected = pytest.approx(away) if status == "resolved" else None
+    assert (found.field, found.tool, found.worst) == (expected,) * 3
+
+
+@pytest.mark.parametrize(
+    ("margin", "inverted", "status"), [(2.0, 2, "inverted"), (0.9, 0, "unstable")]
+)
+def test_cells_turned_inside_out_and_steps_beyond_the_limit_leave_no_error(
+    margin, inverted, status
+):
+    value = {"field": [1.0], "curves": [1.0], "margin": margin, "inverted_cells": inverted}
+    task = Task("study.tradeoff.observation:observe", {})
+    found = errors(Outcome(task, "done", value, "", 0.0), None, None)
+    assert (found.status, found.field) == (status, None)
+
+
+def test_control_points_have_one_order_here_and_in_a_run(stated):
+    given = arguments(sampled(read_scene("block", SMALL)))
+    there = problem(**json.loads(json.dumps(given, sort_keys=True)))
+    assert list(read_scene("block").control_points) == ["tool", "corner"]
+    assert there.posed.probes == stated.posed.probes == ("corner", "tool")
+    assert stated.posed.probes[stated.tool_probe] == "tool"
+
+
+def stepped(stated, configuration, seconds):
+    """Displacement of the nodes after a time, as the timing steps to it."""
+    ready = contender(configuration.contender).prepare(
+        stated.scene, stated.posed, configuration.settings
+    )
+    for _ in range(round(seconds / ready.step)):
+        ready.take_step()
+    return ready.displacement()
+
+
+def ran(stated, configuration, seconds):
+    """Displacement of the control points after a time, as the errors have it."""
+    found = contender(configuration.contender).run(
+        stated.scene, stated.posed, configuration.settings
+    )
+    return found.trajectory.displacement[round(seconds / SAMPLING)]
+
+
+def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
+    settings = {"spacing": 0.01, "volume_term": True, "step_rate": 2000.0}
+    one = Configuration("step-sizes", settings)
+    lattice = assemble(with_settings(stated.scene, settings), stated.posed).lattice
+    at_probes = lattice.interpolation(stated.posed.observation.probes)[0]
+    expected = ran(stated, one, 0.2)
+    found = at_probes @ stepped(stated, one, 0.2)
+    scale = np.abs(expected).max()
+    # The same steps, but their times are summed otherwise.
+    assert np.abs(found - expected).max() < 1e-9 * scale
+    late = at_probes @ stepped(stated, one, 0.2 + 0.0005)
+    assert np.abs(late - expected).max() > 1e-4 * scale
+
+
+@pytest.mark.parametrize("one", [LINEAR, RITZ], ids=lambda one: one.contender)
+def test_what_is_timed_are_the_elements_whose_error_is_measured(one, stated):
+    element, level = one.settings.get("element", "p2"), one.settings["level"]
+    body = build(stated.scene, stated.posed, element, level, "tr-bdf2")
+    at_probes = evaluation(body, stated.posed.observation.probes)
+    expected = ran(stated, one, 0.2)
+    scale = np.abs(expected).max()
+    assert np.abs(at_probes @ stepped(stated, one, 0.2) - expected).max() < 1e-9 * scale
+    late = at_probes @ stepped(stated, one, 0.2 + 1 / 60)
+    assert np.abs(late - expected).max() > 1e-3 * scale
+
+
+def test_a_mode_of_the_superposition_moves_as_its_closed_form():
+    w, dt = 30.0, 0.01
+    state = np.array([0.0, 0.0, 2.0, 0.0])  # a constant load of 2
+    for _ in range(7):
+        state = transitions(np.array([w**2]), Damping(0.0), dt)[0] @ state
+    assert state[0] == pytest.approx(2.0 / w**2 * (1 - math.cos(7 * w * dt)), rel=1e-12)
+
+
+def test_a_mesh_that_changed_since_the_runs_were_planned_is_refused(tmp_path):
+    mesh = tmp_path / "organ.stl"
+    mesh.write_text("solid a")
+    scene = read_scene("block")
+    scene = replace(scene, organ=replace(scene.organ, mesh=str(mesh)))
+    given = arguments(scene)
+    mesh.write_text("solid b")
+    with pytest.raises(ValueError, match="has changed"):
+        problem(**given)
+
+
+def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():
+    h = np.array(advice.FITTED) * 0.01
+    exact = advice.fitted(h, 5.0 * h**1.5, 0.004)
+    assert exact.order == pytest.approx(1.5)
+    assert exact.promise(0.006).error == pytest.approx(5.0 * 0.006**1.5)
+    assert exact.promise(0.006).bar == pytest.approx(0.004)
+    shaken = 1.0 + 0.05 * (-1.0) ** np.arange(len(h))
+    rough = advice.fitted(h, 5.0 * h**1.5 * shaken, 0.004)
+    assert rough.promise(0.01).holds(1.05 * 5e-3)
+    assert rough.promise(0.01).bar > 0.004 + 0.1 * 5e-3
+    assert not exact.promise(0.01).holds(2 * 5e-3)
+    with pytest.raises(ValueError, match=r"only 2.*lattice\.spacing"):
+        advice.fitted(h[:2], h[:2], 0.004)
+
+
+def candidate(error, wall, *, in_time=True):
+    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), wall * 1e-3), None))
+    promise = advice.Promise(error, 0.01)
+    return advice.Candidate(error, promise, cost, Frame(1, wall, wall, in_time))
+
+
+COARSE, MIDDLE, FINE = (
+    candidate(0.20, 0.1),
+    candidate(0.08, 0.4),
+    candidate(0.03, 2.0, in_time=False),
+)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "taken", "met"),
+    [
+        (Demand(60.0, None), MIDDLE, True),
+        (Demand(60.0, 0.3), COARSE, True),
+        (Demand(60.0, 0.1), MIDDLE, True),
+        (Demand(60.0, 0.085), MIDDLE, False),
+        (Demand(60.0, 0.04), MIDDLE, False),
+    ],
+)
+def test_the_cheapest_that_meets_a_demand_is_taken_or_the_nearest(wanted, taken, met):
+    found = advice.best([COARSE, MIDDLE, FINE], wanted)
+    assert found is taken
+    assert found.meets(wanted) is met
+
+
+def test_where_nothing_keeps_up_the_fastest_is_nearest():
+    faster = candidate(0.2, 1.0, in_time=False)
+    assert advice.best([FINE, faster], Demand(1e3, None)) is faster
+
+
+@pytest.fixture
+def command(monkeypatch, tmp_path, capsys):
+    """Exit code, and what was printed, of a command; `main` turns ValueErrors into code 2."""
+
+    def run(*words):
+        monkeypatch.chdir(tmp_path)
+        try:
+            app(words)
+        except ValueError as problem:
+            return EXIT_BAD_INPUT, str(problem)
+        except SystemExit as left:
+            return left.code or 0, capsys.readouterr().out
+        return 0, capsys.readouterr().out
+
+    return run
+
+
+def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_path):
+    code, said = command("recommend", "block", *OVERRIDES, "--error", "30 %")
+    assert code == 0, said
+    assert "as promised" in said
+    assert "own modulus" in said
+    scene = read_scene(str(tmp_path / "block-30percent.toml"))
+    assert scene.lattice.volume_term
+    assert scene.time == read_scene("block", SMALL).time
+    assert scene.lattice.spacing > 0.005
+
+    code, said = command("recommend", "block", *OVERRIDES, "--error", "0.1 %")
+    assert code == EXIT_FAILED_CHECK
+    assert "cannot: no lattice tried meets an error of 0.1 %; the nearest is" in said
+    assert not (tmp_path / "block-0.1percent.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("tradeoff", "block", "--contender", "rods"), "choose from springs"),
+        (("tradeoff", "paper"), "organ.shape"),
+        (("tradeoff", "block", "--workers", "-1"), "workers: -1 is negative"),
+        (("recommend", "block"), "give --rate"),
+        (("recommend", "block", "--rate", "60 kg"), "--rate 60 kg"),
+        (("recommend", "block", "--error", "many %"), "--error many %"),
+        (("recommend", "block", "--error", "0 %"), "--error 0 %"),
+        (("recommend", "block", "--error", "5 %", "--out", "no/where.toml"), "there is no folder"),
+    ],
+)
+def test_bad_input_ends_with_exit_code_2_and_the_remedy(command, words, told, tmp_path):
+    code, said = command(*words)
+    assert code == EXIT_BAD_INPUT
+    assert told in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_dry_run_says_what_would_be_run_and_writes_nothing(command, tmp_path):
+    code, said = command("tradeoff", "block", "--dry-run", "--contender", "basafa")
+    assert code == 0
+    assert said.startswith("4 runs, 0 stored, 4 left")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_demands_are_read_with_their_units():
+    assert demand("1 kHz", "5%") == Demand(1000.0, 0.05)
+    assert demand(None, "0.05") == Demand(None, 0.05)
