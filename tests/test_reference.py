@@ -1,5 +1,6 @@
 """The reference as the study runs it: methods, meshes for its error, accuracy, refusals."""
 
+import csv
 import dataclasses
 import re
 from itertools import pairwise
@@ -32,6 +33,7 @@ from study.run.outcome import Outcome
 from study.run.posed import pose
 from study.scene import Organ, Reference, Tissue
 from study.scene_file import SceneError, read_scene
+from tests.benchmarks import error_bar
 from tests.test_limits import changed
 
 DAMPING = Damping(mass=40.0, stiffness=4e-3)
@@ -450,3 +452,23 @@ def test_a_turn_without_strain_is_warned_of(body):
     turned = np.cross([0.0, 0.3, 0.0], body.points).ravel()
     assert largest_strain(body, turned) < 1e-12
     assert largest_rotation(body, turned) == pytest.approx(0.3)
+
+
+def test_the_stated_errors_hold_as_often_as_is_said():
+    """226 of 234, and none beyond 2.3 times; the safety factors are no proof."""
+    with error_bar.TABLE.open(newline="") as file:
+        ratios = [float(row["true"]) / float(row["stated"]) for row in csv.DictReader(file)]
+    assert (sum(ratio <= 1.0 for ratio in ratios), len(ratios)) == (226, 234)
+    assert max(ratios) < 2.35
+
+
+@pytest.mark.slow
+def test_the_table_of_stated_errors_is_what_the_code_gives(monkeypatch):
+    """Of the coarsest mesh of one scene, against a truth a level coarser than the table's."""
+    monkeypatch.setattr(error_bar, "FINEST", 3)
+    with error_bar.TABLE.open(newline="") as file:
+        committed = {(r["scene"], r["level"], r["quantity"]): r for r in csv.DictReader(file)}
+    for row in error_bar.rows("block, nu 0"):
+        kept = committed[row.scene, str(row.level), row.quantity]
+        assert row.stated == pytest.approx(float(kept["stated"]), rel=1e-3)
+        assert row.true == pytest.approx(float(kept["true"]), rel=0.5)
