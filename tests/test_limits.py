@@ -122,7 +122,6 @@ def test_a_peak_at_the_last_sample_keeps_its_field(small_scene):
     assert errors["field-relative-l2-peak"] == errors["field-relative-l2-final"] > 0
 
 
-
 def test_halved_steps_are_halved_even_where_the_samples_set_the_step(small_scene):
     """Negative control: an error estimate from two equal runs would be zero."""
     scene = changed(small_scene, time={"duration": 0.1, "samples": 1001})

@@ -215,7 +215,7 @@ def alone(kind: str) -> Finding:
 
 def without_footprint(footprint: str) -> Finding:
     """Interval type-2 without a footprint is Mamdani's, and its interval a point."""
-    settings = Settings(footprint=footprint, footprint_factor=0.0)  # type: ignore[arg-type]
+    settings = Settings(footprint=footprint, footprint_factor=0.0)  # type: ignore[arg-type] # a name from the table
     found = estimate(READINGS, "interval-type-2", settings)
     one = estimate(READINGS, "mamdani", settings).estimate
     return beside(np.full(3, one), np.array([found.estimate, *(found.interval or ())]))
@@ -223,7 +223,7 @@ def without_footprint(footprint: str) -> Finding:
 
 def with_largest(footprint: str) -> Finding:
     """The liver's interval at the largest footprint, by a search."""
-    settings = Settings(footprint=footprint, footprint_factor=3.0)  # type: ignore[arg-type]
+    settings = Settings(footprint=footprint, footprint_factor=3.0)  # type: ignore[arg-type] # likewise
     row = np.array([[READINGS[name] / KPA for name in AETIOLOGIES]])
     return _searched(liver_system(settings), row)
 

@@ -127,7 +127,7 @@ def asked(
     """A path that cannot be begun."""
     tissue = replace(TISSUE, poisson_ratio=nu)
     given = tuple(float("nan") if factor is None else factor for factor in factors)
-    path = solve(_column(0.1, element, tissue), tissue, law, given)  # type: ignore[arg-type]
+    path = solve(_column(0.1, element, tissue), tissue, law, given)  # type: ignore[arg-type] # a name of the case
     return value(0.0, path.reached)
 
 

@@ -131,7 +131,7 @@ def leaves_out(shape: str) -> Finding:
     """The share of the body's volume that has no lattice."""
     boxes, share = PARTED[shape]
     assembly, _ = lattice_of(Make(), Boxes(Make().spacing * np.array(boxes)))
-    return value(share, assembly.lattice.dropped)  # type: ignore[attr-defined]
+    return value(share, assembly.lattice.dropped)  # type: ignore[attr-defined] # a cubic lattice has it
 
 
 def scales(size: float) -> Finding:
