@@ -252,6 +252,25 @@ def verify(
         sys.exit(EXIT_FAILED_CHECK)
 
 
+@dataclass(frozen=True, kw_only=True)
+class SweepFlags:
+    """Where the runs of a sweep go.
+
+    Parameters
+    ----------
+    workers
+        Processes that runs are spread over; none by default.
+    scheduler
+        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
+    dry_run
+        Say what would be run, and stop.
+    """
+
+    workers: int = 0
+    scheduler: str | None = None
+    dry_run: Annotated[bool, Parameter(negative=())] = False
+
+
 @app.command
 def tradeoff(
     scene: str = "liver",
@@ -259,12 +278,12 @@ def tradeoff(
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
     contender: list[str] | None = None,
     out: Path | None = None,
-    workers: int = 0,
-    scheduler: str | None = None,
-    dry_run: Annotated[bool, Parameter(negative=())] = False,
     quick: Annotated[bool, Parameter(negative=())] = False,
+    sweep: Annotated[SweepFlags, Parameter(name="*")] = SweepFlags(),
 ) -> None:
     """Measure error and cost of every model of a scene in many settings.
+
+    Costs are always timed in this process, one configuration after another.
 
     Parameters
     ----------
@@ -276,12 +295,6 @@ def tradeoff(
         Only this one, for example volume-springs. May be repeated.
     out
         Folder to write; results/NAME-tradeoff by default. Finished runs are kept beside it.
-    workers
-        Processes that runs are spread over; none by default. Costs are always timed in this one.
-    scheduler
-        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
-    dry_run
-        Say what would be run, and stop.
     quick
         Time three turns instead of five.
     """
@@ -293,11 +306,11 @@ def tradeoff(
         overrides=set_ or (),
         contenders=contender or (),
         out=out,
-        workers=workers,
-        scheduler=scheduler,
+        workers=sweep.workers,
+        scheduler=sweep.scheduler,
         quick=quick,
     )
-    if dry_run:
+    if sweep.dry_run:
         print("\n".join(asked.planned(request)))
         return
     from reports import exchange, exchange_answers, exchange_figure
@@ -358,10 +371,8 @@ def stability(
     scene: str = "block",
     *,
     out: Path | None = None,
-    workers: int = 0,
-    scheduler: str | None = None,
-    dry_run: Annotated[bool, Parameter(negative=())] = False,
     quick: Annotated[bool, Parameter(negative=())] = False,
+    sweep: Annotated[SweepFlags, Parameter(name="*")] = SweepFlags(),
 ) -> None:
     """Try every model at its extremes, and hold what comes out to what is known beforehand.
 
@@ -371,12 +382,6 @@ def stability(
         A built-in scene or a TOML file, whose own lattice is tried too.
     out
         Folder to write; results/NAME-stability by default. Finished cases are kept beside it.
-    workers
-        Processes that cases are spread over; none by default.
-    scheduler
-        Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
-    dry_run
-        Say what would be run, and stop.
     quick
         Only a part of the cases, half a minute.
     """
@@ -384,8 +389,14 @@ def stability(
     from study.stability import table
     from study.sweep.tally import on_stderr
 
-    request = asked.Request(scene=scene, out=out, workers=workers, scheduler=scheduler, quick=quick)
-    if dry_run:
+    request = asked.Request(
+        scene=scene,
+        out=out,
+        workers=sweep.workers,
+        scheduler=sweep.scheduler,
+        quick=quick,
+    )
+    if sweep.dry_run:
         print(asked.planned(request))
         return
     with on_stderr("stability") as progress:
