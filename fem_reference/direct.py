@@ -12,6 +12,9 @@ from scipy.sparse.linalg import splu
 Floats = NDArray[np.float64]
 Solve = Callable[[Floats], Floats]
 
+IMBALANCE = 1e-6
+"""Share of the load by which no answer is out of balance, whatever rounding is to be expected."""
+
 
 def factorised(matrix: csc_array) -> Solve:
     """Solution by factors of a symmetric matrix, in an ordering that keeps them small.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, eye_array, kron
 from scipy.sparse.linalg import LinearOperator, cg, minres
 
-from fem_reference.direct import Solve, factorised
+from fem_reference.direct import IMBALANCE, Solve, factorised
 from fem_reference.elasticity import Body
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,8 @@ def _refined(
     magnitude = abs(matrix)
     for _ in range(REFINEMENTS):
         reachable = ROUNDING * float(np.linalg.norm(magnitude @ np.abs(found)))
-        if np.linalg.norm(left) <= max(tolerance * scale, reachable):
+        # Rounding excuses no more than that: of a nearly singular matrix it would excuse anything.
+        if np.linalg.norm(left) <= max(tolerance * scale, min(reachable, IMBALANCE * scale)):
             return found
         wanted = STRICTER[method] * tolerance * scale / float(np.linalg.norm(left))
         more, _ = method(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.direct import Solve, factorised
+from fem_reference.direct import IMBALANCE, Solve, factorised
 from fem_reference.elasticity import Body
 from fem_reference.iterative import iterative
 
@@ -14,7 +14,6 @@ Floats = NDArray[np.float64]
 FACTORED_BELOW = 6_000
 """Unknowns for which factors are cheaper than iterations, even for one solution."""
 TOLERANCE = 1e-10
-IMBALANCE = 1e-6
 
 
 def solver(body: Body, tolerance: float = TOLERANCE) -> Solve:

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from fem_reference import iterative as module
 from fem_reference import memory
@@ -115,6 +116,18 @@ def test_a_body_held_at_a_point_only_is_refused_or_solved_never_wrong(method, sm
     found = discretise(small_posed.geometry.mesh, Tissue(), weak, small_posed.tool)
     with pytest.raises(ValueError, match="support"):
         solve_static(found) if method == "direct" else iterative(found, 1e-10)(found.load)
+
+
+def test_rounding_of_a_huge_answer_excuses_no_imbalance(monkeypatch):
+    """A solver that runs away along a motion that nothing holds, on any processor."""
+    free = csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
+
+    def runs_away(*_, **_options):
+        return np.full(2, 1e17), 0
+
+    monkeypatch.setitem(module.STRICTER, runs_away, 1.0)
+    with pytest.raises(ValueError, match="support"):
+        module._refined(runs_away, free, np.asarray, np.array([1.0, 0.0]), 1e-10)
 
 
 # --- elements ----------------------------------------------------------------------------------
