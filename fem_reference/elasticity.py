@@ -20,15 +20,17 @@ from skfem.models.elasticity import lame_parameters
 
 from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 ElementName = Literal["p1", "p2", "taylor-hood"]
 
 ELEMENTS = {"p1": skfem.ElementTetP1, "p2": skfem.ElementTetP2, "taylor-hood": skfem.ElementTetP2}
+CHOICES = ("auto", *ELEMENTS)
+"""Names that `chosen_element` takes."""
 LOCKING = 0.48
 """Poisson ratio above which a pressure pays: at 0.49 it leaves a seventh of the error."""
 # Degrees that the quadrature integrates: gradients of quadratic functions, their squares; the load

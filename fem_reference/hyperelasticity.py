@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csc_array
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elasticity import Body, rows
-from study.scene import Tissue
+from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,7 +7,7 @@ import os
 from fem_reference.elasticity import chosen_element
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import edges
-from study.scene import Tissue
+from study.problem.tissue import Tissue
 
 BYTES_PER_UNKNOWN = {"p1": 30_000, "p2": 10_000, "taylor-hood": 13_000}
 """At the peak of assembly and iterative solution, measured at 20 000 to 100 000 unknowns."""

@@ -17,10 +17,10 @@ from fem_reference.observation import at_points, evaluation
 from fem_reference.recording import Recorder
 from fem_reference.solvers import solve_static
 from fem_reference.superposition import Superposed, superposed
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
-from study.scene import Tissue
-from study.trajectory import Observation, Trajectory
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.problem.trajectory import Observation, Trajectory
 
 Floats = NDArray[np.float64]
 Factor = Callable[[Floats], Floats]

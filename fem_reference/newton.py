@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import Law, LawName, Solid, largest_log_strain, solid
-from study.scene import Tissue
+from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 

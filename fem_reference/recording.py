@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points, evaluation, largest_rotation, largest_strain
-from study.trajectory import Observation, empty_trajectory
+from study.problem.trajectory import Observation, empty_trajectory
 
 Floats = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from msm.laws import Law
 from msm.network import Network, network
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
-from study.contact import Foundation, ToolPatch
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import Body
+from study.problem.contact import Foundation, ToolPatch
 
 Floats = NDArray[np.float64]
 

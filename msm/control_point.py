@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from msm.damping import Damping
 from msm.laws import Law, tension
-from study.trajectory import Trajectory
+from study.problem.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from msm.network import Network
 from msm.stability import DEFAULT, Follower, critical_time_step
 from msm.statics import static_displacement
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
-from study.trajectory import Observation, Trajectory, empty_trajectory
+from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
 __all__ = [
     "DEFAULT",

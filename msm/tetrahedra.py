@@ -22,11 +22,11 @@ from scipy.sparse import csr_array
 from msm.assembly import Assembly, contact
 from msm.calibration import reference_stiffness
 from msm.springs import Springs
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import SurfaceRule
 from study.mesh.tetrahedra import EDGES, edges, mean_edge, volumes
+from study.problem.contact import Foundation, ToolPatch
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,7 +13,7 @@ from typing import Any
 
 from reports.differences import resolved
 from reports.digits import DASH, Table, count, fixed, percent, significant
-from study.results import Results
+from study.results.folder import Results
 
 FOLDER = resources.files("reports").joinpath("data")
 VOLUME_TERM = {"False": "springs", "True": "springs and volume term"}

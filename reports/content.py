@@ -15,7 +15,7 @@ from reports.ranking import columns, tool_probe
 from reports.reference import is_built_in_liver, reference
 from reports.rule_view import view_names
 from reports.verification import verification
-from study.results import Results
+from study.results.folder import Results
 
 SCENE_COLUMNS = 4
 

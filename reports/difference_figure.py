@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from reports import canvas
 from reports.appearance import look
 from reports.differences import field_errors, own_error, resolved
-from study.results import Results
+from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from reports.digits import percent
-from study.results import Results
+from study.results.folder import Results
 
 
 def field_errors(results: Results) -> dict[tuple[str, str], dict[str, float]]:

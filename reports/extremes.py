@@ -9,7 +9,7 @@ from reports.beforehand import has_lattice
 from reports.digits import count, percent, words
 from reports.exchange_figure import exchange_figure
 from reports.stability_map import critical_step_figure, stability_map
-from study.results import Results
+from study.results.folder import Results
 
 
 def extremes(results: Results) -> dict[str, Any] | None:

@@ -13,7 +13,7 @@ from reports.appearance import look
 from reports.camera import Camera, facing_tool
 from reports.digits import fixed, short, significant
 from reports.renders import Job, Pictures
-from study.results import Results
+from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reports import canvas
 from reports.appearance import FUZZY_PREFIX, SYSTEM_NAMES, look, system_name
-from study.results import Results
+from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

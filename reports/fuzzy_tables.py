@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from reports.appearance import system_name
 from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, words
-from study.results import Results
+from study.results.folder import Results
 
 SYSTEM = "system"
 SOURCED_MARKS = {"yes": "", "partly": " †", "weak": " ‡", "no": " §"}

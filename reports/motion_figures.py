@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reports import canvas
 from reports.appearance import look
 from reports.digits import short
-from study.results import Results, Row
+from study.results.folder import Results, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

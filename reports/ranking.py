@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reports.appearance import system_of
-from study.results import Results
+from study.results.folder import Results
 
 Column = tuple[str, str]
 

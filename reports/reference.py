@@ -7,7 +7,7 @@ from typing import Any
 
 from reports.digits import DASH, count, fixed, percent, significant, words
 from reports.summary import printed_peak
-from study.results import Results
+from study.results.folder import Results
 
 ELEMENTS = {
     "p1": "linear tetrahedra",

@@ -19,7 +19,7 @@ from reports.motion_figures import motion_figures
 from reports.renders import Pictures, render
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
-from study.results import Results, ResultsError, read
+from study.results.folder import Results, ResultsError, read
 
 NAME = "report.pdf"
 TEMPLATE = "template.typ"

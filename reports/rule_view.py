@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from reports import canvas
 from reports.appearance import FUZZY_PREFIX, look, system_name
 from reports.digits import fixed
-from study.results import Results
+from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

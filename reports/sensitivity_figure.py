@@ -16,7 +16,7 @@ from reports.fuzzy_tables import (
     changes,
     heading,
 )
-from study.results import Results
+from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,7 +21,7 @@ from reports.digits import (
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
 from reports.ranking import Verdict, references, tool_probe, verdicts
-from study.results import Results
+from study.results.folder import Results
 
 GLANCE = (
     "model",

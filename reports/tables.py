@@ -31,7 +31,7 @@ from reports.ranking import (
     verdicts,
 )
 from reports.summary import status
-from study.results import Results
+from study.results.folder import Results
 from study.similarity.score import FORMULAS
 
 BEST = "*"

@@ -9,7 +9,7 @@ from typing import Any
 
 from reports.beforehand import Line, read
 from reports.digits import DASH, Table, count, fixed, significant, words
-from study.results import Results
+from study.results.folder import Results
 
 GROWTH = "growth: "
 PARTS = ("mesh", "assembly", "solution")

@@ -14,7 +14,7 @@ from cyclopts import App, Parameter
 if TYPE_CHECKING:
     from types import FrameType
 
-    from study.results import Results
+    from study.results.folder import Results
 
 EXIT_FAILED_CHECK = 1
 EXIT_BAD_INPUT = 2
@@ -77,10 +77,10 @@ def run(
         Go on from where an interrupted run into the same folder last kept its state.
     """
     from study.progress import on_stderr
-    from study.results import continuing, replacing, write
+    from study.results.folder import continuing, replacing, write
     from study.run.keeping import Keeping
     from study.run.whole import run_study
-    from study.scene_file import read_scene
+    from study.scene.file import read_scene
 
     chosen = read_scene(scene, set_ or ())
     folder = out or Path("results") / Path(scene).stem
@@ -143,7 +143,7 @@ def _print_summary(results: Results, folder: Path) -> None:
 @app.command
 def scenes() -> None:
     """List the built-in scenes."""
-    from study.scene_file import BUILT_IN, built_in_title
+    from study.scene.file import BUILT_IN, built_in_title
 
     for name in BUILT_IN:
         print(f"{name:8s} {built_in_title(name)}")
@@ -167,8 +167,8 @@ def check(
     unit
         Unit of a mesh file, for example mm; guessed from the volume if it is not given.
     """
-    from study.inspection import describe_mesh, describe_scene
-    from study.scene_file import BUILT_IN
+    from study.check import describe_mesh, describe_scene
+    from study.scene.file import BUILT_IN
 
     if target in BUILT_IN or target.endswith(".toml") or not Path(target).exists():
         lines = describe_scene(target, set_ or ())
@@ -211,8 +211,8 @@ def export(
     set_
         Override of a scene, table.key=value. May be repeated.
     """
-    from study.exporting import Request
-    from study.exporting import export as write
+    from study.export import Request
+    from study.export import export as write
     from study.progress import on_stderr
 
     with on_stderr() as progress:
@@ -238,7 +238,7 @@ def verify(
     as_json
         Print JSON instead of a table.
     """
-    from study import verifying
+    from study.known import verify as verifying
     from study.progress import on_stderr
 
     if out is not None and not out.parent.is_dir():
@@ -385,8 +385,8 @@ def stability(
     quick
         Only a part of the cases, half a minute.
     """
-    from study.stability import request as asked
-    from study.stability import table
+    from study.known.stability import request as asked
+    from study.known.stability import table
     from study.sweep.tally import on_stderr
 
     request = asked.Request(

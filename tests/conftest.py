@@ -10,11 +10,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
+from study.problem.problem import Problem
 from study.progress import Silent
-from study.run.posed import Posed, pose
 from study.run.whole import run_study
 from study.scene import Scene
-from study.scene_file import read_scene
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 SMALL = (
     'organ.size=["60 mm", "40 mm", "30 mm"]',
@@ -40,8 +41,8 @@ def small_scene() -> Scene:
 
 
 @pytest.fixture(scope="session")
-def small_posed(small_scene) -> Posed:
-    return pose(small_scene)
+def small_posed(small_scene) -> Problem:
+    return problem_of(small_scene)
 
 
 @pytest.fixture(scope="session")

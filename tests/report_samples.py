@@ -13,7 +13,7 @@ import typst
 
 from reports import report
 from reports.content import document
-from study.results import Results, Row
+from study.results.folder import Results, Row
 from study.similarity.score import MEASURES
 
 TITLE = "An octahedron under a tool"

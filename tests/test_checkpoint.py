@@ -19,7 +19,7 @@ from msm.springs import connect
 from msm.volume import volume_term
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
-from study.trajectory import Observation
+from study.problem.trajectory import Observation
 
 E, H, RHO, SAMPLES = 5e3, 0.01, 1054.0, 41
 STIFFENING = Basafa(8.0, 1600.0, 0.2)

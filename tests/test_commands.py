@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from study import progress
-from study.results import TABLES
+from study.results.folder import TABLES
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -9,10 +9,10 @@ import pytest
 from msm.integrators import INTEGRATORS
 from study.folders import FolderError
 from study.progress import Silent
-from study.results import TABLES, Results, ResultsError, read, replacing
-from study.results import write as write_files
-from study.run.comparison import best_factor, relative_l2
+from study.results.folder import TABLES, Results, ResultsError, read, replacing
+from study.results.folder import write as write_files
 from study.run.whole import run_study
+from study.similarity.fields import best_factor, relative_l2
 
 MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2"]
 

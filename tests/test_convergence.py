@@ -8,13 +8,13 @@ from msm.calibration import reference_stiffness
 from msm.lattice import interpolation
 from msm.laws import Hooke
 from msm.model import Material, assemble, static_displacement
-from study.contact import Foundation, ToolPatch
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
-from study.run.comparison import best_factor, relative_l2
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.similarity.fields import best_factor, relative_l2
 
 SIZE = (0.20, 0.16, 0.08)
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.run.convergence import (
+from fem_reference.discretisation_error import (
     FORMAL_ORDER,
     SAFETY,
     SAFETY_ASSUMED,

@@ -7,11 +7,11 @@ import skfem
 from fem_reference.elasticity import discretise
 from fem_reference.grid import CurvedMapping, curved, mapping, straight
 from fem_reference.observation import at_points, evaluation
-from study.contact import Foundation, ToolPatch
 from study.organ import liver
 from study.organ.isosurface_stuffing import stuff
 from study.organ.projection import onto_surface
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
 
 RADIUS = 0.05
 VOLUME = 1.5e-3

@@ -11,13 +11,13 @@ from scipy.sparse import coo_array
 
 from fem_reference.elasticity import discretise
 from fem_reference.exchange import calculix
-from fem_reference.exchange.problem import Problem, problem
-from study import exporting
+from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from study import export as exporting
 from study.commands import app
-from study.exporting import Request, export
+from study.export import Request, export
 from study.progress import Silent
-from study.results import SCHEMA_VERSION, Results, write
-from study.scene_file import write_scene
+from study.results.folder import SCHEMA_VERSION, Results, write
+from study.scene.file import write_scene
 from tests.oracles.cases import build, ramp
 
 SMALL = ('organ.size=["60 mm", "40 mm", "30 mm"]', "tool.radius=15 mm", "tool.force=0.05 N")
@@ -25,7 +25,7 @@ QUICK = (*SMALL, "reference.element_size=20 mm", "time.samples=17")
 
 
 @pytest.fixture(scope="module", params=["block-p1", "block-p2-wavy"])
-def found(request) -> Problem:
+def found(request) -> NodalProblem:
     return build(request.param).problem
 
 
@@ -59,7 +59,7 @@ def test_taylor_hood_is_refused_with_key_and_remedy(small_posed, small_scene):
     mesh = posed.geometry.mesh
     body = discretise(mesh, tissue, posed.foundation, posed.tool, "taylor-hood")
     with pytest.raises(ValueError, match=r"reference\.element: taylor-hood .*\"p2\""):
-        problem(body, tissue, posed.foundation)
+        nodal_problem(body, tissue, posed.foundation)
 
 
 # --- CalculiX ------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from msm.lattice import interpolation
 from msm.statics import static_displacement
 from study.mesh.quadrature import over_volume
 from study.organ.block import block_mesh
-from study.run.comparison import relative_l2
+from study.similarity.fields import relative_l2
 from tests.benchmarks import field_error, large_strain
 from tests.benchmarks.converged import converged
 

@@ -9,9 +9,9 @@ import pytest
 import pyvista
 
 from msm import model
-from study import vtkhdf
-from study.fields import Frames, Mesh, recording
 from study.organ.block import block_mesh
+from study.results import vtkhdf
+from study.results.fields import Frames, Mesh, recording
 from study.run.lattices import assemble, elastic
 
 pytestmark = pytest.mark.filterwarnings("ignore::pyvista.PyVistaDeprecationWarning")

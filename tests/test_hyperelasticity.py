@@ -18,10 +18,10 @@ from fem_reference.hyperelasticity import (
     solid,
 )
 from fem_reference.newton import TOLERANCE, solve
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
 from tests.benchmarks import large_strain
 
 EDGE = 0.04

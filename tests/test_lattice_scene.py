@@ -10,7 +10,7 @@ from msm.checkpoint import Checkpoint
 from msm.damping import Damping
 from msm.laws import Hooke, Piecewise, initial_stiffness
 from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
-from study.inspection import describe_scene
+from study.check import describe_scene
 from study.mesh.tetrahedra import edges, mean_edge
 from study.progress import Silent
 from study.run.assumptions import assumptions
@@ -25,8 +25,8 @@ from study.run.lattices import (
 )
 from study.run.organ import run_organ, spacing
 from study.run.outcome import Outcome
-from study.run.posed import pose
-from study.scene_file import read_scene, write_scene
+from study.scene.file import read_scene, write_scene
+from study.scene.problem import problem_of
 from tests.conftest import SMALL
 
 E = 9.5e3
@@ -50,7 +50,7 @@ def scene_with(*overrides):
 
 def posed_with(*overrides):
     scene = scene_with(*overrides)
-    posed = pose(scene)
+    posed = problem_of(scene)
     return scene, posed, assemble(scene, posed)
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from study.progress import Silent
-from study.run.posed import pose
 from study.run.whole import run_study
-from study.scene_file import read_scene
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 
 def changed(scene, **tables):
@@ -107,7 +107,8 @@ def test_a_scene_that_cannot_be_posed_names_the_key(override, message):
 def test_support_and_tool_stay_where_they_are_whatever_the_mesh(small_scene):
     """The places must not move with the element size, or no study could converge."""
     posed = [
-        pose(changed(small_scene, reference={"element_size": size})) for size in (0.015, 0.006)
+        problem_of(changed(small_scene, reference={"element_size": size}))
+        for size in (0.015, 0.006)
     ]
     assert np.allclose(posed[0].tool.centre, posed[1].tool.centre, atol=1e-15)
     assert posed[0].foundation.level == posed[1].foundation.level
@@ -145,12 +146,12 @@ def test_a_stiff_support_on_cut_cells_still_lets_the_lattice_settle(small_scene)
     from msm.damping import Damping
     from msm.laws import Hooke
     from msm.model import Material, assemble, run, static_displacement
-    from study.trajectory import Observation
+    from study.problem.trajectory import Observation
 
     scene = changed(small_scene, organ={"size": (0.06, 0.04, 0.035)}, support={"stiffness": 1e8})
     place = dataclasses.replace(scene.tool.place, side="inferior")
     scene = changed(scene, support={"side": "superior"}, tool={"place": place})
-    posed = pose(dataclasses.replace(scene, control_points={}))
+    posed = problem_of(dataclasses.replace(scene, control_points={}))
     lattice = assemble(
         posed.geometry.body, posed.surface_rule, 1054, 0.01, posed.foundation, posed.tool, 0.2
     )

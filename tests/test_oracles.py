@@ -12,7 +12,7 @@ import pytest
 from fem_reference.dynamics import Damping
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.solvers import solve_static
-from study.exporting import frames
+from study.export import frames
 from tests.oracles import calculix, matrices
 from tests.oracles.cases import CASES, DYNAMIC, build, difference, kept, ramp
 

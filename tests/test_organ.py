@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import over_surface, over_volume
@@ -12,8 +11,9 @@ from study.organ import liver
 from study.organ.block import block_mesh
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import ImplicitBody, MeshBody
-from study.organ.place import OUTWARD, resolve
+from study.problem.contact import Foundation, ToolPatch
 from study.scene import Place
+from study.scene.place import OUTWARD, resolve
 
 VOLUME = 1.5e-3
 

@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from study.run.comparison import relative_l2
+from study.similarity.fields import relative_l2
 from tests.benchmarks import bench_peers, field_error
 from tests.benchmarks.bench_peers import FRACTION, LOAD, SETTLED, SPACINGS, steps_in
 

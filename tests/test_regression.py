@@ -13,7 +13,7 @@ import pytest
 
 from study.progress import Silent
 from study.run.whole import run_study
-from study.scene_file import read_scene
+from study.scene.file import read_scene
 
 STORE = Path(__file__).parent / "data" / "scores.json"
 # Library versions change sums in the last digits, and a factor of 1e4 covers how far solvers and

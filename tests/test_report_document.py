@@ -13,7 +13,7 @@ import typst
 
 from reports import motion_figures, renders, report
 from reports.content import document
-from study.results import Results, ResultsError, write
+from study.results.folder import Results, ResultsError, write
 from tests.report_samples import FUZZY, MODELS, TITLE, results_of
 
 ROOT = Path(__file__).resolve().parent.parent

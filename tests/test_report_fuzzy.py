@@ -35,7 +35,7 @@ from reports.fuzzy_tables import (
 )
 from reports.rule_view import draw_rules, kinds, rule_figures, view_names
 from reports.sensitivity_figure import draw_sensitivity, layout, sensitivity_figure
-from study.results import Results
+from study.results.folder import Results
 from tests.report_samples import results_of
 
 NAN = float("nan")

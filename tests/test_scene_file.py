@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from study.quantity import Quantity
-from study.scene_file import BUILT_IN, SceneError, read_scene, resolved, write_scene
+from study.scene.file import BUILT_IN, SceneError, read_scene, resolved, write_scene
 
 MESH = "lattice.springs=tetrahedra"
 RAYLEIGH = "damping.kind=rayleigh"

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from study.problem.response import Motion
 from study.similarity import phase_plane
-from study.similarity.motion import Motion
 from study.similarity.score import scores
 
 SAMPLES = st.integers(8, 40)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import similaritymeasures
 
-from study.similarity.motion import Motion
+from study.problem.response import Motion
 from study.similarity.score import scores
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import similaritymeasures
 
+from study.problem.response import Motion
 from study.similarity import phase_plane
-from study.similarity.motion import Motion
 from study.similarity.score import FORMULAS, MEASURES, scores
 from study.similarity.time_history import relative_l2_distance
 from study.similarity.time_warping import warping_path

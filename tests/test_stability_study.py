@@ -11,17 +11,17 @@ import pytest
 
 from fem_reference.elasticity import discretise
 from study.commands import EXIT_FAILED_CHECK, app
-from study.contact import Foundation, ToolPatch
+from study.known.stability import request as asked
+from study.known.stability import suite, table
+from study.known.stability.case import Case, judge
+from study.known.stability.cases import collapse, critical_step, drift, fixed_step, lattice_shapes
+from study.known.stability.finding import Finding, at_most, beside, value
+from study.known.stability.trial import trial
 from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
-from study.scene import Tissue
-from study.scene_file import read_scene
-from study.stability import request as asked
-from study.stability import suite, table
-from study.stability.case import Case, judge
-from study.stability.cases import collapse, critical_step, drift, fixed_step, lattice_shapes
-from study.stability.finding import Finding, at_most, beside, value
-from study.stability.trial import trial
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.scene.file import read_scene
 from study.sweep.runner import Outcome
 
 COMMITTED = Path(__file__).resolve().parent.parent / "reports/data/stability.csv"

@@ -18,15 +18,15 @@ from msm.springs import Springs, stiffness_matrix
 from msm.tetrahedra import TetrahedralLattice, connect, node_volumes
 from msm.tetrahedra import assemble as assemble_tetrahedra
 from msm.volume import none
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary, mean_edge, oriented, volumes
 from study.organ.block import block_mesh
 from study.organ.isosurface_stuffing import body_centred_lattice
 from study.organ.occupancy import MeshBody
-from study.run.comparison import best_factor, relative_l2
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.similarity.fields import best_factor, relative_l2
 
 DOWN = np.array([0.0, 0.0, -1.0])
 CUBE, BLOCK = (1.0, 1.0, 1.0), (0.20, 0.16, 0.08)

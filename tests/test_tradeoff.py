@@ -13,10 +13,11 @@ from fem_reference.observation import evaluation
 from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
 from study.progress import Silent
 from study.run.lattices import assemble
-from study.scene_file import read_scene
+from study.scene.file import read_scene
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
+from study.tradeoff import problem as problem_module
 from study.tradeoff import recommend as advice
 from study.tradeoff import table, whole
 from study.tradeoff.body import build
@@ -26,7 +27,7 @@ from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lattice import with_settings
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations, contender
-from study.tradeoff.problem import SAMPLING, arguments, plain, problem, sampled
+from study.tradeoff.problem import SAMPLING, arguments, plain, sampled
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Reference
 from study.tradeoff.table import Cost
@@ -60,7 +61,7 @@ def found(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def stated():
-    return problem(**arguments(sampled(read_scene("block", SMALL))))
+    return problem_module.stated(**arguments(sampled(read_scene("block", SMALL))))
 
 
 def row_of(found, configuration):
@@ -212,7 +213,7 @@ def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
 
 @pytest.mark.parametrize(("away", "status"), [(0.019, "not resolved"), (0.021, "resolved")])
 def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, stated):
-    seen = stated.posed.observation
+    seen = stated.problem.observation
     field = np.ones((len(seen.volume_points), 3))
     curves = np.ones((len(seen.times), len(seen.probes), 3))
     known = Reference(field, curves, 0.02, np.full(len(seen.probes), 0.02))
@@ -243,16 +244,16 @@ def test_cells_turned_inside_out_and_steps_beyond_the_limit_leave_no_error(
 
 def test_control_points_have_one_order_here_and_in_a_run(stated):
     given = arguments(sampled(read_scene("block", SMALL)))
-    there = problem(**json.loads(json.dumps(given, sort_keys=True)))
+    there = problem_module.stated(**json.loads(json.dumps(given, sort_keys=True)))
     assert list(read_scene("block").control_points) == ["tool", "corner"]
-    assert there.posed.probes == stated.posed.probes == ("corner", "tool")
-    assert stated.posed.probes[stated.tool_probe] == "tool"
+    assert there.problem.probes == stated.problem.probes == ("corner", "tool")
+    assert stated.problem.probes[stated.problem.tool_probe] == "tool"
 
 
 def stepped(stated, configuration, seconds):
     """Displacement of the nodes after a time, as the timing steps to it."""
     ready = contender(configuration.contender).prepare(
-        stated.scene, stated.posed, configuration.settings
+        stated.scene, stated.problem, configuration.settings
     )
     for _ in range(round(seconds / ready.step)):
         ready.take_step()
@@ -262,7 +263,7 @@ def stepped(stated, configuration, seconds):
 def ran(stated, configuration, seconds):
     """Displacement of the control points after a time, as the errors have it."""
     found = contender(configuration.contender).run(
-        stated.scene, stated.posed, configuration.settings
+        stated.scene, stated.problem, configuration.settings
     )
     return found.trajectory.displacement[round(seconds / SAMPLING)]
 
@@ -270,8 +271,8 @@ def ran(stated, configuration, seconds):
 def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
     settings = {"spacing": 0.01, "volume_term": True, "step_rate": 2000.0}
     one = Configuration("step-sizes", settings)
-    lattice = assemble(with_settings(stated.scene, settings), stated.posed).lattice
-    at_probes = lattice.interpolation(stated.posed.observation.probes)[0]
+    lattice = assemble(with_settings(stated.scene, settings), stated.problem).lattice
+    at_probes = lattice.interpolation(stated.problem.observation.probes)[0]
     expected = ran(stated, one, 0.2)
     found = at_probes @ stepped(stated, one, 0.2)
     scale = np.abs(expected).max()
@@ -284,8 +285,8 @@ def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
 @pytest.mark.parametrize("one", [LINEAR, RITZ], ids=lambda one: one.contender)
 def test_what_is_timed_are_the_elements_whose_error_is_measured(one, stated):
     element, level = one.settings.get("element", "p2"), one.settings["level"]
-    body = build(stated.scene, stated.posed, element, level, "tr-bdf2")
-    at_probes = evaluation(body, stated.posed.observation.probes)
+    body = build(stated.scene, stated.problem, element, level, "tr-bdf2")
+    at_probes = evaluation(body, stated.problem.observation.probes)
     expected = ran(stated, one, 0.2)
     scale = np.abs(expected).max()
     assert np.abs(at_probes @ stepped(stated, one, 0.2) - expected).max() < 1e-9 * scale
@@ -309,7 +310,7 @@ def test_a_mesh_that_changed_since_the_runs_were_planned_is_refused(tmp_path):
     given = arguments(scene)
     mesh.write_text("solid b")
     with pytest.raises(ValueError, match="has changed"):
-        problem(**given)
+        problem_module.stated(**given)
 
 
 def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():

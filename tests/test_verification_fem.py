@@ -16,7 +16,7 @@ from fem_reference.model import build
 from fem_reference.observation import at_points, evaluation, largest_strain
 from fem_reference.solvers import solve_static
 from fem_reference.stiffness import Stiffness
-from fem_reference.verification import (
+from study.known.verification import (
     bent_bar,
     column,
     damped_motion,
@@ -28,13 +28,13 @@ from fem_reference.verification import (
     thick_sphere,
     torsional_modes,
 )
-from fem_reference.verification.finding import Finding, convergence
-from fem_reference.verification.suite import PROBLEMS
-from study.contact import Foundation, ToolPatch
+from study.known.verification.finding import Finding, convergence
+from study.known.verification.suite import PROBLEMS
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.organ.block import block_mesh
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
 
 SIZE = (0.06, 0.05, 0.04)
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -17,7 +17,7 @@ from msm.springs import Springs, connect, stiffness_matrix
 from msm.volume import none
 from study.organ.block import block_mesh
 from study.organ.occupancy import ImplicitBody, MeshBody
-from study.trajectory import Observation
+from study.problem.trajectory import Observation
 
 E, H = 4e3, 0.01
 MIXES = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.9), (0.5, 0.4), (1.0, 0.9)]
@@ -244,7 +244,7 @@ def test_compiled_law_equals_the_plain_one(law):
 def test_benchmark_scaling_keeps_the_modulus_at_every_spacing():
     """K (h / h_0)^2 per length h: k_ref / h, and so E = 2.5 k_ref / h, does not change."""
     from study.run.lattices import benchmark
-    from study.scene_file import read_scene
+    from study.scene.file import read_scene
 
     for spacing in ("5 mm", "10 mm", "20 mm"):
         scene = read_scene("liver", [f"lattice.spacing={spacing}"])

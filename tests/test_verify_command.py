@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from fem_reference.verification.finding import Finding, Problem
-from fem_reference.verification.suite import PROBLEMS
-from study import verifying
 from study.commands import EXIT_FAILED_CHECK, app
+from study.known import verify as verifying
+from study.known.verification.finding import Finding, Problem
+from study.known.verification.suite import PROBLEMS
 from study.progress import Silent
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.dynamics import Damping
-from fem_reference.exchange.problem import DIRECTIONS, Problem
+from fem_reference.exchange.nodal import DIRECTIONS, NodalProblem
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Motion:
         return step > 0 and (step % self.kept == 0 or step == self.count)
 
 
-def files(problem: Problem, motion: Motion | None = None) -> dict[str, str]:
+def files(problem: NodalProblem, motion: Motion | None = None) -> dict[str, str]:
     """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion."""
     named = {
         "mesh.inp": _lines(_mesh(problem, motion)),
@@ -76,7 +76,7 @@ def _number(value: float) -> str:
     return text if len(text) <= FIELD else f"{value:.12e}"
 
 
-def _mesh(problem: Problem, motion: Motion | None) -> Iterator[str]:
+def _mesh(problem: NodalProblem, motion: Motion | None) -> Iterator[str]:
     yield "*NODE, NSET=ALL"
     for number, (x, y, z) in enumerate(problem.nodes, 1):
         yield f"{number}, {_number(x)}, {_number(y)}, {_number(z)}"
@@ -93,7 +93,7 @@ def _mesh(problem: Problem, motion: Motion | None) -> Iterator[str]:
     yield "*SOLID SECTION, ELSET=BODY, MATERIAL=TISSUE"
 
 
-def _foundation(problem: Problem) -> Iterator[str]:
+def _foundation(problem: NodalProblem) -> Iterator[str]:
     number = len(problem.elements)
     for index, ((constant, ends, direction), members) in enumerate(_sets(problem).items(), 1):
         yield f"*ELEMENT, TYPE=SPRING{ends}, ELSET={SET_NAME}{index}"
@@ -105,7 +105,7 @@ def _foundation(problem: Problem) -> Iterator[str]:
         yield constant
 
 
-def _sets(problem: Problem) -> dict[tuple[str, int, int], list[tuple[int, ...]]]:
+def _sets(problem: NodalProblem) -> dict[tuple[str, int, int], list[tuple[int, ...]]]:
     """Springs by what one set has in common: constant, number of nodes, direction."""
     found: dict[tuple[str, int, int], list[tuple[int, ...]]] = {}
     for nodes, constant in springs(problem):
@@ -114,7 +114,7 @@ def _sets(problem: Problem) -> dict[tuple[str, int, int], list[tuple[int, ...]]]
     return found
 
 
-def springs(problem: Problem) -> Iterator[tuple[tuple[int, ...], float]]:
+def springs(problem: NodalProblem) -> Iterator[tuple[tuple[int, ...], float]]:
     """Nodes, from 1, and constant [N/m] of each spring of the foundation in one direction."""
     S = problem.support.tocoo()
     for i, j, value in zip(S.coords[0], S.coords[1], S.data, strict=True):
@@ -125,7 +125,7 @@ def springs(problem: Problem) -> Iterator[tuple[tuple[int, ...], float]]:
             yield (i + 1,), float(total)
 
 
-def _load(problem: Problem) -> Iterator[str]:
+def _load(problem: NodalProblem) -> Iterator[str]:
     for node, direction in np.argwhere(problem.load != 0.0):
         yield f"{node + 1}, {direction + 1}, {_number(problem.load[node, direction])}"
 

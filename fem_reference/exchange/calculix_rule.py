@@ -16,7 +16,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from fem_reference.elasticity import Body
 from fem_reference.stiffness import Stiffness
-from study.scene import Tissue
+from study.problem.tissue import Tissue
 
 ONE_POINT = (np.full((3, 1), 0.25), np.array([1.0 / 6.0]))
 NEAR, FAR = (5.0 - np.sqrt(5.0)) / 20.0, (5.0 + 3.0 * np.sqrt(5.0)) / 20.0

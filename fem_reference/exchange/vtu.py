@@ -16,14 +16,14 @@ from vtkmodules.vtkCommonDataModel import (
 )
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-from fem_reference.exchange.problem import Problem
+from fem_reference.exchange.nodal import NodalProblem
 
 Floats = NDArray[np.float64]
 
 CELL_TYPES = {4: VTK_TETRA, 10: VTK_QUADRATIC_TETRA}
 
 
-def text(problem: Problem, displacement: Floats) -> str:
+def text(problem: NodalProblem, displacement: Floats) -> str:
     """A .vtu file with the displacement [m] (n, 3), load [N] and support density [Pa/m]."""
     fields = {
         "displacement": displacement,
@@ -38,7 +38,7 @@ def text(problem: Problem, displacement: Floats) -> str:
     return str(writer.GetOutputString())
 
 
-def _grid(problem: Problem, fields: Mapping[str, Floats]) -> vtkUnstructuredGrid:
+def _grid(problem: NodalProblem, fields: Mapping[str, Floats]) -> vtkUnstructuredGrid:
     corners = problem.elements.shape[1]
     places, connectivity = vtkPoints(), vtkCellArray()
     places.SetData(numpy_to_vtk(problem.nodes, deep=True))  # type: ignore[no-untyped-call] # VTK has no types here

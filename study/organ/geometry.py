@@ -17,7 +17,6 @@ from study.organ.block import block_of_cells, cell_counts
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import Body, ImplicitBody, MeshBody
 from study.organ.projection import onto_surface
-from study.scene import Organ
 
 Projection = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -57,22 +56,13 @@ class Geometry:
     project: Projection | None = None
 
 
-def build(organ: Organ, element_size: float) -> Geometry:
-    """Geometry of an organ with finite elements of about `element_size` [m].
+def block(size: tuple[float, float, float], element_size: float) -> Geometry:
+    """A block of edges [m] in elements of about `element_size` [m].
 
-    Raises MeshError, a ValueError, for a mesh file that cannot be used.
+    All axes are cut into as many parts more from level to level, from 2 to 4 and on. ValueError for
+    elements so small that they are too many.
     """
-    if organ.mesh is not None:
-        return _from_file(Path(organ.mesh), organ.unit, element_size)
-    volume = float(np.prod(organ.size)) if organ.shape == "block" else organ.volume
-    _check_count(volume, element_size)
-    if organ.shape == "block":
-        return _block(organ.size, element_size)
-    return _liver(organ.volume, element_size)
-
-
-def _block(size: tuple[float, float, float], element_size: float) -> Geometry:
-    """A block; all axes are cut into as many parts more from level to level, from 2 to 4 and on."""
+    _check_count(float(np.prod(size)), element_size)
     parts = cell_counts(size, BLOCK_PARTS * element_size)
 
     @cache
@@ -96,7 +86,12 @@ def _check_count(volume: float, element_size: float) -> None:
         )
 
 
-def _liver(volume: float, element_size: float) -> Geometry:
+def built_in_liver(volume: float, element_size: float) -> Geometry:
+    """The built-in liver of a volume [m^3] in elements of about `element_size` [m].
+
+    ValueError for elements so small that they are too many.
+    """
+    _check_count(volume, element_size)
     body = ImplicitBody(lambda points: liver.signed_function(points, volume))
     box = liver.bounding_box(volume)
 
@@ -114,7 +109,11 @@ def _liver(volume: float, element_size: float) -> Geometry:
     return _geometry(level, body, (note,), partial(onto_surface, body.signed))
 
 
-def _from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
+def from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
+    """The organ of a mesh file in its unit, in elements of about `element_size` [m].
+
+    Raises MeshError, a ValueError, for a file that cannot be used.
+    """
     from study.mesh.load import load_mesh
     from study.mesh.tetrahedralise import tetrahedralise
 

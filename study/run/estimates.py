@@ -15,7 +15,7 @@ from fuzzy.explanation_arrays import drawing_arrays
 from fuzzy.liver import records_in_use
 from fuzzy.sensitivity import sensitivity
 from fuzzy.stiffness import Estimate, Options, Settings
-from study.results import Row
+from study.results.folder import Row
 from study.scene import Scene
 
 SURFACE_POINTS = 41

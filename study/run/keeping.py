@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.checkpoint import Checkpoint
-from study.fields import Mesh, recording
+from study.results.fields import Mesh, recording
 
 Floats = NDArray[np.float64]
 OnSample = Callable[[int, Floats, Floats], None]

@@ -9,16 +9,16 @@ from fem_reference.hyperelasticity import LawName
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
+from study.problem.problem import Problem
 from study.progress import Progress
-from study.run.comparison import relative_l2
 from study.run.outcome import ROTATION_LIMIT, STRAIN_LIMIT, Outcome
-from study.run.posed import Posed
 from study.scene import Scene
+from study.similarity.fields import relative_l2
 
 
 def compare_large_strain(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     body: Body,
     outcome: Outcome,
     record: dict[str, Any],
@@ -41,7 +41,7 @@ def compare_large_strain(
         record["hyperelastic"] = found
 
 
-def _difference(scene: Scene, posed: Posed, body: Body, law: LawName) -> dict[str, Any] | str:
+def _difference(scene: Scene, posed: Problem, body: Body, law: LawName) -> dict[str, Any] | str:
     """The comparison, or why there is none."""
     if body.element == "taylor-hood":
         return f"elements without a pressure lock at a Poisson ratio above {LOCKING:g}"

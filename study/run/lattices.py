@@ -18,13 +18,13 @@ from msm.lattice import Lattice
 from msm.laws import Basafa, Hooke, Law, initial_stiffness, piecewise
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Step
 from msm.volume import volume_term
-from study.fields import Mesh
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
 from study.progress import Advance, Progress
+from study.results.fields import Mesh
 from study.run.keeping import Keeping, OnSample, checkpoint, recorded
 from study.run.outcome import Outcome, model_record
-from study.run.posed import Posed
 from study.scene import Scene
-from study.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fuzzy.stiffness import Estimate
@@ -112,7 +112,7 @@ def reference_mass(scene: Scene) -> float:
     return float(scene.tissue.density * scene.damping.reference_spacing**3)
 
 
-def assemble(scene: Scene, posed: Posed) -> Assembly:
+def assemble(scene: Scene, posed: Problem) -> Assembly:
     """The lattice over the organ, or on its mesh, which all its models share."""
     if scene.lattice.springs == "tetrahedra":
         return tetrahedra.assemble(
@@ -136,7 +136,7 @@ def assemble(scene: Scene, posed: Posed) -> Assembly:
 
 def run_lattices(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     assembly: Assembly,
     estimates: dict[str, Estimate],
     outcome: Outcome,
@@ -167,7 +167,7 @@ def _note_lost_bounds(system: str, outcome: Outcome) -> None:
             )
 
 
-def _check_mass(scene: Scene, posed: Posed, assembly: Assembly, outcome: Outcome) -> None:
+def _check_mass(scene: Scene, posed: Problem, assembly: Assembly, outcome: Outcome) -> None:
     expected = posed.geometry.volume * scene.tissue.density
     difference = abs(float(assembly.mass.sum()) / expected - 1.0)
     meaning = "mass of the lattice against that of the finite-element mesh"
@@ -176,7 +176,7 @@ def _check_mass(scene: Scene, posed: Posed, assembly: Assembly, outcome: Outcome
 
 def _run(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     assembly: Assembly,
     contender: Contender,
     outcome: Outcome,
@@ -252,7 +252,7 @@ def _finite(value: float) -> float | None:
 
 def _march(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     assembly: Assembly,
     contender: Contender,
     step: Step,
@@ -276,7 +276,7 @@ def _march(
 
 def _bound(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     assembly: Assembly,
     contender: Contender,
     side: str,

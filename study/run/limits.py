@@ -12,20 +12,20 @@ from fem_reference.observation import at_points, evaluation
 from msm import model as lattice_model
 from msm.calibration import POISSON_RATIO
 from msm.model import Assembly
+from study.problem.problem import Problem
 from study.progress import Progress
-from study.run.comparison import best_factor, relative_l2
 from study.run.lattices import elastic
 from study.run.outcome import Outcome
-from study.run.posed import Posed
 from study.run.reference import Solved
 from study.scene import Scene
+from study.similarity.fields import best_factor, relative_l2
 
 Floats = NDArray[np.float64]
 
 
 def lattice_limits(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     solved: Solved,
     assembly: Assembly,
     outcome: Outcome,

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.mesh.tetrahedra import mean_edge
+from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.outcome import Outcome
-from study.run.posed import Posed
 from study.scene import Scene
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ GRAVITY = 9.81
 
 def run_organ(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     estimates: dict[str, Estimate],
     progress: Progress,
     keeping: Keeping | None = None,
@@ -48,14 +48,14 @@ def run_organ(
     return outcome
 
 
-def spacing(scene: Scene, posed: Posed) -> float:
+def spacing(scene: Scene, posed: Problem) -> float:
     """Spacing of the lattice, or mean edge of the mesh that springs run along [m]."""
     if scene.lattice.springs == "tetrahedra":
         return mean_edge(posed.geometry.mesh)
     return scene.lattice.spacing
 
 
-def dimensionless(scene: Scene, posed: Posed) -> dict[str, float]:
+def dimensionless(scene: Scene, posed: Problem) -> dict[str, float]:
     """Numbers that show a mistaken unit before anything is run."""
     extent = float(np.ptp(posed.geometry.surface.points, axis=0).max())
     modulus, radius = scene.tissue.youngs_modulus, scene.tool.radius

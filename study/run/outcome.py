@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.trajectory import Trajectory
 from study.scene import Scene
-from study.trajectory import Trajectory
 
 STRAIN_LIMIT = 0.05
 """Largest strain of the linear reference above which it is not to be trusted."""

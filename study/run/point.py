@@ -11,23 +11,14 @@ from msm import control_point
 from msm.calibration import reference_stiffness
 from msm.damping import Damping, eq_2, eq_9
 from msm.laws import Basafa, Hooke, Law, initial_stiffness
-from study.history import load_factor
+from study.problem.problem import PointProblem
+from study.problem.trajectory import Trajectory
 from study.progress import Progress
-from study.run.comparison import Lens
 from study.run.outcome import Outcome, model_record
 from study.scene import Scene
-from study.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fuzzy.stiffness import Estimate
-
-PROBE = "control-point"
-
-
-def lens(scene: Scene) -> Lens:
-    """How the point's motion is looked at: along its spring."""
-    times = np.linspace(0.0, scene.time.duration, scene.time.samples)
-    return Lens(times, (PROBE,), np.array([1.0, 0.0, 0.0]), np.zeros(0))
 
 
 def benchmark_law(scene: Scene) -> Basafa:
@@ -36,29 +27,23 @@ def benchmark_law(scene: Scene) -> Basafa:
     return Basafa(scene.basafa.k1 / h_0, scene.basafa.k2 / h_0, scene.basafa.x_c)
 
 
-def mass(scene: Scene) -> float:
-    """Mass [kg] of the point: declared, or that for which eq. (2) meets the benchmark's gamma_0."""
-    if scene.organ.mass is not None:
-        return scene.organ.mass
-    k = initial_stiffness(benchmark_law(scene))
-    return control_point.mass_that_meets(scene.basafa.gamma_0, scene.damping.ratio, k)
-
-
-def run_point(scene: Scene, estimates: dict[str, Estimate], progress: Progress) -> Outcome:
+def run_point(
+    scene: Scene, point: PointProblem, estimates: dict[str, Estimate], progress: Progress
+) -> Outcome:
     """Run the benchmark and one oscillator per estimate."""
     outcome = Outcome()
-    m, h_0 = mass(scene), scene.damping.reference_spacing
+    m, h_0 = point.mass, point.rest_length
     outcome.extra["control_point"] = {"mass_kg": m, "rest_length_m": h_0}
     if "basafa" in scene.models:
         damping = eq_9(scene.basafa.gamma_0, scene.basafa.gamma_1, m)
-        _run(scene, "basafa", benchmark_law(scene), damping, outcome, progress)
+        _run(scene, point, "basafa", benchmark_law(scene), damping, outcome, progress)
     if "msm" in scene.models:
         for system, estimate in estimates.items():
             name = f"msm-{system}"
-            trajectory = _fuzzy_tuned(scene, name, estimate.estimate, outcome, progress)
+            trajectory = _fuzzy_tuned(scene, point, name, estimate.estimate, outcome, progress)
             if estimate.interval is not None:
                 ends = [
-                    _fuzzy_tuned(scene, name, modulus, Outcome(), progress)
+                    _fuzzy_tuned(scene, point, name, modulus, Outcome(), progress)
                     for modulus in estimate.interval
                 ]
                 outcome.bounds[name] = (ends[0], ends[1])
@@ -67,25 +52,35 @@ def run_point(scene: Scene, estimates: dict[str, Estimate], progress: Progress) 
 
 
 def _fuzzy_tuned(
-    scene: Scene, name: str, modulus: float, outcome: Outcome, progress: Progress
+    scene: Scene,
+    point: PointProblem,
+    name: str,
+    modulus: float,
+    outcome: Outcome,
+    progress: Progress,
 ) -> Trajectory:
     k = reference_stiffness(modulus, scene.damping.reference_spacing)
-    damping = eq_2(scene.damping.ratio, k, mass(scene))
-    return _run(scene, name, Hooke(k), damping, outcome, progress)
+    damping = eq_2(scene.damping.ratio, k, point.mass)
+    return _run(scene, point, name, Hooke(k), damping, outcome, progress)
 
 
 def _run(
-    scene: Scene, name: str, law: Law, damping: Damping, outcome: Outcome, progress: Progress
+    scene: Scene,
+    point: PointProblem,
+    name: str,
+    law: Law,
+    damping: Damping,
+    outcome: Outcome,
+    progress: Progress,
 ) -> Trajectory:
-    m, h_0 = mass(scene), scene.damping.reference_spacing
+    m, h_0 = point.mass, point.rest_length
 
     def force(t: float) -> float:
-        factor = load_factor(scene.tool.history, np.asarray(t))
-        return scene.tool.force * float(factor)
+        return float(point.force(np.asarray(t)))
 
     started = time.perf_counter()
     with progress.stage(name):
-        trajectory = control_point.run(law, h_0, m, damping, force, lens(scene).times)
+        trajectory = control_point.run(law, h_0, m, damping, force, point.times)
     wall = time.perf_counter() - started
     outcome.runs[name] = trajectory
     k = initial_stiffness(law)

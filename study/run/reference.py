@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fem_reference import model as fem
+from fem_reference.discretisation_error import FORMAL_ORDER, Estimate, discretisation_error
 from fem_reference.dynamics import ORDER, Damping
 from fem_reference.elasticity import Body
-from study.fields import Mesh
 from study.organ.geometry import Level
+from study.problem.problem import Problem
 from study.progress import Progress
-from study.run.convergence import FORMAL_ORDER, Estimate, discretisation_error
+from study.results.fields import Mesh
 from study.run.keeping import Keeping, recorded
 from study.run.large_strain import compare_large_strain
 from study.run.lattices import damping_rates
 from study.run.outcome import Outcome, model_record
-from study.run.posed import Posed
 from study.scene import Scene
 
 COARSER = 2
@@ -56,7 +56,7 @@ class Errors:
 
 def run_reference(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     outcome: Outcome,
     progress: Progress,
     keeping: Keeping | None = None,
@@ -82,13 +82,13 @@ def run_reference(
     return best
 
 
-def _first(scene: Scene, posed: Posed, progress: Progress) -> list[Solved]:
+def _first(scene: Scene, posed: Problem, progress: Progress) -> list[Solved]:
     """On the scene's mesh and those coarser, the coarsest first."""
     levels = [posed.geometry.level(k) for k in range(-COARSER, 1)]
     return [solved_on(scene, posed, level, progress) for level in levels if level is not None]
 
 
-def _finer(scene: Scene, posed: Posed, last: Level, errors: Errors | None) -> Level | None:
+def _finer(scene: Scene, posed: Problem, last: Level, errors: Errors | None) -> Level | None:
     """The level expected to be accurate enough, or the finest there is, if it is finer."""
     share, found = 1.0, None
     if errors is not None and scene.reference.accuracy is not None:
@@ -100,7 +100,7 @@ def _finer(scene: Scene, posed: Posed, last: Level, errors: Errors | None) -> Le
     return found
 
 
-def solved_on(scene: Scene, posed: Posed, level: Level, progress: Progress) -> Solved:
+def solved_on(scene: Scene, posed: Problem, level: Level, progress: Progress) -> Solved:
     """The reference of a scene on one of its meshes."""
     name = f"fem: {len(level.mesh.tetrahedra)} tetrahedra"
     with progress.stage(f"{name}, assembly"):
@@ -111,7 +111,7 @@ def solved_on(scene: Scene, posed: Posed, level: Level, progress: Progress) -> S
         return Solved(level, body, fem.run(*arguments, on_progress=advance))
 
 
-def build(scene: Scene, posed: Posed, level: Level) -> Body:
+def build(scene: Scene, posed: Problem, level: Level) -> Body:
     """The body of a scene on one of its meshes."""
     chosen = scene.reference
     where = (posed.foundation, posed.tool, chosen.element, posed.geometry.project)
@@ -124,7 +124,7 @@ def _method(scene: Scene, times: int = 1) -> fem.Method:
     return fem.Method(chosen.method, times * chosen.steps_per_sample, chosen.modes)
 
 
-def _keep_fields(keeping: Keeping | None, posed: Posed, best: Solved, outcome: Outcome) -> None:
+def _keep_fields(keeping: Keeping | None, posed: Problem, best: Solved, outcome: Outcome) -> None:
     """The motion of the vertices of the finest mesh, if it is wanted."""
     if keeping is None or keeping.fields is None:
         return
@@ -164,7 +164,7 @@ def _record(scene: Scene, solved: Solved) -> dict[str, Any]:
     }
 
 
-def mesh_errors(scene: Scene, posed: Posed, solved: Sequence[Solved]) -> Errors | None:
+def mesh_errors(scene: Scene, posed: Problem, solved: Sequence[Solved]) -> Errors | None:
     """Errors of the finest mesh by those before it; none of one mesh, or of elements that lock.
 
     Locked elements approach a wrong solution for long, and seem to have converged. A subspace's
@@ -243,7 +243,7 @@ def _add_mesh_errors(
 
 def _add_time_errors(
     scene: Scene,
-    posed: Posed,
+    posed: Problem,
     coarsest: Solved,
     outcome: Outcome,
     record: dict[str, Any],

@@ -8,23 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.response import Response
 from study.progress import Progress
-from study.provenance import provenance
-from study.results import SCHEMA_VERSION, Results
+from study.results.folder import SCHEMA_VERSION, Results
+from study.results.provenance import provenance
 from study.run import estimates as fuzzy_side
 from study.run.assumptions import assumptions
-from study.run.comparison import Lens, band_rows, curve_rows, error_rows, similarity_rows
 from study.run.outcome import ROTATION_LIMIT, STRAIN_LIMIT, Outcome
+from study.run.tables import band_rows, curve_rows, error_rows, similarity_rows
 from study.scene import Scene
-from study.scene_file import resolved, write_scene
+from study.scene.file import resolved, write_scene
 
 if TYPE_CHECKING:
     from study.run.keeping import Keeping
-
-
-def is_point(scene: Scene) -> bool:
-    """Whether the scene is a single control mass point."""
-    return scene.organ.shape == "point" and scene.organ.mesh is None
 
 
 def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) -> Results:
@@ -39,17 +35,19 @@ def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) 
         fuzzy = fuzzy_side.run_fuzzy(scene) if "msm" in scene.models else fuzzy_side.NONE
     found = fuzzy.estimates
     arrays: dict[str, dict[str, NDArray[Any]]] = {"fuzzy": fuzzy.arrays} if found else {}
-    if is_point(scene):
+    if scene.is_point:
         from study.run import point
+        from study.scene.problem import point_problem_of
 
-        lens, outcome = point.lens(scene), point.run_point(scene, found, progress)
+        given = point_problem_of(scene)
+        response, outcome = given.response, point.run_point(scene, given, found, progress)
     else:
         from study.run.organ import run_organ
-        from study.run.posed import pose
+        from study.scene.problem import problem_of
 
         with progress.stage("organ"):
-            posed = pose(scene)
-        lens, outcome = posed.lens, run_organ(scene, posed, found, progress, keeping)
+            posed = problem_of(scene)
+        response, outcome = posed.response, run_organ(scene, posed, found, progress, keeping)
         arrays["fields"] = {
             "points": posed.geometry.surface.points,
             "triangles": posed.geometry.surface.triangles,
@@ -57,14 +55,14 @@ def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) 
             "probes": posed.observation.probes,
         } | {name: run.surface_field for name, run in outcome.runs.items()}
     with progress.stage("similarity"):
-        tables = _tables(lens, outcome) | {"sensitivity": fuzzy.sensitivity}
+        tables = _tables(response, outcome) | {"sensitivity": fuzzy.sensitivity}
     text = write_scene(scene)
     numbers: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "title": scene.title,
         "scene": resolved(scene),
         **fuzzy.numbers,
-        "probes": list(lens.probes),
+        "probes": list(response.probes),
         "models": outcome.models,
         "checks": outcome.checks,
         "strain_limit": STRAIN_LIMIT,
@@ -77,16 +75,18 @@ def run_study(scene: Scene, progress: Progress, keeping: Keeping | None = None) 
     return Results(text, numbers | outcome.extra, tables, arrays)
 
 
-def _tables(lens: Lens, outcome: Outcome) -> dict[str, Any]:
-    bands = [row for name, ends in outcome.bounds.items() for row in band_rows(lens, name, ends)]
-    has_field = lens.volumes.size > 0
+def _tables(response: Response, outcome: Outcome) -> dict[str, Any]:
+    bands = [
+        row for name, ends in outcome.bounds.items() for row in band_rows(response, name, ends)
+    ]
+    has_field = response.volumes.size > 0
     collapsed = {record["name"] for record in outcome.models if record.get("inverted_cells")}
     sound = {name: run for name, run in outcome.runs.items() if name not in collapsed}
     return {
-        "curves": list(curve_rows(lens, outcome.runs)),
+        "curves": list(curve_rows(response, outcome.runs)),
         "bands": bands,
-        "similarity": list(similarity_rows(lens, sound, outcome.notes)),
-        "errors": list(error_rows(lens, sound)) if has_field else [],
+        "similarity": list(similarity_rows(response, sound, outcome.notes)),
+        "errors": list(error_rows(response, sound)) if has_field else [],
     }
 
 

@@ -1,26 +1,17 @@
-"""Motion of one control point, and what makes two motions comparable."""
+"""What makes two motions of a control point comparable."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from study.problem.response import Motion
 
 Floats = NDArray[np.float64]
 
 SAMPLE_MINIMUM = 8
 # SI sizes no organ reaches; between them, squares and products of samples stay in double range.
 LARGEST, SMALLEST = 1e30, 1e-30
-
-
-@dataclass(frozen=True)
-class Motion:
-    """`time` [s], `displacement` [m] and `velocity` [m/s] along one line; each shape (samples,)."""
-
-    time: Floats
-    displacement: Floats
-    velocity: Floats
 
 
 def check_pair(candidate: Motion, reference: Motion) -> None:

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.response import Motion
 from study.similarity.iso18571 import overall_rating
-from study.similarity.motion import Motion, check_pair
+from study.similarity.motion import check_pair
 from study.similarity.phase_plane import area_score, frechet_score, pcm_score
 from study.similarity.time_history import relative_l2_score
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from fem_reference import model as fem
 from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body
+from study.problem.problem import Problem
 from study.run.lattices import damping_rates
-from study.run.posed import Posed
 from study.scene import Scene
 
 FRAME_RATE = 60.0
 """Steps per second [Hz], of which a sample takes a whole number."""
 
 
-def build(scene: Scene, posed: Posed, element: str, level: int, method: str) -> Body:
+def build(scene: Scene, posed: Problem, element: str, level: int, method: str) -> Body:
     """The body on a level of the organ's meshes. ValueError if there is no such level."""
     found = posed.geometry.level(level)
     if found is None:

@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from study.run.posed import Posed
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
 from study.scene import Scene
-from study.trajectory import Trajectory
 
 Settings = dict[str, Any]
 """Plain values by name, as JSON has them."""
@@ -64,8 +64,8 @@ class Contender(Protocol):
     def configurations(self, scene: Scene) -> Iterator[Settings]:
         """Settings that are worth a place in the table, the cheapest first."""
 
-    def run(self, scene: Scene, posed: Posed, settings: Settings) -> Observed:
+    def run(self, scene: Scene, posed: Problem, settings: Settings) -> Observed:
         """The whole motion."""
 
-    def prepare(self, scene: Scene, posed: Posed, settings: Settings) -> Ready:
+    def prepare(self, scene: Scene, posed: Problem, settings: Settings) -> Ready:
         """Set up to take steps."""

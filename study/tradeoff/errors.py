@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from study.run.comparison import relative_l2
+from study.similarity.fields import relative_l2
 from study.sweep.runner import Outcome
-from study.tradeoff.problem import Problem
+from study.tradeoff.problem import Stated
 from study.tradeoff.reference import Reference
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Errors:
     message: str = ""
 
 
-def errors(outcome: Outcome, reference: Reference, stated: Problem) -> Errors:
+def errors(outcome: Outcome, reference: Reference, given: Stated) -> Errors:
     """Errors of one run of `study.tradeoff.observation`."""
     value = outcome.value
     if outcome.status != "done" or value is None:
@@ -48,11 +48,11 @@ def errors(outcome: Outcome, reference: Reference, stated: Problem) -> Errors:
         )
     if value["inverted_cells"]:
         return Errors("inverted", message=f"{value['inverted_cells']} cells")
-    return _measured(value, reference, stated)
+    return _measured(value, reference, given)
 
 
-def _measured(value: dict[str, Any], reference: Reference, stated: Problem) -> Errors:
-    volumes = stated.posed.volume_rule.weights
+def _measured(value: dict[str, Any], reference: Reference, given: Stated) -> Errors:
+    volumes = given.problem.volume_rule.weights
     field = relative_l2(np.reshape(value["field"], (-1, 3)), reference.field, volumes)
     curves = curve_errors(np.reshape(value["curves"], reference.curves.shape), reference.curves)
     known = [resolved(c, bar) for c, bar in zip(curves, reference.curve_errors, strict=True)]
@@ -60,7 +60,7 @@ def _measured(value: dict[str, Any], reference: Reference, stated: Problem) -> E
     return Errors(
         "not resolved" if kept is None else "resolved",
         kept,
-        known[stated.tool_probe],
+        known[given.problem.tool_probe],
         max((c for c in known if c is not None), default=None),
     )
 

@@ -16,9 +16,9 @@ from msm.lattice import Lattice
 from msm.linearised import farthest
 from msm.stability import Follower
 from msm.timestep import LOOK, Automatic, Fixed, Rate
+from study.problem.problem import Problem
 from study.run import lattices
 from study.run.lattices import asked_step, assemble, fuzzy_tuned
-from study.run.posed import Posed
 from study.scene import Scene
 from study.tradeoff.contender import Observed, Ready, Settings
 
@@ -45,7 +45,7 @@ def with_settings(scene: Scene, settings: Settings) -> Scene:
     return replace(scene, lattice=replace(free, **settings))
 
 
-def run(scene: Scene, posed: Posed, settings: Settings, choose: Choose = of_tissue) -> Observed:
+def run(scene: Scene, posed: Problem, settings: Settings, choose: Choose = of_tissue) -> Observed:
     """The motion of a lattice with these keys of the scene's table `lattice`."""
     chosen = with_settings(scene, settings)
     assembly = assemble(chosen, posed)
@@ -61,7 +61,7 @@ def run(scene: Scene, posed: Posed, settings: Settings, choose: Choose = of_tiss
     return Observed(found.trajectory, found.smallest_step, found.margin, found.inverted_cells)
 
 
-def prepare(scene: Scene, posed: Posed, settings: Settings, choose: Choose = of_tissue) -> Ready:
+def prepare(scene: Scene, posed: Problem, settings: Settings, choose: Choose = of_tissue) -> Ready:
     """A lattice at rest; between its steps the limit is looked at as often as in a run."""
     chosen = with_settings(scene, settings)
     assembly = assemble(chosen, posed)

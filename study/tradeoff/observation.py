@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from study.tradeoff.lineup import contender
-from study.tradeoff.problem import plain, problem
+from study.tradeoff.problem import plain, stated
 
 FUNCTION = f"{__name__}:observe"
 
@@ -20,8 +20,8 @@ def observe(
     `step_s`: the shortest it took; `margin`: smallest ratio of the critical step to one it took,
     None without a critical step; `diverged_at_s`, `inverted_cells`.
     """
-    posed = problem(scene, mesh_sha256)
-    found = contender(name).run(posed.scene, posed.posed, settings)
+    given = stated(scene, mesh_sha256)
+    found = contender(name).run(given.scene, given.problem, settings)
     run = found.trajectory
     whole = run.status == "finished" and bool(np.isfinite(run.volume_field[0]).all())
     return {

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.quadrature import over_volume
-from study.run.posed import Posed, pose
-from study.run.whole import is_point
+from study.problem.problem import Problem
 from study.scene import Scene
-from study.scene_file import resolved, validate
+from study.scene.file import resolved, validate
+from study.scene.problem import problem_of
 
 Floats = NDArray[np.float64]
 
@@ -28,20 +28,14 @@ TIDY_DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Problem:
+class Stated:
     """A scene posed on its organ; the field is looked at once in each tetrahedron.
 
     On the built-in liver that moves an error by 2 % of itself against eight points in each.
     """
 
     scene: Scene
-    posed: Posed
-
-    @property
-    def tool_probe(self) -> int:
-        """The control point nearest to the tool."""
-        away = self.posed.observation.probes - self.posed.tool.centre
-        return int(np.linalg.norm(away, axis=1).argmin())
+    problem: Problem
 
 
 def sampled(scene: Scene) -> Scene:
@@ -50,7 +44,7 @@ def sampled(scene: Scene) -> Scene:
     What is left of its duration beyond them is cut off. A scene too short for that keeps its own.
     ValueError if it is a single mass point.
     """
-    if is_point(scene):
+    if scene.is_point:
         raise ValueError(
             'organ.shape: "point" has no displacement field to be accurate in; choose a scene with '
             "an organ"
@@ -73,21 +67,21 @@ def _sha256(path: str) -> str:
     return sha256(Path(path).read_bytes()).hexdigest()
 
 
-def problem(scene: dict[str, Any], mesh_sha256: str | None) -> Problem:
+def stated(scene: dict[str, Any], mesh_sha256: str | None) -> Stated:
     """The problem of `arguments`, kept for the next run. ValueError if its mesh has changed."""
     # In one order of keys, whichever way it came: control points are numbered by it.
     return _posed(json.dumps(scene, sort_keys=True), mesh_sha256)
 
 
 @lru_cache(maxsize=2)
-def _posed(scene: str, mesh_sha256: str | None) -> Problem:
+def _posed(scene: str, mesh_sha256: str | None) -> Stated:
     found = validate(json.loads(scene), "scene")
     if found.organ.mesh is not None and _sha256(found.organ.mesh) != mesh_sha256:
         raise ValueError(f"organ.mesh: {found.organ.mesh} has changed since the runs were planned")
-    posed = pose(found)
+    posed = problem_of(found)
     rule = over_volume(posed.geometry.mesh, 1)
     seen = replace(posed.observation, volume_points=rule.points)
-    return Problem(found, replace(posed, volume_rule=rule, observation=seen))
+    return Stated(found, replace(posed, volume_rule=rule, observation=seen))
 
 
 def tidy(value: float) -> float:

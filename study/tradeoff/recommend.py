@@ -17,7 +17,7 @@ import numpy as np
 
 from study.progress import Progress
 from study.scene import Scene
-from study.scene_file import write_scene
+from study.scene.file import write_scene
 from study.sweep.runner import How
 from study.sweep.store import Store
 from study.tradeoff import reference, whole
@@ -25,7 +25,7 @@ from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lattice import FRACTION, lifts, with_settings
 from study.tradeoff.lineup import Configuration
-from study.tradeoff.problem import Problem, arguments, problem, tidy
+from study.tradeoff.problem import Stated, arguments, stated, tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Reference
 from study.tradeoff.table import Cost
@@ -96,14 +96,14 @@ def recommend(
     coarser = judged_by(scene)
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
     outcomes = whole.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
-    stated = problem(**arguments(coarser))
-    known = reference.restored(outcomes[0].value or {}, stated)
-    found = [errors(outcome, known, stated) for outcome in outcomes[1:]]
+    given = stated(**arguments(coarser))
+    known = reference.restored(outcomes[0].value or {}, given)
+    found = [errors(outcome, known, given) for outcome in outcomes[1:]]
     kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
     every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
-    candidates = _candidates(stated, every, curve, wanted, progress)
-    return _verified(stated, known, candidates, wanted, store, how, progress)
+    candidates = _candidates(given, every, curve, wanted, progress)
+    return _verified(given, known, candidates, wanted, store, how, progress)
 
 
 def judged_by(scene: Scene) -> Scene:
@@ -151,20 +151,20 @@ def _configuration(scene: Scene, spacing: float) -> Configuration:
 
 
 def _candidates(
-    stated: Problem, spacings: Sequence[float], fit: Fit, wanted: Demand, progress: Progress
+    given: Stated, spacings: Sequence[float], fit: Fit, wanted: Demand, progress: Progress
 ) -> list[Candidate]:
     """All spacings, timed in turns."""
-    costs = _costs(stated, spacings, progress)
+    costs = _costs(given, spacings, progress)
     return [
         Candidate(h, fit.promise(h), cost, _frame(cost, wanted))
         for h, cost in zip(spacings, costs, strict=True)
     ]
 
 
-def _costs(stated: Problem, spacings: Sequence[float], progress: Progress) -> list[Cost]:
-    chosen = [_configuration(stated.scene, h) for h in spacings]
+def _costs(given: Stated, spacings: Sequence[float], progress: Progress) -> list[Cost]:
+    chosen = [_configuration(given.scene, h) for h in spacings]
     longest = [float("inf")] * len(chosen)  # that at rest is less
-    return whole.costs(stated, chosen, longest, QUICK_REPEATS, progress)
+    return whole.costs(given, chosen, longest, QUICK_REPEATS, progress)
 
 
 def _frame(cost: Cost, wanted: Demand) -> Frame | None:
@@ -186,7 +186,7 @@ def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
 
 
 def _verified(
-    stated: Problem,
+    given: Stated,
     known: Reference,
     candidates: Sequence[Candidate],
     wanted: Demand,
@@ -196,10 +196,10 @@ def _verified(
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     chosen = best(candidates, wanted)
-    configuration = _configuration(stated.scene, chosen.spacing)
-    (_, outcome) = whole.solved(stated.scene, [configuration], store, how)
-    measured = errors(outcome, known, stated)
-    (cost,) = _costs(stated, [chosen.spacing], progress)
+    configuration = _configuration(given.scene, chosen.spacing)
+    (_, outcome) = whole.solved(given.scene, [configuration], store, how)
+    measured = errors(outcome, known, given)
+    (cost,) = _costs(given, [chosen.spacing], progress)
     if outcome.value is not None and outcome.value["step_s"] is not None:
         cost = replace(cost, step=min(cost.step, outcome.value["step_s"]))
     again = _frame(cost, wanted)
@@ -208,7 +208,7 @@ def _verified(
     met = met and (wanted.error is None or (measured.field or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(stated, known, others, wanted, store, how, progress)
+        return _verified(given, known, others, wanted, store, how, progress)
     return Recommended(chosen, met, measured, again, cost.timing.step[1] / cost.step)
 
 

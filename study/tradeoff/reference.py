@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study.progress import Silent
 from study.run.outcome import Outcome
 from study.run.reference import run_reference
-from study.tradeoff.problem import Problem, plain, problem
+from study.tradeoff.problem import Stated, plain, stated
 
 Floats = NDArray[np.float64]
 
@@ -38,11 +38,11 @@ def solve(scene: dict[str, Any], mesh_sha256: str | None) -> dict[str, Any]:
     An error is the sum of those by the mesh, by the subspace and by the steps of the load. None
     where the organ has no other mesh to tell it.
     """
-    posed_problem = problem(scene, mesh_sha256)
-    posed = posed_problem.posed
-    linear = replace(posed_problem.scene.reference, large_strain="none")
+    given = stated(scene, mesh_sha256)
+    posed = given.problem
+    linear = replace(given.scene.reference, large_strain="none")
     outcome = Outcome()
-    run_reference(replace(posed_problem.scene, reference=linear), posed, outcome, Silent())
+    run_reference(replace(given.scene, reference=linear), posed, outcome, Silent())
     (record,), found = outcome.models, outcome.runs["fem"]
     rest = (record["truncation_error"] or 0.0) + max(
         kinds["displacement"] for kinds in record["time_step_error_by_probe"].values()
@@ -60,14 +60,14 @@ def solve(scene: dict[str, Any], mesh_sha256: str | None) -> dict[str, Any]:
     }
 
 
-def restored(value: dict[str, Any], stated: Problem) -> Reference:
+def restored(value: dict[str, Any], given: Stated) -> Reference:
     """The reference of a stored value. ValueError if its error is unknown."""
     if value["field_error"] is None:
         raise ValueError(
             "the organ has one mesh only, so the error of its reference is unknown and none of a "
             "model can be told from it; refine organ.mesh or give a surface"
         )
-    seen = stated.posed.observation
+    seen = given.problem.observation
     return Reference(
         np.reshape(value["field"], (-1, 3)),
         np.reshape(value["curves"], (len(seen.times), len(seen.probes), 3)),

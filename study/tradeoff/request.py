@@ -9,7 +9,7 @@ from pathlib import Path
 
 from study.progress import Progress
 from study.scene import Scene
-from study.scene_file import read_scene
+from study.scene.file import read_scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
 from study.sweep.store import Store

@@ -12,9 +12,9 @@ from typing import Any
 
 from study.folders import replacing
 from study.progress import Progress
-from study.provenance import provenance
+from study.results.provenance import provenance
 from study.scene import Scene
-from study.scene_file import write_scene
+from study.scene.file import write_scene
 from study.sweep.runner import How, Outcome, run
 from study.sweep.store import Store
 from study.sweep.tally import on_stderr
@@ -23,7 +23,7 @@ from study.tradeoff import observation, reference, table
 from study.tradeoff.contender import Ready
 from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration, contender
-from study.tradeoff.problem import Problem, arguments, problem
+from study.tradeoff.problem import Stated, arguments, stated
 from study.tradeoff.reference import Reference
 from study.tradeoff.table import Cost, Row
 from study.tradeoff.timing import Clock, in_turns
@@ -71,17 +71,17 @@ def study(
 ) -> Found:
     """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
     outcomes = solved(scene, chosen, store, how)
-    stated = problem(**arguments(scene))
+    given = stated(**arguments(scene))
     value = outcomes[0].value or {}
-    known = reference.restored(value, stated)
-    rows = compared(stated, chosen, outcomes[1:], known, repeats, progress, clock)
+    known = reference.restored(value, given)
+    rows = compared(given, chosen, outcomes[1:], known, repeats, progress, clock)
     record = {key: value[key] for key in ("element", "unknowns", "field_error", "levels")}
-    by_probe = zip(stated.posed.probes, value["curve_errors"], strict=True)
+    by_probe = zip(given.problem.probes, value["curve_errors"], strict=True)
     return Found(table.with_fronts(rows), record | {"curve_errors": dict(by_probe)})
 
 
 def compared(
-    stated: Problem,
+    given: Stated,
     chosen: Sequence[Configuration],
     outcomes: Sequence[Outcome],
     known: Reference,
@@ -90,10 +90,10 @@ def compared(
     clock: Clock = time.perf_counter,
 ) -> list[Row]:
     """A row per configuration, all that ran timed in turns."""
-    found = [errors(outcome, known, stated) for outcome in outcomes]
+    found = [errors(outcome, known, given) for outcome in outcomes]
     sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
     steps = [float((outcomes[k].value or {})["step_s"]) for k in sound]
-    costed = costs(stated, [chosen[k] for k in sound], steps, repeats, progress, clock)
+    costed = costs(given, [chosen[k] for k in sound], steps, repeats, progress, clock)
     by_place = dict(zip(sound, costed, strict=True))
     return [
         table.row(one, error, known.field_error, by_place.get(k))
@@ -102,7 +102,7 @@ def compared(
 
 
 def costs(
-    stated: Problem,
+    given: Stated,
     chosen: Sequence[Configuration],
     steps: Sequence[float],
     repeats: int,
@@ -112,11 +112,11 @@ def costs(
     """Setup and cost of configurations, at steps [s] that their runs took."""
     with progress.stage("setting up") as advance:
         for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
-            _ready(stated, next(one for one in chosen if one.contender == name))
+            _ready(given, next(one for one in chosen if one.contender == name))
         ready, setups = [], []
         for one in chosen:
             started = clock()
-            ready.append(_ready(stated, one))
+            ready.append(_ready(given, one))
             setups.append(clock() - started)
             advance(len(ready) / len(chosen))
     with progress.stage("timing") as advance:
@@ -127,8 +127,8 @@ def costs(
     ]
 
 
-def _ready(stated: Problem, one: Configuration) -> Ready:
-    return contender(one.contender).prepare(stated.scene, stated.posed, one.settings)
+def _ready(given: Stated, one: Configuration) -> Ready:
+    return contender(one.contender).prepare(given.scene, given.problem, one.settings)
 
 
 def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:

@@ -39,12 +39,13 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from fem_reference.elasticity import Body, discretise, elastic
 from fem_reference.exchange import calculix
-from fem_reference.exchange.problem import problem
+from fem_reference.exchange.nodal import nodal_problem
 from fem_reference.grid import straight
 from fem_reference.solvers import solve_static
-from study.run.posed import Posed, pose
+from study.problem.problem import NodalProblem
 from study.scene import Scene
-from study.scene_file import read_scene
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 from tests.oracles.calculix import PROGRAM as CCX
 from tests.oracles.calculix import version as release
 
@@ -88,13 +89,13 @@ class Timed(NamedTuple):
     compiled: float
 
 
-def case(element_size: float) -> tuple[Scene, Posed]:
+def case(element_size: float) -> tuple[Scene, NodalProblem]:
     """The built-in liver."""
     scene = read_scene("liver", (f"reference.element_size={1e3 * element_size:g} mm",))
-    return scene, pose(scene)
+    return scene, problem_of(scene)
 
 
-def discretised(element_size: float) -> tuple[Scene, Posed, Body]:
+def discretised(element_size: float) -> tuple[Scene, NodalProblem, Body]:
     """Its body of straight quadratic tetrahedra."""
     scene, posed = case(element_size)
     body = discretise(posed.geometry.mesh, scene.tissue, posed.foundation, posed.tool, element="p2")
@@ -107,7 +108,7 @@ def discretised(element_size: float) -> tuple[Scene, Posed, Body]:
 def assembly(felupe: str | None) -> list[Row]:
     """Stiffness matrix of the same mesh by every program."""
     scene, posed, body = discretised(COMPARED)
-    given = problem(body, scene.tissue, posed.foundation)
+    given = nodal_problem(body, scene.tissue, posed.foundation)
     found: dict[str, list[Timed]] = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.npz"
@@ -124,7 +125,7 @@ def assembly(felupe: str | None) -> list[Row]:
     return [assembly_row(name, runs, norm, len(body.load)) for name, runs in found.items()]
 
 
-def ours(scene: Scene, posed: Posed) -> Timed:
+def ours(scene: Scene, posed: NodalProblem) -> Timed:
     """Sums of scalar forms, as the reference assembles."""
     seconds = []
     for _ in range(REPEATS):
@@ -134,7 +135,7 @@ def ours(scene: Scene, posed: Posed) -> Timed:
     return Timed(version("scikit-fem"), seconds, float(np.linalg.norm(found.matrix.data)), 0.0)
 
 
-def on_vectors(scene: Scene, posed: Posed) -> Timed:
+def on_vectors(scene: Scene, posed: NodalProblem) -> Timed:
     """scikit-fem's own form of elasticity, on vectors."""
     seconds = []
     form = linear_elasticity(
@@ -213,7 +214,9 @@ def jobs() -> list[Row]:
     theirs_s: list[float] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for file, text in calculix.files(problem(body, scene.tissue, posed.foundation)).items():
+        for file, text in calculix.files(
+            nodal_problem(body, scene.tissue, posed.foundation)
+        ).items():
             (folder / file).write_text(text, encoding="utf-8")
         for _ in range(ROUNDS):
             command = [sys.executable, "-m", __spec__.name, "--job", str(COMPARED)]

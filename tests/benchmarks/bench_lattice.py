@@ -44,7 +44,7 @@ from msm.stability import critical_time_step
 from msm.timestep import LOOK
 from msm.volume import volume_term
 from study.run.lattices import node_damping
-from study.scene_file import read_scene
+from study.scene.file import read_scene
 from tests.benchmarks import field_error
 
 Floats = NDArray[np.float64]

@@ -36,7 +36,7 @@ from msm.laws import Hooke
 from msm.network import Network, network
 from msm.stability import DEFAULT, largest_frequency, longest_step
 from msm.volume import none
-from study.run.comparison import relative_l2
+from study.similarity.fields import relative_l2
 from tests.benchmarks import field_error
 from tests.benchmarks.bench_lattice import in_turns
 from tests.benchmarks.converged import Converged

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.discretisation_error import FORMAL_ORDER, discretisation_error
 from fem_reference.elasticity import discretise
 from fem_reference.grid import Projection
 from fem_reference.model import static_field
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
-from study.run.convergence import FORMAL_ORDER, discretisation_error
-from study.scene import Tissue
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 

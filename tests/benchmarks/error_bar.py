@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from study.progress import Silent
 from study.run import reference
-from study.run.comparison import relative_l2
-from study.run.posed import pose
-from study.scene_file import read_scene
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
+from study.similarity.fields import relative_l2
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def rows(name: str) -> Iterator[Row]:
     """Of one scene, on each mesh that has two coarser ones."""
     base, overrides = SCENES[name]
     scene = read_scene(base, ('models=["fem"]', *overrides))
-    posed = pose(scene)
+    posed = problem_of(scene)
     levels = [found for k in range(-2, FINEST + 1) if (found := posed.geometry.level(k))]
     solved = [reference.solved_on(scene, posed, level, Silent()) for level in levels]
     truth, volumes = solved[-1].found.trajectory, posed.volume_rule.weights

@@ -24,7 +24,6 @@ from msm.lattice import interpolation
 from msm.laws import Hooke
 from msm.statics import static_displacement
 from msm.volume import volume_term
-from study.contact import Foundation, ToolPatch
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary
@@ -32,10 +31,11 @@ from study.organ import liver as implicit
 from study.organ.block import block_mesh
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import Body, MeshBody
-from study.run.comparison import best_factor, relative_l2
-from study.run.posed import pose
-from study.scene import Tissue
-from study.scene_file import read_scene
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
+from study.similarity.fields import best_factor, relative_l2
 from tests.benchmarks.converged import Converged, converged
 
 Floats = NDArray[np.float64]
@@ -103,7 +103,7 @@ def block(sizes: tuple[float, ...] = (0.02, 0.010, 0.02 / 3)) -> Case:
 def liver(sizes: tuple[float, ...] = (0.016, 0.012, 0.009)) -> Case:
     """The built-in liver as its scene poses it; the lattice is given its exact shape."""
     scene = read_scene("liver")
-    posed = pose(scene)
+    posed = problem_of(scene)
     meshes = tuple(map(liver_mesh, sizes))
     modulus, known = scene.tissue.youngs_modulus, posed.geometry
     where = (posed.foundation, posed.tool, known.project)

@@ -35,7 +35,7 @@ from msm.relaxation import relax
 from msm.statics import static_displacement
 from study.mesh.quadrature import over_volume
 from study.organ.block import block_mesh
-from study.run.comparison import relative_l2
+from study.similarity.fields import relative_l2
 from tests.benchmarks.field_error import SIZE, Case, block, lattice, material
 
 Floats = NDArray[np.float64]

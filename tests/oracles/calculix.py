@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.exchange.calculix import Motion, files
-from fem_reference.exchange.problem import Problem
+from fem_reference.exchange.nodal import NodalProblem
 
 PROGRAM = shutil.which("ccx")
 
@@ -22,13 +22,13 @@ def version() -> str:
     return said.split()[-1]
 
 
-def at_rest(given: Problem) -> np.ndarray:
+def at_rest(given: NodalProblem) -> np.ndarray:
     """Displacement [m] (n, 3) under full load."""
     (found,) = _solve(files(given), "static")
     return found
 
 
-def moving(given: Problem, motion: Motion) -> list[np.ndarray]:
+def moving(given: NodalProblem, motion: Motion) -> list[np.ndarray]:
     """Displacement [m] (n, 3) at each time that is printed."""
     return _solve(files(given, motion), "dynamic")
 

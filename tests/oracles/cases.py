@@ -13,10 +13,10 @@ import numpy as np
 from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body, discretise
 from fem_reference.exchange.calculix import Motion
-from fem_reference.exchange.problem import Problem, problem
-from study.contact import Foundation, ToolPatch
-from study.run.posed import pose
-from study.scene_file import read_scene
+from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from study.problem.contact import Foundation, ToolPatch
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 GOLDENS = Path(__file__).parents[1] / "data" / "oracles"
 BLOCK = ('organ.size=["60 mm", "40 mm", "30 mm"]', "tool.radius=15 mm", "tool.force=0.05 N")
@@ -50,7 +50,7 @@ class Built:
     """A case as a body and as plain arrays."""
 
     body: Body
-    problem: Problem
+    problem: NodalProblem
     foundation: Foundation
     tool: ToolPatch
 
@@ -72,13 +72,13 @@ def build(name: str, modulus_factor: float = 1.0) -> Built:
     """A case; `modulus_factor` plants an error in Young's modulus."""
     case = CASES[name]
     scene = read_scene(case.scene, case.overrides)
-    posed = pose(scene)
+    posed = problem_of(scene)
     modulus = modulus_factor * scene.tissue.youngs_modulus
     tissue = replace(scene.tissue, youngs_modulus=modulus)
     project = wavy if case.wavy else posed.geometry.project
     mesh = posed.geometry.mesh
     body = discretise(mesh, tissue, posed.foundation, posed.tool, case.element, project)
-    return Built(body, problem(body, tissue, posed.foundation), posed.foundation, posed.tool)
+    return Built(body, nodal_problem(body, tissue, posed.foundation), posed.foundation, posed.tool)
 
 
 def wavy(points: np.ndarray) -> np.ndarray:
@@ -92,13 +92,13 @@ def ramp() -> Motion:
     return Motion(step=0.002, factors=factors, damping=Damping(3.0, 5e-4), alpha=-0.05, kept=10)
 
 
-def fingerprint(found: Problem) -> str:
+def fingerprint(found: NodalProblem) -> str:
     """Of the geometry, to the micrometre: answers kept for another mesh must not be compared."""
     places = np.round(found.nodes * 1e6).astype(np.int64)
     return hashlib.sha256(places.tobytes() + found.elements.tobytes()).hexdigest()[:16]
 
 
-def keep(name: str, program: str, found: Problem, frames: dict[str, np.ndarray]) -> None:
+def keep(name: str, program: str, found: NodalProblem, frames: dict[str, np.ndarray]) -> None:
     """Write an answer: some nodes of each displacement [m] (n, 3) by its column's name."""
     chosen = np.arange(0, len(found.nodes), -(-len(found.nodes) // KEPT_NODES))
     GOLDENS.mkdir(exist_ok=True)
@@ -111,7 +111,7 @@ def keep(name: str, program: str, found: Problem, frames: dict[str, np.ndarray])
             writer.writerow([node, *(f"{value:.15g}" for value in row)])
 
 
-def kept(name: str, found: Problem) -> tuple[np.ndarray, np.ndarray]:
+def kept(name: str, found: NodalProblem) -> tuple[np.ndarray, np.ndarray]:
     """Node numbers and displacements [m] (frames, nodes, 3) of a kept answer.
 
     ValueError if it was made on another mesh.

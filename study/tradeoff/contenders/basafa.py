@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from msm.lattice import Lattice
+from study.problem.problem import Problem
 from study.run import lattices
-from study.run.posed import Posed
 from study.scene import Scene
 from study.tradeoff import lattice
 from study.tradeoff.contender import Observed, Ready, Settings
@@ -22,12 +22,12 @@ def configurations(scene: Scene) -> Iterator[Settings]:
         yield {"spacing": times * scene.lattice.spacing, "step_fraction": lattice.FRACTION}
 
 
-def run(scene: Scene, posed: Posed, settings: Settings) -> Observed:
+def run(scene: Scene, posed: Problem, settings: Settings) -> Observed:
     """The whole motion."""
     return lattice.run(scene, posed, settings, _choose)
 
 
-def prepare(scene: Scene, posed: Posed, settings: Settings) -> Ready:
+def prepare(scene: Scene, posed: Problem, settings: Settings) -> Ready:
     """Set up to take steps."""
     return lattice.prepare(scene, posed, settings, _choose)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from fem_reference import model as fem
 from fem_reference.dynamics import Oscillator, march
 from msm.timestep import whole_steps
-from study.run.posed import Posed
+from study.problem.problem import Problem
 from study.scene import Scene
 from study.tradeoff.body import FRAME_RATE, build, damping
 from study.tradeoff.contender import Observed, Ready, Settings
@@ -33,7 +33,7 @@ def configurations(scene: Scene) -> Iterator[Settings]:
     yield {"element": "p2", "level": -2, "rate": FAST}
 
 
-def run(scene: Scene, posed: Posed, settings: Settings) -> Observed:
+def run(scene: Scene, posed: Problem, settings: Settings) -> Observed:
     """The whole motion."""
     body = build(scene, posed, settings["element"], settings["level"], METHOD)
     times = posed.observation.times
@@ -43,7 +43,7 @@ def run(scene: Scene, posed: Posed, settings: Settings) -> Observed:
     return Observed(found.trajectory, found.time_step)
 
 
-def prepare(scene: Scene, posed: Posed, settings: Settings) -> Ready:
+def prepare(scene: Scene, posed: Problem, settings: Settings) -> Ready:
     """Set up to take steps, factors and all."""
     body = build(scene, posed, settings["element"], settings["level"], METHOD)
     system = Oscillator(body.mass, body.stiffness, body.load, damping(scene))

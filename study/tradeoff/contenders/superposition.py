@@ -20,7 +20,7 @@ from fem_reference.solvers import solver
 from fem_reference.subspace import Subspace, eigenvectors, empty, extended, superposition
 from fem_reference.superposition import LOOSE
 from msm.timestep import whole_steps
-from study.run.posed import Posed
+from study.problem.problem import Problem
 from study.scene import Scene
 from study.tradeoff.body import FRAME_RATE, build, damping
 from study.tradeoff.contender import Observed, Ready, Settings
@@ -46,7 +46,7 @@ def configurations(scene: Scene) -> Iterator[Settings]:
         yield {"vectors": vectors, "count": count, "level": level}
 
 
-def run(scene: Scene, posed: Posed, settings: Settings) -> Observed:
+def run(scene: Scene, posed: Problem, settings: Settings) -> Observed:
     """The whole motion."""
     body = _body(scene, posed, settings)
     subspace = _subspace(body, settings)
@@ -63,7 +63,7 @@ def run(scene: Scene, posed: Posed, settings: Settings) -> Observed:
     return Observed(recorder.trajectory, float(times[1]))
 
 
-def prepare(scene: Scene, posed: Posed, settings: Settings) -> Ready:
+def prepare(scene: Scene, posed: Problem, settings: Settings) -> Ready:
     """Set up to take steps, each of which gives the displacement of all nodes."""
     subspace = _subspace(_body(scene, posed, settings), settings)
     squares, Q = eigh(subspace.stiffness)
@@ -94,7 +94,7 @@ def transitions(squares: Floats, damped: Damping, step: float) -> Floats:
     return np.asarray(expm(step * rate))
 
 
-def _body(scene: Scene, posed: Posed, settings: Settings) -> Body:
+def _body(scene: Scene, posed: Problem, settings: Settings) -> Body:
     return build(scene, posed, scene.reference.element, settings["level"], "ritz-vectors")
 
 

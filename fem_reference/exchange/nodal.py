@@ -1,0 +1,96 @@
+"""A discretised body as plain arrays: nodes, elements, nodal forces, foundation, material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fem_reference.elasticity import Body
+from study.mesh.tetrahedra import FACES
+from study.problem.contact import Foundation
+from study.problem.tissue import Tissue
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DIRECTIONS = 3
+# Corners of an edge, and mid-side nodes of each face of FACES, by their place in an element.
+EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+FACE_EDGES = np.array([[5, 8, 9], [6, 7, 9], [4, 7, 8], [4, 5, 6]])
+
+
+@dataclass(frozen=True)
+class NodalProblem:
+    """What another code needs to solve the body again.
+
+    `nodes` [m] (n, 3), mid-side nodes where the element has them; `elements` (t, 4) or (t, 10),
+    corners, then the middles of edges 01, 12, 02, 03, 13, 23, the order of C3D10 and of VTK;
+    `load` [N] (n, 3), nodal forces at full load; `support` [N/m] (n, n), the foundation, which
+    couples the nodes in each direction alike; `support_density` [Pa/m] (n,), its stiffness per
+    area, mean of the facets at a node.
+    """
+
+    nodes: Floats
+    elements: Ints
+    tissue: Tissue
+    load: Floats
+    support: csr_array
+    support_density: Floats
+
+    @property
+    def curved(self) -> bool:
+        """Whether a mid-side node lies off the middle of its edge."""
+        if self.elements.shape[1] == 4:
+            return False
+        ends = self.nodes[self.elements[:, EDGES]]
+        middle = self.nodes[self.elements[:, 4:]]
+        edge = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+        offset = np.linalg.norm(ends.mean(axis=2) - middle, axis=2)
+        return bool((offset > 1e-9 * edge).any())
+
+
+def nodal_problem(body: Body, tissue: Tissue, foundation: Foundation) -> NodalProblem:
+    """The problem that a body is, as plain arrays.
+
+    ValueError for Taylor-Hood elements: only the displacement elements have counterparts.
+    """
+    if body.element == "taylor-hood":
+        raise ValueError(
+            "reference.element: taylor-hood has no counterpart in other codes' files; set it to "
+            '"p2" (or lower tissue.poisson_ratio)'
+        )
+    elements = np.asarray(body.nodes.element_dofs.T, dtype=np.int64)
+    return NodalProblem(
+        body.points,
+        elements,
+        tissue,
+        body.load.reshape(-1, DIRECTIONS),
+        csr_array(body.support[::DIRECTIONS, ::DIRECTIONS]),
+        _density(body.points, elements, foundation),
+    )
+
+
+def _density(nodes: Floats, elements: Ints, foundation: Foundation) -> Floats:
+    facets = _boundary_facets(elements)
+    a, b, c = (nodes[facets[:, i]] for i in range(3))
+    doubled = np.cross(b - a, c - a)
+    area = np.linalg.norm(doubled, axis=1, keepdims=True)
+    density = foundation.density(nodes[facets], (doubled / area)[:, None])
+    total = np.bincount(facets.ravel(), (area * density).ravel(), len(nodes))
+    around = np.bincount(facets.ravel(), np.broadcast_to(area, facets.shape).ravel(), len(nodes))
+    return np.divide(total, around, out=np.zeros(len(nodes)), where=around > 0.0)
+
+
+def _boundary_facets(elements: Ints) -> Ints:
+    """Nodes of each facet on the boundary, corners first and outward: (k, 3) or (k, 6)."""
+    corners = elements[:, FACES].reshape(-1, 3)
+    whole = corners
+    if elements.shape[1] > 4:
+        whole = np.hstack([corners, elements[:, FACE_EDGES].reshape(-1, 3)])
+    _, first, count = np.unique(
+        np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(whole[first[count == 1]])

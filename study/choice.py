@@ -1,0 +1,44 @@
+"""Choices by name, from the table that implements them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic_core import CoreSchema
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Annotation of a text field: its value is a key of a table, given as "module:NAME".
+
+    As an annotation `Annotated[str, Choice("msm.integrators:INTEGRATORS")]` it makes pydantic take
+    the keys of that table and nothing else. The table is imported when a value is read, so that a
+    scene can be declared without what computes it, and an entry added to the table is a choice.
+    """
+
+    table: str
+
+    def names(self) -> tuple[str, ...]:
+        """The keys of the table, in its order."""
+        module, _, name = self.table.partition(":")
+        found: Mapping[str, object] = getattr(import_module(module), name)
+        return tuple(found)
+
+    def read(self, value: object) -> str:
+        """The value if it is a key of the table; ValueError with the keys there are."""
+        names = self.names()
+        if not isinstance(value, str) or value not in names:
+            quoted = [repr(name) for name in names]
+            listed = " or ".join(filter(None, [", ".join(quoted[:-1]), quoted[-1]]))
+            raise ValueError(f"should be {listed}")
+        return value
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Let pydantic call `read`."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(self.read)

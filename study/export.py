@@ -1,0 +1,279 @@
+"""The finite-element problem of a scene in the files of another code, for `export`."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.dynamics import Damping, Oscillator, hht, march
+from fem_reference.elasticity import Body
+from fem_reference.exchange import calculix
+from fem_reference.exchange.calculix import Motion
+from fem_reference.exchange.calculix_rule import integrated
+from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from fem_reference.memory import SHARE, available, needed
+from fem_reference.solvers import solve_static
+from study.folders import replacing
+from study.organ.geometry import Level
+from study.problem.problem import Problem
+from study.progress import Progress
+from study.results import folder as results
+from study.scene import Scene
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
+
+Floats = NDArray[np.float64]
+
+FORMATS = ("calculix", "vtu")
+MARK = "README.txt"
+VTU = "problem.vtu"
+ALPHA = -0.05
+"""Of HHT: CalculiX's own default."""
+# Also what CalculiX leaves beside its decks.
+FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
+    f"{deck}.{end}"
+    for deck in ("static", "dynamic")
+    for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
+}
+FRAMES = 4
+"""Times, equally spaced, at which the motion of all nodes is compared."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What was asked: a scene or results folder, the format, the folder to write, overrides."""
+
+    target: str
+    to: str
+    out: Path | None = None
+    overrides: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The scene, the folder to write if none is given, and how many elements its results have."""
+
+    scene: Scene
+    folder: Path
+    elements: int | None = None
+
+
+def export(request: Request, progress: Progress) -> Path:
+    """Write the problem; the folder. ValueError for a target or format that will not do."""
+    if request.to not in FORMATS:
+        raise ValueError(f"--to {request.to}: use one of {', '.join(FORMATS)}")
+    target = _target(request)
+    if target.scene.is_point:
+        raise ValueError("organ.shape: a point has no finite elements; use liver, block or a mesh")
+    folder = (request.out or target.folder).resolve()
+    with replacing(folder, _foreign, "export") as partial:
+        write = _write_vtu if request.to == "vtu" else _write_calculix
+        write(target, partial, progress)
+    return folder
+
+
+def _target(request: Request) -> _Target:
+    path = Path(request.target)
+    if not path.is_dir():
+        return _Target(read_scene(request.target, request.overrides), Path(f"{path.stem}-export"))
+    if request.overrides:
+        raise ValueError(
+            f"--set: {path} is exported as it was run; leave it out, or name {path}/scene.toml"
+        )
+    models = {one["name"]: one for one in results.read(path).numbers["models"]}
+    elements = models["fem"]["elements"] if "fem" in models else None
+    return _Target(read_scene(str(path / "scene.toml")), path / "export", elements)
+
+
+# --- what is written ---------------------------------------------------------------------------
+
+
+def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
+    from fem_reference.exchange import vtu
+
+    scene, (body, posed) = target.scene, _discretised(target, progress)
+    given = nodal_problem(body, scene.tissue, posed.foundation)
+    with progress.stage("at rest under full load"):
+        displacement = solve_static(body).reshape(-1, 3)
+    _write(folder, {VTU: vtu.text(given, displacement), MARK: _about_vtu(scene, given)})
+
+
+def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
+    scene, (body, posed) = target.scene, _discretised(target, progress)
+    given = nodal_problem(body, scene.tissue, posed.foundation)
+    motion = motion_of(scene, posed)
+    _check_memory(body)
+    theirs = integrated(body, scene.tissue)
+    with progress.stage("at rest under full load"):
+        rest, own_rest = solve_static(theirs), solve_static(body)
+    with progress.stage("motion"):
+        moved, own_moved = frames(theirs, motion), _own_frames(body, motion)
+    files = calculix.files(given, motion) | {
+        "static.csv": _table([(0.0, rest)], timed=False),
+        "dynamic.csv": _table(moved),
+    }
+    differences = (
+        _difference(rest, own_rest),
+        max(_difference(u, v) for (_, u), (_, v) in zip(moved, own_moved, strict=True)),
+    )
+    _write(folder, files | {MARK: _about_calculix(scene, given, motion, differences)})
+
+
+def _check_memory(body: Body) -> None:
+    """Steps in time factor the matrix, here and in CalculiX."""
+    wanted, limit = needed(body.unknowns, body.element, stepping=True), SHARE * available()
+    if wanted > limit:
+        raise ValueError(
+            f"reference.element_size: {body.unknowns} unknowns stepped in time need "
+            f"{wanted / 2**30:.1f} GiB of {limit / 2**30:.1f}; enlarge it, or export to vtu"
+        )
+
+
+def _discretised(target: _Target, progress: Progress) -> tuple[Body, Problem]:
+    from study.run.reference import build
+
+    with progress.stage("organ"):
+        posed = problem_of(target.scene)
+        level = _level(posed, target.elements)
+    with progress.stage("assembly"):
+        return build(target.scene, posed, level), posed
+
+
+def _level(posed: Problem, elements: int | None) -> Level:
+    """The mesh of the scene, or the finer one that its results took for their accuracy."""
+    from study.run.reference import FINER
+
+    for k in range(FINER + 1):
+        level = posed.geometry.level(k)
+        if level is not None and elements in {None, len(level.mesh.tetrahedra)}:
+            return level
+    raise ValueError(
+        f"the results have {elements} finite elements, which this version does not make of their "
+        "scene; run it again"
+    )
+
+
+def motion_of(scene: Scene, posed: Problem) -> Motion:
+    """The scene's steps and load history, from no load: a step load is a ramp over one step."""
+    from study.run.lattices import damping_rates
+
+    times = posed.observation.times
+    count = (len(times) - 1) * scene.reference.steps_per_sample
+    factors = posed.factor(np.linspace(0.0, times[-1], count + 1))
+    factors[0] = 0.0
+    damping = Damping(*damping_rates(scene))
+    return Motion(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
+
+
+def frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+    """Times [s] that CalculiX prints of a motion, and the unknowns then."""
+    system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
+    steps = hht(system, motion.factor, motion.step, motion.count, motion.alpha)
+    return _kept(steps, motion)
+
+
+def _own_frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+    """The same times in the reference's own steps, mass and quadrature."""
+    system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
+    return _kept(march(system, motion.factor, motion.step, motion.count), motion)
+
+
+def _kept(steps: Iterator[tuple[Floats, Floats]], motion: Motion) -> list[tuple[float, Floats]]:
+    return [(n * motion.step, u) for n, (u, _) in enumerate(steps) if motion.prints(n)]
+
+
+def _difference(u: Floats, v: Floats) -> float:
+    return float(np.linalg.norm(u - v) / np.linalg.norm(v))
+
+
+def _table(moved: Sequence[tuple[float, Floats]], *, timed: bool = True) -> str:
+    """Displacement [m] of each node, numbered from 1, at each time [s]."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["node", "ux_m", "uy_m", "uz_m", *(["time_s"] if timed else [])])
+    for time, u in moved:
+        end = [f"{time:.9g}"] if timed else []
+        for number, at in enumerate(u.reshape(-1, 3), 1):
+            writer.writerow([number, *(f"{value:.12e}" for value in at), *end])
+    return text.getvalue()
+
+
+# --- what it says ------------------------------------------------------------------------------
+
+COMPARE = r"""same() {
+  paste -d, <(awk 'NF == 4 {print $1","$2","$3","$4}' $1.dat) <(tail -n +2 $1.csv) |
+  awk -F, '$1 != $5 {print "line " NR ": node " $1 " beside " $5; odd = 1; exit 1}
+           {for (i = 2; i < 5; i++) {d += ($i - $(i+4))^2; r += $(i+4)^2}}
+           END {if (!odd) print "relative L2 difference", sqrt(d / r)}'
+}"""
+INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration points"}
+
+
+def _about_calculix(
+    scene: Scene, given: NodalProblem, motion: Motion, differences: tuple[float, float]
+) -> str:
+    at_rest, in_motion = differences
+    alpha, beta = motion.damping.mass, motion.damping.stiffness
+    return f"""\
+{scene.title or "A scene"}
+Its finite-element problem for CalculiX, SI units throughout.
+
+mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
+foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
+                are negative, which is meant: their sum is the matrix
+load.inp        nodal forces [N] of the tool at full load
+static.inp      at rest under full load
+static.csv      what we get for it: displacement [m] of each node
+dynamic.inp     {motion.count} steps of {motion.step:g} s by HHT, alpha {motion.alpha:g}
+dynamic.csv     what we get for it, after every {motion.kept} steps and at the end
+
+Rayleigh damping: alpha {alpha:.6g} 1/s, beta {beta:.6g} s, the foundation's stiffness in it.
+The load starts from zero: where the scene's history does not, it rises within the first step.
+
+Run `ccx static` and `ccx dynamic` (which factors the matrix at every step: minutes for thousands of
+nodes), then compare in bash:
+
+{COMPARE}
+same static; same dynamic
+
+CalculiX prints seven digits: expect about 1.5e-7. The .csv files are solved by our own matrices
+with the quadrature of {INTEGRATED[given.elements.shape[1]]}. It is exact for the
+stiffness of straight elements, not for curved ones and not for the mass. With the quadrature of
+the study, and in motion its consistent mass and TR-BDF2 steps of the same size, the displacement
+differs by {at_rest:.1e} at rest and up to {in_motion:.1e} in motion, relative L2 over the nodes.
+"""
+
+
+def _about_vtu(scene: Scene, given: NodalProblem) -> str:
+    tissue = scene.tissue
+    kind = "quadratic tetrahedra" if given.elements.shape[1] == 10 else "tetrahedra"
+    return f"""\
+{scene.title or "A scene"}
+Its finite-element problem, SI units throughout.
+
+{VTU}  {len(given.nodes)} nodes, {len(given.elements)} {kind}; on the nodes:
+  displacement     [m] at rest under full load
+  load             [N] nodal forces of the tool at full load
+  support_density  [Pa/m] stiffness per area of the foundation, mean of the facets at a node
+
+Material: Young's modulus {tissue.youngs_modulus:g} Pa, Poisson ratio {tissue.poisson_ratio:g},
+density {tissue.density:g} kg/m^3.
+"""
+
+
+# --- the folder --------------------------------------------------------------------------------
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> None:
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def _foreign(present: set[str]) -> str | None:
+    return min(present - FILES, default=None)

@@ -1,0 +1,1 @@
+"""Cases whose answers are known beforehand: verification and stability."""

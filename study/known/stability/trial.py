@@ -1,0 +1,71 @@
+"""One case, run so that it ends: in a finding, a refusal, an error, or at its time limit."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from importlib import import_module
+from typing import Any
+
+from study.known.stability.finding import Finding
+
+
+class OverrunError(Exception):
+    """A case did not end in its time."""
+
+
+def trial(function: str, arguments: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """The finding of a case as plain values; a number that is not finite is None.
+
+    A ValueError is a refusal. Any other exception is an error, and so is a warning: who meets the
+    case in a run would have been told of it by the machinery and not by the program.
+    """
+    try:
+        with warnings.catch_warnings(), time_limit(seconds):
+            warnings.simplefilter("error")
+            module, name = function.split(":")
+            found = getattr(import_module(module), name)(**arguments)
+    except ValueError as error:
+        found = Finding("refused", message=str(error))
+    except OverrunError:
+        found = Finding("error", message=f"did not end within {seconds:g} s")
+    except Exception as error:  # whatever it is, it is what the case found
+        found = Finding("error", message=f"{type(error).__name__}: {error}")
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in asdict(found).items()
+    }
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise OverrunError in this thread after so long, wherever Python is in control.
+
+    A signal would serve the main thread only, and workers run their tasks in others. Compiled code
+    is not interrupted: the error comes when it returns.
+    """
+    here, lock, ended = threading.get_ident(), threading.Lock(), False
+
+    def interrupt() -> None:
+        with lock:
+            if not ended:
+                _raise_in(here, OverrunError)
+
+    timer = threading.Timer(seconds, interrupt)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with lock:
+            ended = True
+        timer.cancel()
+
+
+def _raise_in(thread: int, error: type[Exception]) -> None:
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(error))

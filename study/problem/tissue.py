@@ -1,0 +1,20 @@
+"""What the organ is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from study.quantity import Quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tissue:
+    """Isotropic elastic tissue, that of the reference; the values not given are a liver's.
+
+    The fuzzy estimates of stiffness are judged against its modulus.
+    """
+
+    youngs_modulus: Annotated[float, Quantity("Pa", 100.0, 1e6)] = 9.5e3
+    poisson_ratio: Annotated[float, Quantity("", 0.0, 0.49999)] = 0.45
+    density: Annotated[float, Quantity("kg/m^3", 500.0, 2000.0)] = 1054.0

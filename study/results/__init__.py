@@ -1,0 +1,1 @@
+"""What a study found, on disk and in memory."""

@@ -1,0 +1,41 @@
+"""The scene: everything a study is told, in SI units; `study.scene.file` reads it."""
+
+from study.problem.history import LoadHistory
+from study.problem.tissue import Tissue
+from study.scene.schema import (
+    Aetiology,
+    Basafa,
+    Damping,
+    Fuzzy,
+    Lattice,
+    Organ,
+    Patient,
+    Place,
+    Reference,
+    Scene,
+    Side,
+    SpringLaw,
+    Support,
+    Time,
+    Tool,
+)
+
+__all__ = [
+    "Aetiology",
+    "Basafa",
+    "Damping",
+    "Fuzzy",
+    "Lattice",
+    "LoadHistory",
+    "Organ",
+    "Patient",
+    "Place",
+    "Reference",
+    "Scene",
+    "Side",
+    "SpringLaw",
+    "Support",
+    "Time",
+    "Tissue",
+    "Tool",
+]

@@ -1,0 +1,242 @@
+"""Scene: everything a study of one organ under one tool is told, in SI units.
+
+A scene is written as TOML; `study.scene.file` reads, checks and writes it. The annotations state
+the unit and the allowed range of each quantity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from study.choice import Choice
+from study.problem.history import LoadHistory
+from study.problem.tissue import Tissue
+from study.quantity import Quantity
+
+Length = Annotated[float, Quantity("m", 1e-6, 10.0)]
+Share = Annotated[float, Quantity("", 0.0, 1.0)]
+Reading = Annotated[float, Quantity("Pa", 500.0, 150e3)]
+Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
+
+Component = Annotated[float, Quantity("", -1.0, 1.0)]
+
+Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
+SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
+ModelName = Literal["fem", "basafa", "msm"]
+IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
+ElementName = Annotated[str, Choice("fem_reference.elasticity:CHOICES")]
+MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
+Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A place on or in the organ, given in one of three ways.
+
+    `side` and `at`: seen from that side, two fractions of the bounding box along its two other axes
+    (in the order x, y, z), on the first surface met. `fraction`: three fractions of the bounding
+    box. `point`: coordinates [m]. The last two move to the nearest surface if `snap` is set.
+    """
+
+    side: Side | None = None
+    at: tuple[Share, Share] | None = None
+    fraction: tuple[Share, Share, Share] | None = None
+    point: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    snap: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Organ:
+    """The shape: a built-in one, or a mesh file, which takes precedence.
+
+    `volume` scales the built-in liver, `size` is the block's. `point` is a single control mass
+    point without a mesh; its mass is `mass`, or, without one, that for which eq. (2) at the scene's
+    damping ratio meets the benchmark's gamma_0.
+    """
+
+    shape: Literal["liver", "block", "point"] = "liver"
+    volume: Annotated[float, Quantity("m^3", 1e-9, 10.0)] = 1.5e-3
+    size: tuple[Length, Length, Length] = (0.12, 0.08, 0.06)
+    mass: Annotated[float, Quantity("kg", 1e-6, 100.0)] | None = None
+    mesh: str | None = None
+    unit: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Support:
+    """Elastic foundation on the surface that faces `side`, down to `depth` from its extreme point.
+
+    `stiffness` is its traction per displacement [Pa/m].
+    """
+
+    side: Side = "posterior"
+    depth: Length = 0.03
+    stiffness: Annotated[float, Quantity("Pa/m", 1.0, 1e12)] = 2e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tool:
+    """Blunt tool: where it touches, which way it pushes (inwards by default), how hard."""
+
+    place: Place = field(default_factory=lambda: Place(side="anterior", at=(0.3, 0.5)))
+    direction: tuple[Component, Component, Component] | None = None
+    radius: Length = 0.025
+    force: Annotated[float, Quantity("N", 1e-9, 1e3)] = 0.5
+    history: LoadHistory = field(default_factory=LoadHistory)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Patient:
+    """Elastography reading per aetiology [Pa]; one that is not given is that of a normal liver."""
+
+    hcv: Reading | None = None
+    hbv: Reading | None = None
+    ald: Reading | None = None
+    cld: Reading | None = None
+    nafld: Reading | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fuzzy:
+    """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt.
+
+    `reading` of Table I by name, `consequent` of a combination, `placement` of the sets on
+    elastography data, `footprint` of uncertainty and its factor on the published spread, what an
+    `absent` reading does; then how the systems are evaluated. `surface`: the two readings of the
+    output surfaces. `sensitivity_readings`: readings over which each of these choices is varied.
+    """
+
+    systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
+    reading: str = "R1"
+    consequent: Literal["max", "mean"] = "max"
+    placement: Literal["stage-mean", "cut-off"] = "stage-mean"
+    footprint: Literal["uncertain-mean", "uncertain-spread", "scaled"] = "uncertain-mean"
+    footprint_factor: Annotated[float, Quantity("", 0.0, 3.0)] = 1.0
+    absent: Literal["normal", "silent"] = "normal"
+    sampling: Literal["matlab", "octave", "exact"] = "matlab"
+    samples: Annotated[int, Quantity("", 11, 100_001)] = 101
+    sugeno_aggregation: Literal["sum", "max"] = "sum"
+    reducer: Literal["karnik-mendel", "eiasc", "nie-tan"] = "karnik-mendel"
+    out_of_range: Literal["clamp", "raise", "matlab"] = "clamp"
+    surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
+    sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringLaw:
+    """Points of a spring's tension over its strain, joined by straight lines that go on beyond.
+
+    `relative_tension` is that of a linear spring at this strain: where it equals `strain`, the
+    spring has the stiffness of the estimated modulus.
+    """
+
+    strain: tuple[Annotated[float, Quantity("", -1.0, 10.0)], ...]
+    relative_tension: tuple[Annotated[float, Quantity("", -1e3, 1e3)], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lattice:
+    """Mass-spring lattice: spacing, share of axial stiffness in flexion and in body diagonals.
+
+    `springs`: those of a cubic lattice of this spacing, or one along each edge of the organ's
+    finite-element mesh. `law` of the fuzzy-tuned springs, linear if none is given. `volume_term`
+    gives these models the tissue's Poisson ratio; without it every cubic lattice of springs has
+    1/4. `geometry`: whether forces follow the deformed lattice. The step is at most
+    `step_fraction` of the critical one, which is followed as the body deforms, unless `time_step`
+    or `step_rate` fixes it.
+    """
+
+    springs: Literal["lattice", "tetrahedra"] = "lattice"
+    spacing: Length = 0.01
+    flexion: Annotated[float, Quantity("", 0.0, 0.9)] = 0.2
+    body_diagonals: Annotated[float, Quantity("", 0.0, 0.9)] = 0.0
+    law: SpringLaw | None = None
+    volume_term: bool = False
+    geometry: Literal["nonlinear", "linear"] = "nonlinear"
+    integrator: IntegratorName = "symplectic-euler"
+    step_fraction: Annotated[float, Quantity("", 1e-4, 10.0)] = 0.8
+    time_step: Annotated[float, Quantity("s", 1e-9, 10.0)] | None = None
+    step_rate: Annotated[float, Quantity("Hz", 0.1, 1e9)] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """Damping of the fuzzy-tuned models and of the reference; the benchmark has that of eq. (9).
+
+    `ratio`: zeta of eq. (2); `mass` and `stiffness`: Rayleigh's alpha and beta, C = alpha M +
+    beta K. `reference_spacing`: where k and m of eq. (2) and Table II are taken.
+    """
+
+    kind: Literal["eq-2", "rayleigh"] = "eq-2"
+    ratio: Annotated[float, Quantity("", 0.0, 100.0)] = 0.9
+    mass: Annotated[float, Quantity("s^-1", 0.0, 1e6)] = 0.0
+    stiffness: Annotated[float, Quantity("s", 0.0, 100.0)] = 0.0
+    reference_spacing: Length = 5.5e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Basafa:
+    """Table II: constants of eqs. (5)-(9) at `damping.reference_spacing`."""
+
+    k1: Annotated[float, Quantity("N", 1e-9, 1e6)] = 0.05
+    k2: Annotated[float, Quantity("N", 0.0, 1e9)] = 10.0
+    x_c: Annotated[float, Quantity("", 1e-6, 10.0)] = 0.2
+    gamma_0: Annotated[float, Quantity("N*s/m", 0.0, 1e6)] = 2.0
+    gamma_1: Annotated[float, Quantity("N*s/m^2", 0.0, 1e9)] = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """Finite-element reference: elements, their size (edge of the mesh lattice), motion in time.
+
+    With `accuracy`, a relative error, a finer mesh is taken until the displacement of each control
+    point is estimated to be as accurate. `element`: auto is quadratic, with a pressure of its own
+    above a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of
+    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `large_strain`: law of a static
+    solution beside it where strains exceed what linear elasticity is good for.
+    """
+
+    element: ElementName = "auto"
+    element_size: Length = 0.017
+    accuracy: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
+    method: MethodName = "ritz-vectors"
+    modes: Annotated[int, Quantity("", 1, 1000)] = 100
+    steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
+    large_strain: Literal["neo-hookean", "st-venant-kirchhoff", "none"] = "neo-hookean"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Time:
+    """Simulated time and number of equally spaced samples, both ends included."""
+
+    duration: Annotated[float, Quantity("s", 1e-6, 3600.0)] = 10.0
+    samples: Annotated[int, Quantity("", 16, 20_001)] = 201
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system."""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic's name; nested ones inherit
+
+    title: str = ""
+    models: tuple[ModelName, ...] = ("fem", "basafa", "msm")
+    organ: Organ = field(default_factory=Organ)
+    support: Support = field(default_factory=Support)
+    tool: Tool = field(default_factory=Tool)
+    tissue: Tissue = field(default_factory=Tissue)
+    patient: Patient = field(default_factory=Patient)
+    fuzzy: Fuzzy = field(default_factory=Fuzzy)
+    lattice: Lattice = field(default_factory=Lattice)
+    damping: Damping = field(default_factory=Damping)
+    basafa: Basafa = field(default_factory=Basafa)
+    reference: Reference = field(default_factory=Reference)
+    time: Time = field(default_factory=Time)
+    control_points: dict[str, Place] = field(default_factory=dict)
+    renders: bool = True
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it is a single control mass point, without an organ."""
+        return self.organ.shape == "point" and self.organ.mesh is None
