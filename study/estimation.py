@@ -212,7 +212,7 @@ def _draw(
     """Write the figures into the folder; their paths."""
     from reports.fuzzy_figures import draw_sets, draw_surfaces
     from reports.rule_view import draw_rules
-    from study.run.estimates import drawings
+    from study.models.estimates import drawings
 
     systems, over = request.systems or SYSTEMS, request.surface or ("hcv", "hbv")
     arrays = drawings(settings, systems, readings, over)

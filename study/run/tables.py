@@ -1,4 +1,4 @@
-"""Rows of the result tables: curves, bands, similarity, field errors."""
+"""Rows of the result tables: curves, bands, similarity, differences of the field."""
 
 from __future__ import annotations
 
@@ -9,71 +9,80 @@ from numpy.typing import NDArray
 
 from study.problem.response import Response
 from study.problem.trajectory import Trajectory
-from study.results.folder import Row
+from study.results.tables import BandSample, CurveSample, FieldDifference, SimilarityScore
 from study.similarity.fields import best_factor, norm, relative_l2
 from study.similarity.score import scores
 
 Floats = NDArray[np.float64]
 
-REFERENCES = ("fem", "basafa")
 
-
-def curve_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[Row]:
+def curve_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[CurveSample]:
     """Finite samples of each model at each probe."""
     for model, trajectory in runs.items():
         for i, probe in enumerate(response.probes):
             motion = response.motion(trajectory, i)
             for t, u, v in zip(motion.time, motion.displacement, motion.velocity, strict=True):
                 if np.isfinite(u) and np.isfinite(v):
-                    yield model, probe, float(t), float(u), float(v)
+                    yield CurveSample(model, probe, float(t), float(u), float(v))
 
 
-def band_rows(response: Response, model: str, bounds: Sequence[Trajectory]) -> Iterator[Row]:
+def band_rows(response: Response, model: str, bounds: Sequence[Trajectory]) -> Iterator[BandSample]:
     """Samples of the runs at the lower and at the upper bound of the stiffness interval."""
     for i, probe in enumerate(response.probes):
         lower, upper = (response.motion(bound, i) for bound in bounds)
         columns = (lower.displacement, upper.displacement, lower.velocity, upper.velocity)
         for t, *values in zip(response.times, *columns, strict=True):
             if np.isfinite(values).all():
-                yield (model, probe, float(t), *map(float, values))
+                yield BandSample(model, probe, float(t), *map(float, values))
 
 
-def pairs(models: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Candidate and reference: every model against the finite elements and the benchmark."""
-    for reference in REFERENCES:
+def pairs(models: Sequence[str], references: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Candidate and reference: every model against each reference, and no pair the other way."""
+    for rank, reference in enumerate(references):
         for model in models:
-            if reference in models and model not in REFERENCES[: REFERENCES.index(reference) + 1]:
+            if reference in models and model not in references[: rank + 1]:
                 yield model, reference
 
 
 def similarity_rows(
-    response: Response, runs: Mapping[str, Trajectory], notes: list[str]
-) -> Iterator[Row]:
-    """Scores of all pairs that finished; a pair that cannot be scored leaves a note instead."""
-    for model, reference in pairs(list(runs)):
+    response: Response, runs: Mapping[str, Trajectory], references: Sequence[str]
+) -> tuple[tuple[SimilarityScore, ...], tuple[str, ...]]:
+    """Scores of all pairs that finished, and a note on each pair that cannot be scored."""
+    rows: list[SimilarityScore] = []
+    notes: list[str] = []
+    for model, reference in pairs(list(runs), references):
         for i, probe in enumerate(response.probes):
-            candidate, truth = response.motion(runs[model], i), response.motion(runs[reference], i)
+            candidate, truth = (response.motion(runs[name], i) for name in (model, reference))
             try:
                 found = scores(candidate, truth)
             except ValueError as error:
                 notes.append(f"No score of {model} against {reference} at {probe}: {error}.")
                 continue
-            for score in found:
-                yield model, reference, probe, score.curve, score.measure, score.value
+            pair = (model, reference, probe)
+            rows += [SimilarityScore(*pair, one.curve, one.measure, one.value) for one in found]
+    return tuple(rows), tuple(notes)
 
 
-def error_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[Row]:
+def difference_rows(
+    response: Response, runs: Mapping[str, Trajectory], references: Sequence[str]
+) -> Iterator[FieldDifference]:
     """Differences of the displacement field over the organ, at the peak and at the end."""
-    for model, reference in pairs(list(runs)):
+    for model, reference in pairs(list(runs), references):
         field, truth = runs[model].volume_field, runs[reference].volume_field
-        if not (np.isfinite(field).all() and np.isfinite(truth).all()):
-            continue
-        for frame, name in ((0, "peak"), (-1, "final")):
-            error = relative_l2(field[frame], truth[frame], response.volumes)
-            yield model, reference, f"field-relative-l2-{name}", error
-        share = norm(field[-1] - truth[-1], response.volumes) / norm(truth[0], response.volumes)
-        yield model, reference, "field-l2-final-over-peak", share
-        factor = best_factor(field[0], truth[0], response.volumes)
-        left = relative_l2(factor * field[0], truth[0], response.volumes)
-        yield model, reference, "field-best-factor-peak", factor
-        yield model, reference, "field-relative-l2-peak-at-best-factor", left
+        if np.isfinite(field).all() and np.isfinite(truth).all():
+            for quantity, value in _differences(field, truth, response.volumes):
+                yield FieldDifference(model, reference, quantity, value)
+
+
+def _differences(field: Floats, truth: Floats, volumes: Floats) -> Iterator[tuple[str, float]]:
+    """Quantities of two fields (frames, q, 3), the first frame that of the peak."""
+    for frame, name in ((0, "peak"), (-1, "final")):
+        yield f"field-relative-l2-{name}", relative_l2(field[frame], truth[frame], volumes)
+    share = norm(field[-1] - truth[-1], volumes) / norm(truth[0], volumes)
+    yield "field-l2-final-over-peak", share
+    factor = best_factor(field[0], truth[0], volumes)
+    yield "field-best-factor-peak", factor
+    yield (
+        "field-relative-l2-peak-at-best-factor",
+        relative_l2(factor * field[0], truth[0], volumes),
+    )

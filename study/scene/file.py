@@ -22,6 +22,7 @@ BUILT_IN = ("liver", "block", "paper")
 MAX_BYTES = 65_536
 MAX_LINE = 1_000
 SPRINGS_POISSON_RATIO = 0.25
+_ON_POINT = ("basafa", "msm")
 # What a scene without a mesh cannot use.
 _MESH_ONLY = (
     ("organ", "volume"),
@@ -29,6 +30,7 @@ _MESH_ONLY = (
     ("support",),
     ("lattice",),
     ("reference",),
+    ("superposition",),
     ("control_points",),
     ("renders",),
     ("tool", "place"),
@@ -117,6 +119,8 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield "damping", key
     if scene.reference.method != "modal":
         yield "reference", "modes"
+    if "superposition" not in scene.models:
+        yield ("superposition",)
 
 
 def _load(name: str) -> tuple[dict[str, Any], Path]:
@@ -366,8 +370,9 @@ def _unseen_load(scene: Scene) -> Iterator[str]:
 
 
 def _point_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
-    if "fem" in scene.models:
-        yield "models: fem needs an organ with a mesh; a point has none"
+    for name in scene.models:
+        if name not in _ON_POINT:
+            yield f"models: {name} needs an organ with a mesh; a point has none"
     if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
         yield (
             "organ.mass: cannot follow from eq. (2) without damping; give it, or set "

@@ -23,7 +23,7 @@ Component = Annotated[float, Quantity("", -1.0, 1.0)]
 
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
-ModelName = Literal["fem", "basafa", "msm"]
+ModelName = Annotated[str, Choice("study.models.table:MODELS")]
 IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
 ElementName = Annotated[str, Choice("fem_reference.elasticity:CHOICES")]
 MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
@@ -207,6 +207,14 @@ class Reference:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Superposition:
+    """Of the model of that name: Ritz vectors or modes of vibration, and how many."""
+
+    vectors: Literal["ritz", "modal"] = "ritz"
+    count: Annotated[int, Quantity("", 1, 400)] = 16
+
+
+@dataclass(frozen=True, kw_only=True)
 class Time:
     """Simulated time and number of equally spaced samples, both ends included."""
 
@@ -232,6 +240,7 @@ class Scene:
     damping: Damping = field(default_factory=Damping)
     basafa: Basafa = field(default_factory=Basafa)
     reference: Reference = field(default_factory=Reference)
+    superposition: Superposition = field(default_factory=Superposition)
     time: Time = field(default_factory=Time)
     control_points: dict[str, Place] = field(default_factory=dict)
     renders: bool = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from fuzzy.explanation_arrays import drawing_arrays
 from fuzzy.liver import records_in_use
 from fuzzy.sensitivity import sensitivity
 from fuzzy.stiffness import Estimate, Options, Settings
-from study.results.folder import Row
+from study.results.records import FuzzyRecord, StiffnessSet, SystemEstimate
+from study.results.tables import SensitivityEntry
 from study.scene import Scene
 
 SURFACE_POINTS = 41
@@ -25,7 +26,7 @@ CURVE_POINTS = 401
 def settings(scene: Scene) -> Settings:
     """Settings of the fuzzy systems from the scene. ValueError naming the key that does not fit."""
     asked = asdict(scene.fuzzy)
-    options = Options(**{field.name: asked[field.name] for field in fields(Options)})
+    options = Options(**{f.name: asked[f.name] for f in fields(Options)})
     named = {f.name: asked[f.name] for f in fields(Settings) if f.name != "options"}
     try:
         return Settings(**named, options=options)
@@ -50,54 +51,61 @@ def estimates(scene: Scene) -> dict[str, Estimate]:
 class FuzzySide:
     """What the fuzzy systems found: estimates by system, and their part of the results."""
 
-    estimates: dict[str, Estimate]
-    numbers: dict[str, Any]
-    sensitivity: list[Row]
-    arrays: dict[str, NDArray[Any]]
-    notes: list[str]
-
-
-NONE = FuzzySide({}, {"stiffness": {}, "rule_count": None}, [], {}, [])
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    record: FuzzyRecord = field(default_factory=lambda: FuzzyRecord(systems={}))
+    sensitivity: tuple[SensitivityEntry, ...] = ()
+    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def run_fuzzy(scene: Scene) -> FuzzySide:
     """Estimates, their sensitivity to every choice, and what the report shows of the systems."""
     chosen, given = settings(scene), readings(scene)
     found = estimates(scene)
-    rows, notes = _sensitivity(scene, chosen, given)
+    entries, notes = _sensitivity(scene, chosen, given)
     modulus = scene.tissue.youngs_modulus
-    numbers = {
-        "stiffness": {name: _numbers(one, modulus) for name, one in found.items()},
-        "rule_count": stiffness.rule_count(chosen),
-        "stiffness_sets": [asdict(record) for record in records_in_use(chosen)],
-        "surface_inputs": list(scene.fuzzy.surface),
-    }
+    record = FuzzyRecord(
+        systems={name: _record(one, modulus) for name, one in found.items()},
+        rule_count=stiffness.rule_count(chosen),
+        stiffness_sets=tuple(StiffnessSet(**asdict(one)) for one in records_in_use(chosen)),
+        surface_inputs=scene.fuzzy.surface,
+    )
     arrays = drawings(chosen, scene.fuzzy.systems, given, scene.fuzzy.surface)
-    return FuzzySide(found, numbers, rows, arrays, notes)
+    return FuzzySide(found, record, entries, arrays, notes)
 
 
 def _sensitivity(
     scene: Scene, chosen: Settings, given: Mapping[str, float]
-) -> tuple[list[Row], list[str]]:
+) -> tuple[tuple[SensitivityEntry, ...], tuple[str, ...]]:
     if not scene.fuzzy.sensitivity_readings:
-        return [], []
+        return (), ()
     found = sensitivity(given, chosen, scene.fuzzy.sensitivity_readings)
-    notes = [f"Sensitivity leaves out {left_out}." for left_out in found.left_out]
-    columns = ("choice", "base", "alternative", "system", "at_readings", "rms", "largest", "rows")
-    return [tuple(getattr(row, name) for name in columns) for row in found.rows], notes
+    notes = tuple(f"Sensitivity leaves out {left_out}." for left_out in found.left_out)
+    entries = (
+        SensitivityEntry(
+            choice=row.choice,
+            base=row.base,
+            alternative=row.alternative,
+            system=row.system,
+            change_at_readings_pa=row.at_readings,
+            rms_change_pa=row.rms,
+            largest_change_pa=row.largest,
+            readings=row.rows,
+        )
+        for row in found.rows
+    )
+    return tuple(entries), notes
 
 
-def _numbers(estimate: Estimate, youngs_modulus: float) -> dict[str, Any]:
-    numbers: dict[str, Any] = {
-        "estimate_pa": estimate.estimate,
-        "relative_to_reference": estimate.estimate / youngs_modulus,
-        "quadrature_error_pa": estimate.quadrature_error,
-        "method": estimate.method,
-        "notes": list(estimate.notes),
-    }
-    if estimate.interval is not None:
-        numbers["interval_pa"] = list(estimate.interval)
-    return numbers
+def _record(found: Estimate, youngs_modulus: float) -> SystemEstimate:
+    return SystemEstimate(
+        estimate_pa=found.estimate,
+        relative_to_reference=found.estimate / youngs_modulus,
+        quadrature_error_pa=found.quadrature_error,
+        method=found.method,
+        notes=tuple(found.notes),
+        interval_pa=found.interval,
+    )
 
 
 def drawings(

@@ -1,0 +1,90 @@
+"""A single control mass point on one spring, as the paper compares its models."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from msm import control_point
+from msm.damping import Damping
+from msm.laws import Law, initial_stiffness
+from study.models.errors import place
+from study.models.model import ModelRun, Watch
+from study.problem.problem import PointProblem
+from study.problem.trajectory import Trajectory
+from study.results.records import CurveErrors, ModelRecord, PointRecord
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """Law of the spring, damping of the point, and Young's modulus [Pa] that they stand for."""
+
+    law: Law
+    damping: Damping
+    modulus: float | None = None
+
+
+Make = Callable[[PointProblem], Oscillator]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointSpring:
+    """A spring and a dashpot on a point, which `make` makes; `bounds` at two other stiffnesses.
+
+    `system`: the fuzzy system whose estimate they have.
+    """
+
+    name: str
+    label: str
+    make: Make
+    bounds: tuple[Make, Make] | None = None
+    system: str | None = None
+
+    def run(self, problem: PointProblem, watch: Watch) -> ModelRun:
+        """The motion, by a solver to a tight tolerance, and that at both bounds of stiffness."""
+        oscillator = self.make(problem)
+        started = time.perf_counter()
+        with watch.progress.stage(self.name):
+            found = _moved(oscillator, problem)
+        record = self._record(oscillator, problem, found, time.perf_counter() - started)
+        if self.bounds is None:
+            return ModelRun(found, record)
+        low, high = (_moved(make(problem), problem) for make in self.bounds)
+        return ModelRun(found, record, bounds=(low, high))
+
+    def _record(
+        self, oscillator: Oscillator, problem: PointProblem, found: Trajectory, wall: float
+    ) -> ModelRecord:
+        k, m = initial_stiffness(oscillator.law), problem.mass
+        rate, tolerance = oscillator.damping.gamma_0, control_point.RELATIVE_TOLERANCE
+        errors = CurveErrors(displacement=tolerance, velocity=tolerance)
+        return ModelRecord(
+            name=self.name,
+            label=self.label,
+            system=self.system,
+            simulated_s=float(problem.times[-1]),
+            status=found.status,
+            diverged_at_s=found.diverged_at,
+            diverged_near_m=place(found),
+            nodes=1,
+            wall_s=wall,
+            small_strain_modulus_pa=oscillator.modulus,
+            damping_rate_per_s=rate,
+            time_step_errors=dict.fromkeys(problem.probes, errors),
+            point=PointRecord(
+                stiffness_n_per_m=k,
+                mass_kg=m,
+                damping_ratio=rate / (2.0 * float(np.sqrt(k / m))),
+            ),
+        )
+
+
+def _moved(oscillator: Oscillator, problem: PointProblem) -> Trajectory:
+    def force(t: float) -> float:
+        return float(problem.force(np.asarray(t)))
+
+    spring = (oscillator.law, problem.rest_length, problem.mass, oscillator.damping)
+    return control_point.run(*spring, force, problem.times)

@@ -1,0 +1,35 @@
+"""The damping of a scene, as its models have it."""
+
+from __future__ import annotations
+
+from fem_reference.dynamics import Damping as RayleighDamping
+from msm.calibration import POISSON_RATIO, reference_stiffness
+from msm.damping import Damping, eq_2
+from study.scene import Scene
+
+
+def reference_damping(scene: Scene) -> RayleighDamping:
+    """Of the finite elements: Rayleigh's, or eq. (2) at their modulus."""
+    found = nodal_damping(scene, scene.tissue.youngs_modulus)
+    return RayleighDamping(found.gamma_0, found.beta)
+
+
+def nodal_damping(scene: Scene, modulus: float) -> Damping:
+    """Rayleigh's damping, or eq. (2) for springs of a modulus [Pa].
+
+    Eq. (2) is taken for a node at the reference spacing, so that h does not change it.
+    """
+    if scene.damping.kind == "rayleigh":
+        return Damping(scene.damping.mass, beta=scene.damping.stiffness)
+    k = reference_stiffness(modulus, scene.damping.reference_spacing, lattice_poisson_ratio(scene))
+    return eq_2(scene.damping.ratio, k, reference_mass(scene))
+
+
+def lattice_poisson_ratio(scene: Scene) -> float:
+    """Poisson ratio of the lattices that are tuned: the tissue's with a volume term, else 1/4."""
+    return scene.tissue.poisson_ratio if scene.lattice.volume_term else POISSON_RATIO
+
+
+def reference_mass(scene: Scene) -> float:
+    """Mass [kg] of an inner node at the reference spacing."""
+    return float(scene.tissue.density * scene.damping.reference_spacing**3)

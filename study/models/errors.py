@@ -1,0 +1,95 @@
+"""The error of a model's steps, from the same motion by half as long ones."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.models.model import Model, ModelRun, Prepared, Watch
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.results.records import Check, CurveErrors, ModelRecord, largest
+
+DISPLACEMENT_LIMIT, VELOCITY_LIMIT = 0.01, 0.05
+TINY = 1e-300
+
+
+def time_step_errors(
+    order: int, probes: tuple[str, ...], whole: Trajectory, half: Trajectory
+) -> dict[str, CurveErrors]:
+    """Relative L2 errors of whole steps by control point, none if half steps diverged.
+
+    By Richardson's extrapolation with the order of the integrator. Scores compare curve with curve,
+    so the errors are those of each control point's curves.
+    """
+    if half.status != "finished":
+        return {}
+    share = 1.0 / (1.0 - 0.5**order)
+    return {
+        probe: CurveErrors(
+            displacement=share * _difference(whole.displacement[:, i], half.displacement[:, i]),
+            velocity=share * _difference(whole.velocity[:, i], half.velocity[:, i]),
+        )
+        for i, probe in enumerate(probes)
+    }
+
+
+def _difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Relative L2 difference of two motions (samples, 3)."""
+    return float(np.linalg.norm(a - b) / max(float(np.linalg.norm(b)), TINY))
+
+
+def step_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
+    """Whether the steps of a finished model were short enough, or could not be halved."""
+    if not errors:
+        meaning = "runs with halved steps that diverged although whole steps did not"
+        yield Check(name=f"{name}: halved steps", value=1.0, limit=0.0, meaning=meaning)
+        return
+    worst = largest(errors)
+    for kind, value, limit in (
+        ("displacement", worst.displacement, DISPLACEMENT_LIMIT),
+        ("velocity", worst.velocity, VELOCITY_LIMIT),
+    ):
+        meaning = f"largest relative L2 error of a {kind} curve by the time step"
+        yield Check(name=f"{name}: {kind} by time step", value=value, limit=limit, meaning=meaning)
+
+
+def place(trajectory: Trajectory) -> tuple[float, float, float] | None:
+    """Where a run diverged [m], if it is known."""
+    near = trajectory.diverged_near
+    return None if near is None else (float(near[0]), float(near[1]), float(near[2]))
+
+
+def estimated_run(
+    model: Model, prepared: Prepared, problem: Problem, watch: Watch, order: int | None = None
+) -> ModelRun:
+    """The motion of a model as it simulates itself, with what can be said of any model.
+
+    With the `order` of its steps, their error is estimated by half as long ones.
+    """
+    started = time.perf_counter()
+    with watch.progress.stage(model.name):
+        found = prepared.simulate()
+    wall, errors = time.perf_counter() - started, dict[str, CurveErrors]()
+    checks: tuple[Check, ...] = ()
+    finished = found.trajectory.status == "finished"
+    if order is not None and finished:
+        with watch.progress.stage(f"{model.name}: halved steps"):
+            half = prepared.simulate(0.5 * found.step).trajectory
+        errors = time_step_errors(order, problem.probes, found.trajectory, half)
+        checks = tuple(step_checks(model.name, errors))
+    record = ModelRecord(
+        name=model.name,
+        label=model.label,
+        simulated_s=float(problem.observation.times[-1]),
+        status=found.trajectory.status,
+        diverged_at_s=found.trajectory.diverged_at,
+        diverged_near_m=place(found.trajectory),
+        time_step_s=found.step,
+        wall_s=wall,
+        time_step_errors=errors,
+    )
+    return ModelRun(found.trajectory, record, checks)

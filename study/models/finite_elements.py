@@ -1,0 +1,308 @@
+"""The finite-element reference: linear elasticity on meshes that show its own error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference import model as fem
+from fem_reference.dynamics import ORDER, Oscillator, march
+from fem_reference.dynamics import Damping as RayleighDamping
+from fem_reference.elasticity import Body
+from fem_reference.observation import at_points, evaluation
+from fem_reference.solvers import solve_static
+from msm.timestep import whole_steps
+from study.models.damping import reference_damping
+from study.models.errors import place, step_checks, time_step_errors
+from study.models.keeping import recorded
+from study.models.large_strain import compare, is_large
+from study.models.mesh_error import Solved, is_too_coarse, mesh_error, next_size, why_unknown
+from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.organ.geometry import Level
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Progress
+from study.results.fields import Mesh
+from study.results.records import (
+    Check,
+    CurveErrors,
+    ElementsRecord,
+    LargeStrain,
+    MeshError,
+    MeshLevel,
+    ModelRecord,
+)
+from study.scene import Reference, Scene
+
+Floats = NDArray[np.float64]
+
+COARSER = 2
+"""Meshes below that of the scene, as many as there are: three show the order of convergence."""
+FINER = 12
+"""Levels above it that an accuracy may take, if they are not too large."""
+TRUNCATION_LIMIT = 0.01
+FRAME_RATE = 60.0
+"""Steps per second [Hz] of a model that is stepped by hand, where it has no rate."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FiniteElements:
+    """Finite elements as the scene's table `reference` has them.
+
+    `level`: mesh of the organ that a simulation takes, 0 that of the scene, larger is finer; a run
+    takes several. `rate`: steps per second [Hz] of simulations, None for those of the table.
+    """
+
+    reference: Reference
+    damping: RayleighDamping
+    level: int = 0
+    rate: float | None = None
+    name: str = "fem"
+    label: str = "Finite elements"
+
+    def varied(self, **settings: Any) -> Self:
+        """With another level or rate, or other keys of the scene's table `reference`."""
+        own = {key: settings.pop(key) for key in ("level", "rate") if key in settings}
+        return replace(self, reference=replace(self.reference, **settings), **own)
+
+    def prepare(self, problem: Problem) -> PreparedElements:
+        """Set up; a body is assembled when it is needed, mesh by mesh."""
+        return PreparedElements(self, problem)
+
+    def method(self, times: int = 1) -> fem.Method:
+        """How the motion is found, with so many times the steps of the table."""
+        chosen = self.reference
+        return fem.Method(chosen.method, times * chosen.steps_per_sample, chosen.modes)
+
+
+@dataclass(eq=False)
+class PreparedElements:
+    """Finite elements of a problem; after a run, `best` is what was solved on its last mesh."""
+
+    model: FiniteElements
+    problem: Problem
+    best: Solved | None = field(default=None, init=False)
+
+    def describe(self) -> list[str]:
+        """Size of the mesh."""
+        tetrahedra = len(self.problem.geometry.mesh.tetrahedra)
+        asked = self.model.reference.accuracy is not None
+        finer = ", refined for reference.accuracy" if asked else ""
+        return [f"finite-element mesh: {tetrahedra} tetrahedra{finer}"]
+
+    def body(self, level: Level | None = None) -> Body:
+        """The body on a level, that of the model by default. ValueError if there is no such."""
+        found = level or self.problem.geometry.level(self.model.level)
+        if found is None:
+            raise ValueError(
+                f"level {self.model.level}: the organ has no such mesh; choose another level"
+            )
+        chosen, problem = self.model.reference, self.problem
+        where = (problem.foundation, problem.tool, chosen.element, problem.geometry.project)
+        return fem.build(found.mesh, problem.tissue, *where, chosen.method)
+
+    def simulate(self, longest: float | None = None) -> Simulation:
+        """The motion on one level, by the table's steps, those of the rate, or equal ones."""
+        seen, method, rate = self.problem.observation, self.model.method(), self.model.rate
+        longest = 1.0 / rate if longest is None and rate is not None else longest
+        if longest is not None:
+            every = whole_steps(float(seen.times[1] - seen.times[0]), longest)
+            method = replace(method, steps_per_sample=every)
+        found = fem.run(self.body(), self.model.damping, self.problem.factor, seen, method)
+        return Simulation(found.trajectory, found.time_step)
+
+    def rest(self) -> Floats:
+        """Displacement [m] (q, 3) at rest at the points of the volume field; after a run, its."""
+        best = self.best
+        body = self.body() if best is None else best.body
+        u = solve_static(body) if best is None else best.found.rest(body)
+        return at_points(evaluation(body, self.problem.observation.volume_points), u)
+
+    def rest_at(self, poisson_ratio: float) -> Floats:
+        """The same at another Poisson ratio, on the mesh of the last run if there was one."""
+        tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
+        other = PreparedElements(self.model, replace(self.problem, tissue=tissue))
+        body = other.body(None if self.best is None else self.best.level)
+        points = self.problem.observation.volume_points
+        return at_points(evaluation(body, points), solve_static(body))
+
+    def stepper(self) -> Stepper:
+        """Steps of TR-BDF2 at the rate, factors made once, whatever the method of a run."""
+        body, step = self.body(), 1.0 / (self.model.rate or FRAME_RATE)
+        system = Oscillator(body.mass, body.stiffness, body.load, self.model.damping)
+        motion = march(system, self.problem.factor, step, sys.maxsize)
+        u, _ = next(motion)  # rest, and the factors
+
+        def take_step() -> None:
+            nonlocal u
+            u, _ = next(motion)
+
+        return Stepper(take_step, lambda: u.reshape(-1, 3), step, body.stiffness.size)
+
+    def run(self, watch: Watch) -> ModelRun:
+        """The motion on the finest of the meshes that show its error."""
+        solved, error = self._solve(watch.progress)
+        best = self.best = solved[-1]
+        coarsest = solved[0].found.trajectory  # where halving the steps is cheap
+        half = self._halved(solved[0], watch.progress)
+        steps = time_step_errors(ORDER, self.problem.probes, coarsest, half)
+        strained, note = self._at_large_strain(solved, watch.progress)
+        record = self._record(best, steps, self._elements(solved, error, strained))
+        checks = (*step_checks(self.model.name, steps), *_subspace_checks(best))
+        notes = [self._keep_fields(best, watch), note]
+        if error is None:
+            why = why_unknown(self.problem, best)
+            notes.append(f"The reference's discretisation error is not estimated: {why}.")
+        return ModelRun(best.found.trajectory, record, checks, tuple(filter(None, notes)))
+
+    def _solve(self, progress: Progress) -> tuple[list[Solved], MeshError | None]:
+        """On the scene's mesh and those coarser, then finer until it is accurate enough."""
+        geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
+        levels = [geometry.level(k) for k in range(-COARSER, 1)]
+        solved = [self._solved_on(level, progress) for level in levels if level is not None]
+        error = mesh_error(self.problem, solved)
+        while is_too_coarse(accuracy, error):
+            finer = self._finer(solved[-1].level, next_size(accuracy, error))
+            if finer is None:
+                break
+            solved.append(self._solved_on(finer, progress))
+            error = mesh_error(self.problem, solved)
+        return solved, error
+
+    def _finer(self, last: Level, share: float) -> Level | None:
+        """The level expected to be accurate enough, or the finest there is, if it is finer."""
+        found: Level | None = None
+        for level in filter(None, map(self.problem.geometry.level, range(1, FINER + 1))):
+            if level.size < last.size and (found is None or found.size > share * last.size):
+                found = level
+        return found
+
+    def _solved_on(self, level: Level, progress: Progress) -> Solved:
+        name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
+        with progress.stage(f"{name}, assembly"):
+            body = self.body(level)
+        with progress.stage(name) as advance:
+            problem = self.problem
+            arguments = (self.model.damping, problem.factor, problem.observation)
+            return Solved(level, body, fem.run(body, *arguments, self.model.method(), advance))
+
+    def _halved(self, solved: Solved, progress: Progress) -> Trajectory:
+        problem = self.problem
+        with progress.stage(f"{self.model.name}: halved steps") as advance:
+            arguments = (self.model.damping, problem.factor, problem.observation)
+            return fem.run(solved.body, *arguments, self.model.method(2), advance).trajectory
+
+    def _at_large_strain(
+        self, solved: Sequence[Solved], progress: Progress
+    ) -> tuple[LargeStrain | None, str]:
+        """Linear beside hyperelastic rest on the scene's own mesh, where strains are large."""
+        law, found = self.model.reference.large_strain, solved[-1].found
+        if law == "none" or not is_large(found.largest_strain, found.largest_rotation):
+            return None, ""
+        own = next(one.body for one in solved if one.level.mesh is self.problem.geometry.mesh)
+        with progress.stage(f"{self.model.name}: {law}"):
+            compared = compare(self.problem, own, law)
+        if isinstance(compared, str):
+            return None, f"No {law} solution at the peak load: {compared}."
+        return compared, ""
+
+    def _keep_fields(self, best: Solved, watch: Watch) -> str:
+        """Keep the motion of the vertices, if it is wanted; why it cannot be."""
+        keeping = watch.keeping
+        if keeping is None or keeping.fields is None:
+            return ""
+        superposed, mesh = best.found.superposed, best.level.mesh
+        if superposed is None:
+            return "Fields of fem are kept of a superposition only, not of steps in time."
+        shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
+        afresh = replace(keeping, resume=False)
+        with recorded(afresh, self.model.name, shown, times) as on_sample:
+            for sample in range(len(times)):
+                u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in superposed.state(sample))
+                on_sample(sample, u, v)
+        return ""
+
+    def _record(
+        self, best: Solved, errors: dict[str, CurveErrors], elements: ElementsRecord
+    ) -> ModelRecord:
+        found, damping = best.found, self.model.damping
+        return ModelRecord(
+            name=self.model.name,
+            label=self.model.label,
+            simulated_s=float(self.problem.observation.times[-1]),
+            status=found.trajectory.status,
+            diverged_at_s=found.trajectory.diverged_at,
+            diverged_near_m=place(found.trajectory),
+            nodes=found.nodes,
+            time_step_s=found.time_step,
+            steps=found.steps,
+            wall_s=found.wall,
+            small_strain_modulus_pa=self.problem.tissue.youngs_modulus,
+            damping_rate_per_s=damping.mass,
+            stiffness_damping_s=damping.stiffness,
+            largest_strain=found.largest_strain,
+            time_step_errors=errors,
+            elements=elements,
+        )
+
+    def _elements(
+        self, solved: Sequence[Solved], error: MeshError | None, strained: LargeStrain | None
+    ) -> ElementsRecord:
+        best, accuracy = solved[-1], self.model.reference.accuracy
+        superposed = best.found.superposed
+        missed = error is not None and is_too_coarse(accuracy, error)
+        return ElementsRecord(
+            element=best.found.element,
+            elements=best.found.elements,
+            unknowns=best.body.unknowns,
+            method=self.model.reference.method,
+            subspace_vectors=None if superposed is None else superposed.subspace.load.size,
+            truncation_error=None if superposed is None else superposed.truncation_error,
+            largest_rotation_rad=best.found.largest_rotation,
+            levels=tuple(_level(one, best) for one in solved),
+            mesh_error=error,
+            accuracy_missed=accuracy if missed else None,
+            large_strain=strained,
+        )
+
+
+def _level(one: Solved, best: Solved) -> MeshLevel:
+    return MeshLevel(
+        size=one.level.size / best.level.size,
+        elements=one.found.elements,
+        unknowns=one.body.unknowns,
+        wall_s=one.found.wall,
+    )
+
+
+def _subspace_checks(solved: Solved) -> Iterator[Check]:
+    if solved.found.superposed is not None:
+        meaning = "largest relative L2 change of a curve by the last quarter of the subspace"
+        error = solved.found.superposed.truncation_error
+        yield Check(name="fem: subspace", value=error, limit=TRUNCATION_LIMIT, meaning=meaning)
+
+
+def models(scene: Scene, _: Estimates) -> Iterator[FiniteElements]:
+    """The one reference."""
+    yield FiniteElements(reference=scene.reference, damping=reference_damping(scene))
+
+
+def assumptions(scene: Scene) -> list[str]:
+    """On strain and damping, and on what a comparison with it is worth."""
+    damping = (
+        "the mass-proportional damping of eq. (2) at the reference modulus"
+        if scene.damping.kind == "eq-2"
+        else "the Rayleigh damping of the fuzzy-tuned models"
+    )
+    return [
+        f"The finite-element reference is linear in strain and has {damping}. Comparison with "
+        "it is code to code, not validation against an experiment."
+    ]
+
+
+KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True)

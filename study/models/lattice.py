@@ -1,0 +1,330 @@
+"""A lattice of springs over the organ, or along its mesh, whatever the springs are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msm import model as msm
+from msm import tetrahedra
+from msm.assembly import arrays
+from msm.integrators import INTEGRATORS
+from msm.lattice import Lattice as LatticeMesh
+from msm.linearised import farthest
+from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
+from msm.stability import Follower
+from msm.timestep import LOOK, whole_steps
+from study.models.errors import place, step_checks, time_step_errors
+from study.models.keeping import OnSample, checkpoint, recorded
+from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Advance
+from study.results.fields import Mesh
+from study.results.records import Check, LatticeRecord, ModelRecord
+from study.scene import Lattice, Scene
+
+Floats = NDArray[np.float64]
+
+MASS_LIMIT = 0.05
+
+
+@dataclass(frozen=True)
+class Springs:
+    """What springs are made of: modulus [Pa] and Poisson ratio at small strain, material."""
+
+    modulus: float
+    poisson_ratio: float
+    material: Material
+
+
+Make = Callable[[Scene, LatticeMesh], Springs]
+"""Springs for a lattice, as a scene and its table `lattice` have them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeModel:
+    """Springs over the organ of a scene, which `make` makes; `bounds` at two other stiffnesses.
+
+    `system`: the fuzzy system whose estimate they have.
+    """
+
+    name: str
+    label: str
+    scene: Scene
+    make: Make
+    bounds: tuple[Make, Make] | None = None
+    system: str | None = None
+
+    @property
+    def lattice(self) -> Lattice:
+        """Its table of the scene."""
+        return self.scene.lattice
+
+    def varied(self, **settings: Any) -> Self:
+        """With other keys of the scene's table `lattice`; a step is left out unless it is given."""
+        free = replace(self.lattice, springs="lattice", time_step=None, step_rate=None)
+        return replace(self, scene=replace(self.scene, lattice=replace(free, **settings)))
+
+    def prepare(self, problem: Problem) -> PreparedLattice:
+        """The lattice on the organ, and its springs."""
+        assembly = assembled(problem, self.lattice)
+        return PreparedLattice(self, problem, assembly, self.make(self.scene, assembly.lattice))
+
+
+def assembled(problem: Problem, lattice: Lattice) -> Assembly:
+    """The lattice that all models of a scene share."""
+    if lattice.springs == "tetrahedra":
+        return _on_mesh(problem)
+    return _cubic(problem, lattice.spacing, lattice.flexion, lattice.body_diagonals)
+
+
+@lru_cache(maxsize=1)
+def _on_mesh(problem: Problem) -> Assembly:
+    where = (problem.foundation, problem.tool)
+    return tetrahedra.assemble(
+        problem.geometry.mesh, problem.surface_rule, problem.tissue.density, *where
+    )
+
+
+@lru_cache(maxsize=1)
+def _cubic(problem: Problem, spacing: float, flexion: float, body_diagonals: float) -> Assembly:
+    return msm.assemble(
+        problem.geometry.body,
+        problem.surface_rule,
+        problem.tissue.density,
+        spacing,
+        problem.foundation,
+        problem.tool,
+        flexion,
+        body_diagonals,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedLattice:
+    """A lattice on its organ."""
+
+    model: LatticeModel
+    problem: Problem
+    assembly: Assembly
+    springs: Springs
+
+    @property
+    def linear(self) -> bool:
+        """Whether forces are those of small displacements."""
+        return self.model.lattice.geometry == "linear"
+
+    @cached_property
+    def critical_time_step(self) -> float:
+        """Longest stable step [s] at rest; infinite for an integrator without a limit."""
+        integrator = self.model.lattice.integrator
+        return float(msm.critical_time_step(self.assembly, self.springs.material, integrator))
+
+    def describe(self) -> list[str]:
+        """Nodes and springs, then modulus, critical step and damping."""
+        where = "lattice" if self.model.lattice.springs == "lattice" else "springs on the mesh"
+        damping = self.springs.material.damping
+        dashpots = f" and {1e3 * damping.beta:.4g} ms" if damping.beta > 0.0 else ""
+        nodes, count = len(self.assembly.mass), len(self.assembly.springs.weight)
+        return [
+            f"{where}: {nodes} nodes, {count} springs",
+            f"{self.model.name}: modulus {self.springs.modulus / 1e3:.2f} kPa, critical step "
+            f"{1e3 * self.critical_time_step:.3g} ms, damping {damping.gamma_0:.4g} 1/s{dashpots}",
+        ]
+
+    def simulate(self, longest: float | None = None) -> Simulation:
+        """The motion by the scene's steps, or by equal ones of at most `longest` [s]."""
+        step: Step = asked_step(self.model.lattice)
+        if longest is not None:
+            interval = float(self.problem.observation.times[1])
+            step = Fixed(interval / whole_steps(interval, longest))
+        found = self._march(step)
+        return Simulation(found.trajectory, found.smallest_step, found.margin, found.inverted_cells)
+
+    def run(self, watch: Watch) -> ModelRun:
+        """The motion, its error by halved steps, and the motion at both bounds of its stiffness."""
+        found, errors = self._run(watch), {}
+        finished = found.trajectory.status == "finished"
+        if finished:
+            half = self._halved(found, watch)
+            order = INTEGRATORS[self.model.lattice.integrator].order
+            errors = time_step_errors(order, self.problem.probes, found.trajectory, half)
+        record = replace(self._record(found), time_step_errors=errors)
+        checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
+        bounds = self._bounds(watch)
+        return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds)
+
+    def rest(self) -> Floats:
+        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised."""
+        nodal = msm.static_displacement(self.assembly, self.springs.material)
+        points = self.problem.observation.volume_points
+        return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
+
+    def stepper(self) -> Stepper:
+        """The lattice at rest; between its steps the limit is looked at as often as in a run."""
+        method = INTEGRATORS[self.model.lattice.integrator]
+        material = self.springs.material
+        net = arrays(self.assembly, material, linear=self.linear)
+        follower = Follower(material.law, net, method)
+        u, v = np.zeros_like(net.load), np.zeros_like(net.load)
+        dt, taken = _step(self.model.lattice, follower.limit(u)), 0
+
+        def advance(count: int) -> None:
+            nonlocal taken
+            starts = dt * (taken + np.arange(count, dtype=np.float64))
+            factors = np.stack([self.problem.factor(starts + at * dt) for at in method.at], axis=1)
+            method.advance(material.law, net, factors, dt, u, v)
+            taken += count
+
+        def take_step() -> None:
+            advance(1)
+            if taken % LOOK == 0:
+                farthest(u)
+                follower.limit(u)
+
+        def restart() -> None:
+            nonlocal taken
+            u[:], v[:], taken = 0.0, 0.0, 0
+
+        return Stepper(take_step, u.copy, dt, net.load.size, advance, restart)
+
+    def _run(self, watch: Watch) -> Run:
+        name, lattice = self.model.name, self.assembly.lattice
+        mesh, times = Mesh(lattice.nodes, lattice.cells), self.problem.observation.times
+        with (
+            watch.progress.stage(name) as advance,
+            recorded(watch.keeping, name, mesh, times) as on_sample,
+        ):
+            return self._march(
+                asked_step(self.model.lattice), advance, watch, name, on_sample=on_sample
+            )
+
+    def _halved(self, found: Run, watch: Watch) -> Trajectory:
+        name = self.model.name
+        with watch.progress.stage(f"{name}: halved steps") as advance:
+            step = Counts(2 * found.substeps)
+            return self._march(step, advance, watch, f"{name}-halved").trajectory
+
+    def _bounds(self, watch: Watch) -> tuple[Trajectory, Trajectory] | None:
+        if self.model.bounds is None:
+            return None
+        low, high = self.model.bounds
+        return self._bound(low, "lower", watch), self._bound(high, "upper", watch)
+
+    def _bound(self, make: Make, side: str, watch: Watch) -> Trajectory:
+        name = self.model.name
+        other = replace(self, springs=make(self.model.scene, self.assembly.lattice))
+        with watch.progress.stage(f"{name}: {side} bound") as advance:
+            step = asked_step(self.model.lattice)
+            return other._march(step, advance, watch, f"{name}-{side}").trajectory
+
+    def _lost_bounds(self, bounds: tuple[Trajectory, Trajectory] | None) -> tuple[str, ...]:
+        return tuple(
+            f"The run of {self.model.name} at the {side} bound of its interval diverged at "
+            f"{run.diverged_at:g} s: its band ends there."
+            for side, run in zip(("lower", "upper"), bounds or (), strict=False)
+            if run.status == "diverged"
+        )
+
+    def _march(
+        self,
+        step: Step,
+        advance: Advance = lambda _: None,
+        watch: Watch = SILENT,
+        kept_as: str = "",
+        on_sample: OnSample = lambda *_: None,
+    ) -> Run:
+        return msm.run(
+            self.assembly,
+            self.springs.material,
+            self.problem.factor,
+            self.problem.observation,
+            step,
+            advance,
+            integrator=self.model.lattice.integrator,
+            linear=self.linear,
+            checkpoint=checkpoint(watch.keeping, kept_as),
+            on_sample=on_sample,
+        )
+
+    def _mass(self) -> Check:
+        expected = self.problem.geometry.volume * self.problem.tissue.density
+        return Check(
+            name="lattice: mass",
+            value=abs(float(self.assembly.mass.sum()) / expected - 1.0),
+            limit=MASS_LIMIT,
+            meaning="mass of the lattice against that of the finite-element mesh",
+        )
+
+    def _record(self, found: Run) -> ModelRecord:
+        model, trajectory, damping = self.model, found.trajectory, self.springs.material.damping
+        return ModelRecord(
+            name=model.name,
+            label=model.label,
+            system=model.system,
+            simulated_s=float(self.problem.observation.times[-1]),
+            status=trajectory.status,
+            diverged_at_s=trajectory.diverged_at,
+            diverged_near_m=place(trajectory),
+            nodes=len(self.assembly.mass),
+            time_step_s=found.largest_step,
+            critical_time_step_s=_finite(found.critical_time_step),
+            steps=found.steps,
+            wall_s=found.wall,
+            small_strain_modulus_pa=self.springs.modulus,
+            damping_rate_per_s=damping.gamma_0,
+            stiffness_damping_s=damping.beta,
+            largest_strain=found.largest_strain,
+            time_step_errors={},
+            lattice=LatticeRecord(
+                springs=len(self.assembly.springs.weight),
+                integrator=model.lattice.integrator,
+                poisson_ratio=self._poisson_ratio(),
+                smallest_time_step_s=found.smallest_step,
+                smallest_step_margin=_finite(found.margin),
+                repeated_steps=found.repeated_steps,
+                node_mass_kg=self._node_mass(),
+                inverted_cells=found.inverted_cells,
+            ),
+        )
+
+    def _poisson_ratio(self) -> float | None:
+        """None where the mesh decides, and not the springs."""
+        if self.model.lattice.springs == "tetrahedra":
+            return None
+        return self.springs.poisson_ratio
+
+    def _node_mass(self) -> float:
+        """Of an inner node of the cubic lattice, or the mean of a mesh [kg]."""
+        if self.model.lattice.springs == "tetrahedra":
+            return float(self.assembly.mass.mean())
+        return self.problem.tissue.density * self.model.lattice.spacing**3
+
+
+def asked_step(lattice: Lattice) -> Step:
+    """How a scene wants steps to be chosen."""
+    if lattice.time_step is not None:
+        return Fixed(lattice.time_step)
+    if lattice.step_rate is not None:
+        return Rate(lattice.step_rate)
+    return Automatic(lattice.step_fraction)
+
+
+def _step(lattice: Lattice, limit: float) -> float:
+    """The step [s] that a run at rest would take, but for a whole number of them to a sample."""
+    if lattice.time_step is not None:
+        return lattice.time_step
+    if lattice.step_rate is not None:
+        return 1.0 / lattice.step_rate
+    return lattice.step_fraction * limit
+
+
+def _finite(value: float) -> float | None:
+    """The value, or None where an integrator has no limit."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,86 @@
+"""What is read into the paper, or left out, of lattices of springs: sentences for the report."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from study.scene import Scene, SpringLaw
+
+
+def layout(scene: Scene) -> list[str]:
+    """On how springs fill the organ, and on what their damping acts against."""
+    return [
+        _layout(scene),
+        "Nodal damping acts against the ground, as in the paper, and so resists rigid motion.",
+    ]
+
+
+def _layout(scene: Scene) -> str:
+    if scene.lattice.springs == "tetrahedra":
+        return (
+            "Springs run along the edges of the finite-element mesh, each with k = E V / L^2, V "
+            "the volume of the tetrahedra round it (Van Gelder 1998). That is the modulus E only "
+            "where edges point evenly in all directions: modulus, Poisson ratio and anisotropy "
+            "are those of the mesh, and refining it does not cure them."
+        )
+    return (
+        "Face diagonals have sqrt(2) times the force constants of edges, and springs on the "
+        "surface carry the share of the cells they belong to; otherwise the lattice would be "
+        "anisotropic and up to 38 % too stiff."
+    )
+
+
+def springs(scene: Scene) -> list[str]:
+    """On the law of tuned springs, their calibration and their damping."""
+    return [
+        f"{_law(scene)}; the estimate is read as Young's modulus E. " + _calibration(scene),
+        _damping(scene),
+    ]
+
+
+def _law(scene: Scene) -> str:
+    law = scene.lattice.law
+    if law is None:
+        return "The fuzzy-tuned springs are linear, eq. (1)"
+    before, after = _slopes_at_rest(law)
+    return (
+        f"The fuzzy-tuned springs follow {len(law.strain)} points of the scene, which the paper "
+        "does not have, from the stiffness of the estimate: at rest they have "
+        f"{after:g} times that in tension and {before:g} times that in compression"
+    )
+
+
+def _slopes_at_rest(law: SpringLaw) -> tuple[float, float]:
+    """Relative stiffness just below and just above no strain."""
+    rest, slopes = law.strain.index(0.0), np.diff(law.relative_tension) / np.diff(law.strain)
+    return float(slopes[max(rest - 1, 0)]), float(slopes[min(rest, len(slopes) - 1)])
+
+
+def _damping(scene: Scene) -> str:
+    damping = scene.damping
+    if damping.kind == "eq-2":
+        return (
+            f"Damping by eq. (2) with w = sqrt(k/m), zeta = {damping.ratio:g}, k and m taken at "
+            "the reference spacing."
+        )
+    return (
+        f"Rayleigh damping C = alpha M + beta K with alpha = {damping.mass:g} 1/s and beta = "
+        f"{damping.stiffness:g} s in place of eq. (2), K each model's own stiffness, support "
+        "included; the part beta K is a dashpot on each spring, cell and foundation and leaves "
+        "rigid motion of the body itself free."
+    )
+
+
+def _calibration(scene: Scene) -> str:
+    if scene.lattice.springs == "tetrahedra":
+        return "There is no volume term, as in the paper."
+    if not scene.lattice.volume_term:
+        return (
+            "k = 0.4 E h is the calibration of the cubic lattice, whose Poisson ratio is 1/4; "
+            "there is no volume term, as in the paper."
+        )
+    return (
+        "Springs of k = mu h carry the shear modulus mu, and one energy per cell in its volume, "
+        "1/2 kappa V (J - 1)^2 with kappa = lambda - mu, which the paper does not have, the rest; "
+        f"the Poisson ratio is the tissue's {scene.tissue.poisson_ratio:g}."
+    )

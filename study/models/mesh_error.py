@@ -1,0 +1,101 @@
+"""The discretisation error of the finite elements, from solutions on several meshes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference import model as fem
+from fem_reference.discretisation_error import FORMAL_ORDER, Estimate, discretisation_error
+from fem_reference.elasticity import Body
+from study.organ.geometry import Level
+from study.problem.problem import Problem
+from study.results.records import CurveErrors, CurveOrders, MeshError
+
+Floats = NDArray[np.float64]
+
+LARGEST_JUMP = 0.6
+"""Of the element size at once: sizes far apart do not show the order."""
+LINEAR_LOCKING = 0.4
+"""Poisson ratio above which linear elements are far too stiff on any mesh that is run here."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The reference on one mesh."""
+
+    level: Level
+    body: Body
+    found: fem.Reference
+
+
+def mesh_error(problem: Problem, solved: Sequence[Solved]) -> MeshError | None:
+    """Errors of the finest mesh by those before it; none of one mesh, or of elements that lock.
+
+    Locked elements approach a wrong solution for long, and seem to have converged. A subspace's
+    truncation is added in squares to the errors of curves.
+    """
+    if len(solved) < 2 or locks(problem, solved[-1]):
+        return None
+    runs = [one.found.trajectory for one in solved]
+    field = _estimate(solved, [run.volume_field[0] for run in runs], problem.volume_rule.weights)
+    by_probe, orders = {}, {}
+    for i, probe in enumerate(problem.probes):
+        u = _estimate(solved, [run.displacement[:, i] for run in runs])
+        v = _estimate(solved, [run.velocity[:, i] for run in runs])
+        errors = (math.hypot(one.error, _truncation(solved[-1])) for one in (u, v))
+        by_probe[probe] = CurveErrors(
+            **dict(zip(("displacement", "velocity"), errors, strict=True))
+        )
+        orders[probe] = CurveOrders(displacement=u.observed, velocity=v.observed)
+    return MeshError(
+        field_peak=field.error,
+        field_order=field.observed,
+        formal_order=FORMAL_ORDER[solved[-1].found.element],
+        by_probe=by_probe,
+        order_by_probe=orders,
+    )
+
+
+def _estimate(
+    solved: Sequence[Solved], results: Sequence[Floats], weights: Floats | None = None
+) -> Estimate:
+    sizes = [one.level.size for one in solved]
+    return discretisation_error(results, sizes, FORMAL_ORDER[solved[-1].found.element], weights)
+
+
+def _truncation(solved: Solved) -> float:
+    superposed = solved.found.superposed
+    return 0.0 if superposed is None else superposed.truncation_error
+
+
+def locks(problem: Problem, solved: Solved) -> bool:
+    """Whether the elements are far too stiff at the tissue's Poisson ratio."""
+    return solved.found.element == "p1" and problem.tissue.poisson_ratio > LINEAR_LOCKING
+
+
+def is_too_coarse(accuracy: float | None, error: MeshError | None) -> bool:
+    """Whether an accuracy that is asked for is missed, or not known to be reached."""
+    return accuracy is not None and (error is None or error.worst.displacement > accuracy)
+
+
+def next_size(accuracy: float | None, error: MeshError | None) -> float:
+    """Element size, as a share of the last, at which the accuracy is expected."""
+    if error is None or accuracy is None:
+        return 1.0
+    excess = error.worst.displacement / accuracy
+    return float(max(excess ** (-1.0 / max(FORMAL_ORDER.values())), LARGEST_JUMP))
+
+
+def why_unknown(problem: Problem, solved: Solved) -> str:
+    """What keeps the error from being estimated."""
+    if locks(problem, solved):
+        return (
+            "linear elements lock at this Poisson ratio and seem to have converged when they have "
+            "not; leave reference.element out"
+        )
+    return "it has no other mesh of this organ to compare with"

@@ -1,0 +1,162 @@
+"""What a model is: settings that are prepared for a problem, run, and stepped.
+
+A model is a frozen dataclass of its settings in SI units, made of a scene by a `ModelKind`. To add
+one: a file with a model and its kind, and a line in `study.models.table.MODELS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.problem.problem import PointProblem, Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Progress, Silent
+from study.results.records import Check, ModelRecord
+from study.scene import Scene
+
+if TYPE_CHECKING:
+    from fuzzy.stiffness import Estimate
+    from study.models.keeping import Keeping
+
+Floats = NDArray[np.float64]
+Estimates = Mapping[str, "Estimate"]
+"""Of stiffness, by fuzzy system."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """The motion of a model, and the steps that it took.
+
+    `step` [s]: the shortest; `margin`: smallest ratio of the critical step to one that was taken;
+    `inverted_cells`: turned inside out.
+    """
+
+    trajectory: Trajectory
+    step: float
+    margin: float = float("inf")
+    inverted_cells: int = 0
+
+
+@dataclass(frozen=True)
+class ModelRun:
+    """The motion of a model with its record, in which its own numerical errors stand.
+
+    `bounds`: motion at both ends of an interval of stiffness, if the model has one.
+    """
+
+    trajectory: Trajectory
+    record: ModelRecord
+    checks: tuple[Check, ...] = ()
+    notes: tuple[str, ...] = ()
+    bounds: tuple[Trajectory, Trajectory] | None = None
+
+
+@dataclass(frozen=True)
+class Stepper:
+    """A prepared model at rest, to be stepped one step at a time.
+
+    `take_step()` goes one step on, as a run does it, with all that a run does between steps;
+    `take_bare_steps(count)` goes on without what is between them, None where there is nothing.
+    `restart()` puts it at rest again, where what a step costs depends on the motion.
+    `displacement()` [m] (n, 3) of the nodes is the state that is delivered. `step` [s]; `unknowns`:
+    components of displacement, or coordinates of a superposition, which every step turns into
+    displacements.
+    """
+
+    take_step: Callable[[], None]
+    displacement: Callable[[], Floats]
+    step: float
+    unknowns: int
+    take_bare_steps: Callable[[int], None] | None = None
+    restart: Callable[[], None] = lambda: None
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who is told how far a run is, and what of it is kept on disk meanwhile."""
+
+    progress: Progress
+    keeping: Keeping | None = None
+
+
+SILENT = Watch(Silent())
+"""Nobody is told, and nothing is kept."""
+
+
+class Prepared(Protocol):
+    """A model set up for a problem: assembled, its critical step known."""
+
+    def describe(self) -> list[str]:
+        """Lines on what would be run, for a person."""
+
+    def simulate(self, longest: float | None = None) -> Simulation:
+        """The motion by steps as the model chooses them, or by equal ones of at most so long [s].
+
+        Equal steps divide the sampling interval.
+        """
+
+    def run(self, watch: Watch) -> ModelRun:
+        """The motion with its record, and the error of its steps as far as it can be told."""
+
+    def rest(self) -> Floats:
+        """Displacement [m] (q, 3) at rest under the full load, at the points of the volume field.
+
+        Linearised where the model is not linear.
+        """
+
+    def stepper(self) -> Stepper:
+        """The model at rest, to be timed or stepped by hand."""
+
+
+class Model(Protocol):
+    """A model with its settings; `name` is unique in a study, `label` is printed."""
+
+    @property
+    def name(self) -> str:
+        """Unique in a study."""
+
+    @property
+    def label(self) -> str:
+        """In print."""
+
+    def varied(self, **settings: Any) -> Self:
+        """With other settings by name, plain values as JSON has them."""
+
+    def prepare(self, problem: Problem) -> Prepared:
+        """Set up for a problem. ValueError for settings that do not fit it."""
+
+
+class PointModel(Protocol):
+    """A model of a single control mass point."""
+
+    @property
+    def name(self) -> str:
+        """Unique in a study."""
+
+    def run(self, problem: PointProblem, watch: Watch) -> ModelRun:
+        """The motion with its record."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelKind:
+    """What a name in a scene's list of models stands for.
+
+    `models` of a scene and the fuzzy estimates: one, or several as for `msm`; `on_point`: likewise
+    for a scene that is a single control mass point, None where the kind needs an organ.
+    `assumptions`: sentences on what was read into the paper or left out. `is_reference`: whether
+    the others are compared with it; `any_load`: whether it follows a load whose place was not known
+    beforehand; `is_tuned`: whether
+    its models are those of the fuzzy estimates.
+    """
+
+    models: Callable[[Scene, Estimates], Iterable[Model]]
+    on_point: Callable[[Scene, Estimates], Iterable[PointModel]] | None = None
+    assumptions: Callable[[Scene], list[str]] = lambda _: []
+    is_reference: bool = False
+    is_tuned: bool = False
+    any_load: bool = True

@@ -1,0 +1,65 @@
+"""The models there are, by the names that a scene gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+
+from study.models.model import Estimates, Model, ModelKind, PointModel
+from study.scene import Scene
+
+MODELS = {
+    "fem": "study.models.finite_elements:KIND",
+    "basafa": "study.models.basafa:KIND",
+    "msm": "study.models.fuzzy_tuned:KIND",
+    "tissue": "study.models.tissue:KIND",
+    "superposition": "study.models.superposition:KIND",
+}
+"""Where each kind stands; imported when it is used, for what computes it is heavy."""
+
+
+def kind(name: str) -> ModelKind:
+    """The kind of a name. ValueError with the names there are."""
+    if name not in MODELS:
+        raise ValueError(f"models: {name!r} is no model; there are {', '.join(MODELS)}")
+    module, _, attribute = MODELS[name].partition(":")
+    found: ModelKind = getattr(import_module(module), attribute)
+    return found
+
+
+def named(scene: Scene) -> list[str]:
+    """Names of the kinds in a scene, in the order of the table, in which they run."""
+    return sorted(scene.models, key=list(MODELS).index)
+
+
+def models_of(scene: Scene, estimates: Estimates) -> Iterator[Model]:
+    """All models that a scene with an organ names."""
+    for name in named(scene):
+        yield from kind(name).models(scene, estimates)
+
+
+def point_models_of(scene: Scene, estimates: Estimates) -> Iterator[PointModel]:
+    """All models of a scene that is a single point. ValueError for one that needs an organ."""
+    for name in named(scene):
+        on_point = kind(name).on_point
+        if on_point is None:
+            raise ValueError(f"models: {name} needs an organ with a mesh; a point has none")
+        yield from on_point(scene, estimates)
+
+
+def model(scene: Scene, name: str) -> Model:
+    """The model of a kind that has one, whatever the fuzzy estimates."""
+    (found,) = kind(name).models(scene, {})
+    return found
+
+
+def references() -> list[str]:
+    """Names of the kinds that the others are compared with."""
+    return [name for name in MODELS if kind(name).is_reference]
+
+
+def assumptions(scene: Scene) -> list[str]:
+    """What each kind in a scene assumes, each sentence once."""
+    return list(
+        dict.fromkeys(text for name in named(scene) for text in kind(name).assumptions(scene))
+    )

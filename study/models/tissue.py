@@ -1,0 +1,56 @@
+"""The lattice with the tissue's own modulus: a baseline that needs no patient and no estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from msm.calibration import POISSON_RATIO, reference_stiffness
+from msm.lattice import Lattice as LatticeMesh
+from msm.laws import Hooke, Law, initial_stiffness, piecewise
+from msm.model import Material
+from msm.volume import volume_term
+from study.models.damping import lattice_poisson_ratio, nodal_damping
+from study.models.lattice import LatticeModel, Springs
+from study.models.lattice_assumptions import layout, springs
+from study.models.model import Estimates, ModelKind
+from study.scene import Scene
+
+
+def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> Springs:
+    """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""
+    nu = lattice_poisson_ratio(scene)
+    linear = elastic(mesh, modulus, nu)
+    k = initial_stiffness(linear.law)
+    law = spring_law(scene, k)
+    material = replace(linear, law=law, damping=nodal_damping(scene, modulus))
+    return Springs(modulus * (initial_stiffness(law) / k), nu, material)
+
+
+def elastic(mesh: LatticeMesh, modulus: float, nu: float) -> Material:
+    """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
+    law = Hooke(reference_stiffness(modulus, mesh.spacing, nu))
+    return Material(law, volume_term(mesh, modulus, nu) if nu > POISSON_RATIO else None)
+
+
+def spring_law(scene: Scene, k: float) -> Law:
+    """Linear springs of eq. (1), k [N/m], or the scene's law in proportion to them."""
+    law = scene.lattice.law
+    return Hooke(k) if law is None else piecewise(law.strain, k * np.array(law.relative_tension))
+
+
+def models(scene: Scene, _: Estimates) -> Iterator[LatticeModel]:
+    """The one lattice of the tissue's modulus."""
+    make = partial(of_modulus, modulus=scene.tissue.youngs_modulus)
+    yield LatticeModel(name="tissue", label="MSM tissue modulus", scene=scene, make=make)
+
+
+def assumptions(scene: Scene) -> list[str]:
+    """On the layout of the springs, their law, calibration and damping."""
+    return [*layout(scene), *springs(scene)]
+
+
+KIND = ModelKind(models=models, assumptions=assumptions)

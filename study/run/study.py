@@ -1,0 +1,144 @@
+"""The study of a scene: every model that it names, run and compared."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from study.models.estimates import FuzzySide, run_fuzzy
+from study.models.large_strain import STRAIN_LIMIT
+from study.models.model import SILENT, ModelRun, Watch
+from study.models.table import kind, models_of, named, point_models_of
+from study.problem.problem import Problem
+from study.problem.response import Response
+from study.results.folder import Arrays, Results
+from study.results.provenance import provenance
+from study.results.records import ControlPoint, Dimensionless, LatticeLimits, StudyRecord
+from study.run.assumptions import assumptions
+from study.run.dimensionless import dimensionless
+from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
+from study.run.warnings import warnings
+from study.scene import Scene
+from study.scene.file import write_scene
+from study.scene.problem import point_problem_of, problem_of
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Runs of all models of a scene by name, and what else was found on its problem."""
+
+    response: Response
+    runs: dict[str, ModelRun]
+    notes: tuple[str, ...] = ()
+    fields: Arrays = field(default_factory=dict)
+    dimensionless: Dimensionless | None = None
+    lattice_limits: LatticeLimits | None = None
+    control_point: ControlPoint | None = None
+
+
+def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
+    """Run all that the scene names and gather the results.
+
+    Raises ValueError for an organ, support or tool that cannot be used.
+    """
+    started = time.perf_counter()
+    with watch.progress.stage("fuzzy systems"):
+        tuned = any(kind(name).is_tuned for name in named(scene))
+        fuzzy = run_fuzzy(scene) if tuned else FuzzySide()
+    compared = (_on_point if scene.is_point else _on_organ)(scene, fuzzy, watch)
+    with watch.progress.stage("similarity"):
+        results = _results(scene, fuzzy, compared)
+    record = replace(results.record, study_wall_s=time.perf_counter() - started)
+    return replace(results, record=record)
+
+
+def _on_point(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
+    problem = point_problem_of(scene)
+    models = point_models_of(scene, fuzzy.estimates)
+    runs = {model.name: model.run(problem, watch) for model in models}
+    point = ControlPoint(mass_kg=problem.mass, rest_length_m=problem.rest_length)
+    return Compared(problem.response, runs, control_point=point)
+
+
+def _on_organ(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
+    with watch.progress.stage("organ"):
+        problem = problem_of(scene)
+    runs: dict[str, ModelRun] = {}
+    limits = None
+    for model in models_of(scene, fuzzy.estimates):
+        with watch.progress.stage(f"{model.name}: set up"):
+            prepared = model.prepare(problem)
+        runs[model.name] = prepared.run(watch)
+        if model.name == "fem" and fuzzy.estimates:
+            from study.run.limits import lattice_limits
+
+            limits = lattice_limits(scene, problem, prepared, watch.progress)
+    return Compared(
+        problem.response,
+        runs,
+        problem.geometry.notes,
+        _fields(problem, runs),
+        dimensionless(scene, problem),
+        limits,
+    )
+
+
+def _fields(problem: Problem, runs: dict[str, ModelRun]) -> Arrays:
+    """Surface, tool and probes, and the displacement of each model on the surface."""
+    return {
+        "points": problem.geometry.surface.points,
+        "triangles": problem.geometry.surface.triangles,
+        "tool": np.stack([problem.tool.centre, problem.tool.direction]),
+        "probes": problem.observation.probes,
+    } | {name: run.trajectory.surface_field for name, run in runs.items()}
+
+
+def _results(scene: Scene, fuzzy: FuzzySide, found: Compared) -> Results:
+    runs, response = found.runs, found.response
+    models = tuple(run.record for run in runs.values())
+    # A lattice's mass is checked for each model on it, and is told once.
+    checks = tuple(dict.fromkeys(check for run in runs.values() for check in run.checks))
+    references = [name for name in named(scene) if kind(name).is_reference]
+    # One that diverged leaves a note in place of its scores.
+    sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}
+    scores, unscored = similarity_rows(response, sound, references)
+    record = StudyRecord(
+        title=scene.title,
+        probes=response.probes,
+        fuzzy=fuzzy.record,
+        models=models,
+        checks=checks,
+        warnings=warnings(scene, models, checks),
+        assumptions=assumptions(scene, found.control_point),
+        notes=(
+            *fuzzy.notes,
+            *found.notes,
+            *(note for run in runs.values() for note in run.notes),
+            *unscored,
+        ),
+        strain_limit=STRAIN_LIMIT,
+        study_wall_s=None,
+        provenance=provenance(write_scene(scene), scene.organ.mesh),
+        dimensionless=found.dimensionless,
+        lattice_limits=found.lattice_limits,
+        control_point=found.control_point,
+    )
+    has_field = response.volumes.size > 0
+    return Results(
+        scene,
+        record,
+        tuple(curve_rows(response, {name: run.trajectory for name, run in runs.items()})),
+        tuple(
+            row
+            for name, run in runs.items()
+            if run.bounds is not None
+            for row in band_rows(response, name, run.bounds)
+        ),
+        scores,
+        tuple(difference_rows(response, sound, references)) if has_field else (),
+        fuzzy.sensitivity,
+        found.fields,
+        fuzzy.arrays,
+    )

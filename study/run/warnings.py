@@ -1,0 +1,77 @@
+"""What a reader of the results must be told before the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from study.models.large_strain import ROTATION_LIMIT, STRAIN_LIMIT
+from study.results.records import Check, ElementsRecord, ModelRecord
+from study.scene import Scene
+
+
+def warnings(
+    scene: Scene, models: Sequence[ModelRecord], checks: Sequence[Check]
+) -> tuple[str, ...]:
+    """Sentences on models outside what they are good for, and on checks that failed."""
+    of_models = (text for record in models for text in _of_model(scene, record))
+    failed = (
+        f"Check failed: {check.name} is {check.value:.2g}, its limit {check.limit:g}."
+        for check in checks
+        if not check.passed
+    )
+    return (*of_models, *failed)
+
+
+def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
+    if record.elements is not None:
+        yield from _of_elements(record, record.elements)
+    if record.status == "diverged":
+        yield (
+            f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
+            f"{_remedy(scene)}"
+        )
+    if record.inverted_cells:
+        yield (
+            f"{record.inverted_cells} cells of {record.name} turned inside out: springs "
+            "do not resist that, so it has no scores. Reduce tool.force."
+        )
+
+
+def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+    strain, rotation = record.largest_strain, elements.largest_rotation_rad
+    if strain is not None and strain > STRAIN_LIMIT:
+        yield (
+            f"The largest strain of the linear reference is {100 * strain:.1f} %; above "
+            f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(elements)}. "
+            "Reduce tool.force or enlarge tool.radius."
+        )
+    if rotation > ROTATION_LIMIT:
+        yield (
+            f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
+            "it should not be trusted. Reduce tool.force or hold the organ better."
+        )
+    if elements.accuracy_missed and elements.mesh_error:
+        yield (
+            f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "
+            f"mesh of {elements.elements} tetrahedra, the last within the limit, reaches "
+            f"{100 * elements.mesh_error.worst.displacement:.2g} %. Ask for less, or simplify "
+            "the organ or its load."
+        )
+
+
+def _at_large_strain(elements: ElementsRecord) -> str:
+    found = elements.large_strain
+    if found is None:
+        return ""
+    share = 100 * found.field_difference
+    return f", and at rest it differs by {share:.1f} % from a {found.law} solid"
+
+
+def _remedy(scene: Scene) -> str:
+    """What keeps a run from diverging."""
+    lattice = scene.lattice
+    for key, value in (("time_step", lattice.time_step), ("step_rate", lattice.step_rate)):
+        if value is not None:
+            verb = "Shorten" if key == "time_step" else "Raise"
+            return f"{verb} lattice.{key}, or leave it out so that steps follow the limit."
+    return "Reduce lattice.step_fraction or the load."
