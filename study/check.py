@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from study.scene import Scene
 from study.scene.file import read_scene
-
-if TYPE_CHECKING:
-    from study.problem.problem import Problem
 
 
 def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
@@ -21,37 +17,19 @@ def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
         from study.scene.problem import point_problem_of
 
         return [*lines, f"one control mass point of {point_problem_of(scene).mass:.4g} kg"]
-    from study.run.organ import dimensionless
+    from study.models.estimates import estimates
+    from study.models.table import kind, models_of, named
+    from study.run.dimensionless import dimensionless
     from study.scene.problem import problem_of
 
-    posed = problem_of(scene)
-    lines += [f"note: {note}" for note in posed.geometry.notes]
-    lines += [f"{key} = {value:.4g}" for key, value in dimensionless(scene, posed).items()]
-    tetrahedra = len(posed.geometry.mesh.tetrahedra)
-    finer = ", refined for reference.accuracy" if scene.reference.accuracy is not None else ""
-    lines.append(f"finite-element mesh: {tetrahedra} tetrahedra{finer}")
-    if set(scene.models) & {"basafa", "msm"}:
-        lines += _lattice_lines(scene, posed)
-    return lines
-
-
-def _lattice_lines(scene: Scene, posed: Problem) -> list[str]:
-    from msm.model import critical_time_step
-    from study.run.estimates import estimates
-    from study.run.lattices import assemble, contenders
-
-    assembly = assemble(scene, posed)
-    where = "lattice" if scene.lattice.springs == "lattice" else "springs on the mesh"
-    lines = [f"{where}: {len(assembly.mass)} nodes, {len(assembly.springs.weight)} springs"]
-    for contender in contenders(scene, assembly.lattice, estimates(scene)):
-        step = critical_time_step(assembly, contender.material, scene.lattice.integrator)
-        damping = contender.material.damping
-        dashpots = f" and {1e3 * damping.beta:.4g} ms" if damping.beta > 0.0 else ""
-        lines.append(
-            f"{contender.name}: modulus {contender.modulus / 1e3:.2f} kPa, critical step "
-            f"{1e3 * step:.3g} ms, damping {damping.gamma_0:.4g} 1/s{dashpots}"
-        )
-    return lines
+    problem = problem_of(scene)
+    lines += [f"note: {note}" for note in problem.geometry.notes]
+    numbers = asdict(dimensionless(scene, problem))
+    lines += [f"{key} = {value:.4g}" for key, value in numbers.items()]
+    tuned = any(kind(name).is_tuned for name in named(scene))
+    models = models_of(scene, estimates(scene) if tuned else {})
+    described = (line for model in models for line in model.prepare(problem).describe())
+    return [*lines, *dict.fromkeys(described)]
 
 
 def describe_mesh(path: Path, unit: str | None) -> list[str]:

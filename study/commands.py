@@ -76,10 +76,11 @@ def run(
     resume
         Go on from where an interrupted run into the same folder last kept its state.
     """
+    from study.models.keeping import Keeping
+    from study.models.model import Watch
     from study.progress import on_stderr
     from study.results.folder import continuing, replacing, write
-    from study.run.keeping import Keeping
-    from study.run.whole import run_study
+    from study.run.study import run_study
     from study.scene.file import read_scene
 
     chosen = read_scene(scene, set_ or ())
@@ -90,7 +91,7 @@ def run(
         on_stderr() as progress,
     ):
         keeping = Keeping(state, resume, partial if fields else None)
-        results = run_study(chosen, progress, keeping)
+        results = run_study(chosen, Watch(progress, keeping))
         with progress.stage("results"):
             write(results, partial)
         failure = None
@@ -100,7 +101,7 @@ def run(
     _print_summary(results, folder)
     if failure:
         print(f"liver-study: results kept, but no report: {failure}", file=sys.stderr)
-    if failure or any(not check["passed"] for check in results.numbers["checks"]):
+    if failure or any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
 
 
@@ -122,20 +123,19 @@ def _make_report(folder: Path) -> None:
 def _print_summary(results: Results, folder: Path) -> None:
     from reports.differences import own_error, resolved
 
-    numbers = results.numbers
-    for warning in numbers["warnings"]:
+    for warning in results.record.warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    for system, found in numbers["stiffness"].items():
-        interval = found.get("interval_pa")
+    for system, found in results.record.fuzzy.systems.items():
+        interval = found.interval_pa
         span = f" [{interval[0] / 1e3:.2f}, {interval[1] / 1e3:.2f}]" if interval else ""
         print(
-            f"{system}: {found['estimate_pa'] / 1e3:.2f} kPa{span}, "
-            f"{found['relative_to_reference']:.2f} of the reference modulus"
+            f"{system}: {found.estimate_pa / 1e3:.2f} kPa{span}, "
+            f"{found.relative_to_reference:.2f} of the reference modulus"
         )
-    for model, reference, quantity, value in results.tables["errors"]:
-        if quantity == "field-relative-l2-peak":
-            share = resolved(float(value), own_error(results, str(reference)))
-            print(f"{model} against {reference}: field difference {share}")
+    for row in results.field_differences:
+        if row.quantity == "field-relative-l2-peak":
+            share = resolved(row.value, own_error(results, row.reference))
+            print(f"{row.model} against {row.reference}: field difference {share}")
     pdf = folder / "report.pdf"
     print(f"results in {folder}" + (f", report {pdf}" if pdf.exists() else ""))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Damping, Oscillator, hht, march
+from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
 from fem_reference.exchange import calculix
 from fem_reference.exchange.calculix import Motion
@@ -20,6 +20,7 @@ from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed
 from fem_reference.solvers import solve_static
 from study.folders import replacing
+from study.models.finite_elements import FINER, FiniteElements, models
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -86,9 +87,10 @@ def _target(request: Request) -> _Target:
         raise ValueError(
             f"--set: {path} is exported as it was run; leave it out, or name {path}/scene.toml"
         )
-    models = {one["name"]: one for one in results.read(path).numbers["models"]}
-    elements = models["fem"]["elements"] if "fem" in models else None
-    return _Target(read_scene(str(path / "scene.toml")), path / "export", elements)
+    found = results.read(path)
+    elements = next((one.elements for one in found.record.models if one.elements), None)
+    count = None if elements is None else elements.elements
+    return _Target(found.scene, path / "export", count)
 
 
 # --- what is written ---------------------------------------------------------------------------
@@ -136,19 +138,21 @@ def _check_memory(body: Body) -> None:
 
 
 def _discretised(target: _Target, progress: Progress) -> tuple[Body, Problem]:
-    from study.run.reference import build
-
     with progress.stage("organ"):
         posed = problem_of(target.scene)
         level = _level(posed, target.elements)
     with progress.stage("assembly"):
-        return build(target.scene, posed, level), posed
+        return reference_of(target.scene).prepare(posed).body(level), posed
+
+
+def reference_of(scene: Scene) -> FiniteElements:
+    """The finite elements of a scene."""
+    (found,) = models(scene, {})
+    return found
 
 
 def _level(posed: Problem, elements: int | None) -> Level:
     """The mesh of the scene, or the finer one that its results took for their accuracy."""
-    from study.run.reference import FINER
-
     for k in range(FINER + 1):
         level = posed.geometry.level(k)
         if level is not None and elements in {None, len(level.mesh.tetrahedra)}:
@@ -161,13 +165,11 @@ def _level(posed: Problem, elements: int | None) -> Level:
 
 def motion_of(scene: Scene, posed: Problem) -> Motion:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
-    from study.run.lattices import damping_rates
-
     times = posed.observation.times
     count = (len(times) - 1) * scene.reference.steps_per_sample
     factors = posed.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
-    damping = Damping(*damping_rates(scene))
+    damping = reference_of(scene).damping
     return Motion(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
 
 

@@ -88,6 +88,11 @@ class PreparedElements:
     problem: Problem
     best: Solved | None = field(default=None, init=False)
 
+    @property
+    def critical_time_step(self) -> float:
+        """Infinite: the steps are implicit, or exact in a subspace."""
+        return float("inf")
+
     def describe(self) -> list[str]:
         """Size of the mesh."""
         tetrahedra = len(self.problem.geometry.mesh.tetrahedra)

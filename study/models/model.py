@@ -89,7 +89,11 @@ SILENT = Watch(Silent())
 
 
 class Prepared(Protocol):
-    """A model set up for a problem: assembled, its critical step known."""
+    """A model set up for a problem."""
+
+    @property
+    def critical_time_step(self) -> float:
+        """Longest stable step [s] at rest; infinite for a model without a limit."""
 
     def describe(self) -> list[str]:
         """Lines on what would be run, for a person."""

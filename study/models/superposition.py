@@ -81,6 +81,11 @@ class PreparedSuperposition:
         """The vectors, and the body among them."""
         return (_ritz if self.model.vectors == "ritz" else _modal)(self.body, self.model.count)
 
+    @property
+    def critical_time_step(self) -> float:
+        """Infinite: each mode is integrated exactly."""
+        return float("inf")
+
     def describe(self) -> list[str]:
         """Unknowns and vectors."""
         kind = "Ritz vectors" if self.model.vectors == "ritz" else "modes and the rest"

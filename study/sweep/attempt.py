@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import json
 import time
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from study.sweep.canonical import canonical
+from study.sweep.canonical import Plain, canonical
 from study.sweep.program import program
 
 Status = Literal["done", "failed", "crashed"]
@@ -17,7 +17,7 @@ class Attempt(NamedTuple):
     """How one call ended, after `wall` seconds; `value` only where it is done."""
 
     status: Status
-    value: dict[str, Any] | None
+    value: Plain | None
     message: str
     wall: float
 
@@ -44,7 +44,7 @@ def attempt(function: str, arguments: str, identity: str) -> Attempt:
     return Attempt("done", value, "", time.perf_counter() - start)
 
 
-def _plain(value: object) -> dict[str, Any]:
+def _plain(value: object) -> Plain:
     """The value as it would come back from the store, wherever it was computed."""
     if not isinstance(value, dict):
         raise TypeError(f"returned {type(value).__name__}, not a dictionary")

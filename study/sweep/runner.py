@@ -6,10 +6,9 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from study.sweep.attempt import Attempt, Status, attempt
-from study.sweep.canonical import canonical
+from study.sweep.canonical import Plain, canonical
 from study.sweep.program import program
 from study.sweep.store import Store
 from study.sweep.tally import Tally, Tell, silent
@@ -43,7 +42,7 @@ class Outcome:
 
     task: Task
     status: Status
-    value: dict[str, Any] | None
+    value: Plain | None
     message: str
     wall: float
 

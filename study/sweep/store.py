@@ -13,9 +13,8 @@ import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from study.sweep.canonical import canonical, digest
+from study.sweep.canonical import Plain, canonical, digest
 from study.sweep.program import program
 from study.sweep.task import Task, key
 
@@ -25,9 +24,9 @@ class Stored:
     """A finished run: what was called, what it returned, in how many seconds."""
 
     function: str
-    arguments: dict[str, Any]
+    arguments: Plain
     program: str
-    value: dict[str, Any]
+    value: Plain
     wall: float
 
 
@@ -50,7 +49,7 @@ class Store:
         """The result of a task, or None if there is none that can be believed."""
         return _read(self._path(task.key))
 
-    def put(self, task: Task, value: dict[str, Any], wall: float) -> None:
+    def put(self, task: Task, value: Plain, wall: float) -> None:
         """Keep the result of a task. ValueError if it cannot be written."""
         stored = Stored(task.function, task.arguments, program(task.module), value, wall)
         path = self._path(task.key)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from study.sweep.canonical import canonical, digest
+from study.sweep.canonical import Plain, canonical, digest
 from study.sweep.program import program
 
 
@@ -20,7 +19,7 @@ class Task:
     """
 
     function: str
-    arguments: dict[str, Any]
+    arguments: Plain
 
     def __post_init__(self) -> None:
         """Refuse what could not be run elsewhere."""
@@ -43,6 +42,6 @@ class Task:
         return key(self.function, self.arguments, program(self.module))
 
 
-def key(function: str, arguments: dict[str, Any], identity: str) -> str:
+def key(function: str, arguments: Plain, identity: str) -> str:
     """Key of a run by the program of this identity (`study.sweep.program`)."""
     return digest({"function": function, "arguments": arguments, "program": identity})

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.similarity.fields import relative_l2
+from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
+from study.tradeoff.observation import Observed
 from study.tradeoff.problem import Stated
-from study.tradeoff.reference import Reference
+from study.tradeoff.reference import Truth
 
 Floats = NDArray[np.float64]
 Status = Literal[
@@ -34,27 +36,25 @@ class Errors:
     message: str = ""
 
 
-def errors(outcome: Outcome, reference: Reference, given: Stated) -> Errors:
+def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
     """Errors of one run of `study.tradeoff.observation`."""
-    value = outcome.value
-    if outcome.status != "done" or value is None:
+    if outcome.status != "done" or outcome.value is None:
         status: Status = "crashed" if outcome.status == "crashed" else "failed"
         return Errors(status, message=outcome.message)
-    if value["field"] is None:
-        return Errors("diverged", message=f"at {value['diverged_at_s']:.3g} s")
-    if value["margin"] is not None and value["margin"] < 1.0:
-        return Errors(
-            "unstable", message=f"step {1.0 / value['margin']:.3g} times the critical one"
-        )
-    if value["inverted_cells"]:
-        return Errors("inverted", message=f"{value['inverted_cells']} cells")
-    return _measured(value, reference, given)
+    found = restored(Observed, outcome.value)
+    if found.field is None or found.curves is None:
+        return Errors("diverged", message=f"at {found.diverged_at_s:.3g} s")
+    if found.margin is not None and found.margin < 1.0:
+        return Errors("unstable", message=f"step {1.0 / found.margin:.3g} times the critical one")
+    if found.inverted_cells:
+        return Errors("inverted", message=f"{found.inverted_cells} cells")
+    return _measured(np.reshape(found.field, (-1, 3)), np.array(found.curves), reference, given)
 
 
-def _measured(value: dict[str, Any], reference: Reference, given: Stated) -> Errors:
+def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> Errors:
     volumes = given.problem.volume_rule.weights
-    field = relative_l2(np.reshape(value["field"], (-1, 3)), reference.field, volumes)
-    curves = curve_errors(np.reshape(value["curves"], reference.curves.shape), reference.curves)
+    field = relative_l2(found, reference.field, volumes)
+    curves = curve_errors(moved.reshape(reference.curves.shape), reference.curves)
     known = [resolved(c, bar) for c, bar in zip(curves, reference.curve_errors, strict=True)]
     kept = resolved(field, reference.field_error)
     return Errors(

@@ -1,31 +1,127 @@
-"""The contenders by name, and what each enters with."""
+"""The contenders by name, and the settings that each enters with.
+
+A contender is a model in a family of settings. Other models of a scene enter as they are.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from msm.calibration import POISSON_RATIO
+from msm.integrators import INTEGRATORS
+from msm.stability import DEFAULT
+from study.models.model import Model
+from study.models.table import kind, model
 from study.scene import Scene
-from study.tradeoff.contender import Contender, Settings
-from study.tradeoff.contenders import (
-    basafa,
-    finite_elements,
-    integrators,
-    springs,
-    step_sizes,
-    superposition,
-    volume_springs,
-)
 
-# Imported by name, so that a stored result is known to be stale when one of them is edited.
+Settings = Mapping[str, str | float | int | bool]
+"""Plain values by name, as `Model.varied` takes them."""
+
+FRACTION = 0.8
+"""Of the critical step, where nothing else is asked for."""
+FRAME_RATE = 60.0
+FAST = 250.0
+"""Steps per second [Hz] beyond a frame's, to show what the step contributes."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A model by the name of its kind, and settings worth a place in the table of a scene.
+
+    `always`: settings that all of them share and none is told apart by.
+    """
+
+    model: str
+    settings: Callable[[Scene], Iterator[Settings]]
+    always: Settings = field(default_factory=dict)
+
+
+def lacks_poisson_ratio(scene: Scene) -> bool:
+    """Whether the tissue's Poisson ratio is one that springs alone do not have."""
+    return scene.tissue.poisson_ratio > POISSON_RATIO
+
+
+def lattice_settings(scene: Scene, times: float, **more: str | float | bool) -> Settings:
+    """A lattice of so many times the scene's spacing, of the tissue's Poisson ratio."""
+    spacing = times * scene.lattice.spacing
+    return {"spacing": spacing, "volume_term": lacks_poisson_ratio(scene)} | more
+
+
+def _springs(scene: Scene) -> Iterator[Settings]:
+    """Springs alone, which have Poisson ratio 1/4 whatever the tissue's."""
+    for times in (2.0, 1.5, 1.0, 0.75):
+        spacing = times * scene.lattice.spacing
+        yield {"spacing": spacing, "volume_term": False, "step_fraction": FRACTION}
+
+
+def _volume_springs(scene: Scene) -> Iterator[Settings]:
+    """Springs with the volume term; none for a tissue whose ratio springs have already."""
+    spacings = (2.0, 1.75, 1.5, 1.25, 1.0, 0.8, 2.0 / 3.0, 0.5)
+    for times in spacings if lacks_poisson_ratio(scene) else ():
+        yield lattice_settings(scene, times, step_fraction=FRACTION)
+
+
+def _step_sizes(scene: Scene) -> Iterator[Settings]:
+    """The default integrator at fixed rates and fractions; a fixed step too long diverges."""
+    for rate in (500.0, 1000.0, 2000.0):
+        yield lattice_settings(scene, 1.0, step_rate=rate)
+    for fraction in (0.95, 0.4, 0.2):
+        yield lattice_settings(scene, 1.0, step_fraction=fraction)
+
+
+def _integrators(scene: Scene) -> Iterator[Settings]:
+    """Every other integrator by spacing and, where nothing limits the step, by step."""
+    for name, method in INTEGRATORS.items():
+        for times in (2.0, 1.0) if name != DEFAULT else ():
+            same = lattice_settings(scene, times, integrator=name)
+            if np.isfinite(method.oscillation):
+                yield {**same, "step_fraction": FRACTION}
+            else:
+                yield from ({**same, "step_rate": rate} for rate in (FRAME_RATE, FAST))
+
+
+def _basafa(scene: Scene) -> Iterator[Settings]:
+    """The benchmark, which has the stiffness of Table II and not that of the tissue."""
+    for times in (2.0, 1.5, 1.0):
+        yield {"spacing": times * scene.lattice.spacing, "step_fraction": FRACTION}
+
+
+def _finite_elements(_: Scene) -> Iterator[Settings]:
+    """By element and mesh at a frame's step, and the coarsest with shorter ones."""
+    meshes = (
+        *(("p1", level) for level in (-2, -1, 0, 1)),
+        *(("p2", level) for level in (-2, -1, 0)),
+        *(("taylor-hood", level) for level in (-2, -1)),
+    )
+    for element, level in meshes:
+        yield {"element": element, "level": level, "rate": FRAME_RATE}
+    yield {"element": "p2", "level": -2, "rate": FAST}
+
+
+def _superposition(_: Scene) -> Iterator[Settings]:
+    """By vectors, their number and mesh."""
+    subspaces = (
+        *(("ritz", count, -1) for count in (4, 16)),
+        *(("ritz", count, 0) for count in (2, 4, 8, 16, 24)),
+        *(("ritz", 16, level) for level in (1, 2)),
+        *(("modal", count, -2) for count in (10, 40)),
+        ("ritz", 16, -2),
+    )
+    for vectors, count, level in subspaces:
+        yield {"vectors": vectors, "count": count, "level": level}
+
+
 CONTENDERS: dict[str, Contender] = {
-    "springs": springs,
-    "volume-springs": volume_springs,
-    "step-sizes": step_sizes,
-    "integrators": integrators,
-    "basafa": basafa,
-    "finite-elements": finite_elements,
-    "superposition": superposition,
+    "springs": Contender("tissue", _springs),
+    "volume-springs": Contender("tissue", _volume_springs),
+    "step-sizes": Contender("tissue", _step_sizes),
+    "integrators": Contender("tissue", _integrators),
+    "basafa": Contender("basafa", _basafa),
+    "finite-elements": Contender("fem", _finite_elements, {"method": "tr-bdf2"}),
+    "superposition": Contender("superposition", _superposition),
 }
 
 
@@ -45,18 +141,46 @@ class Configuration:
         )
         return " ".join(parts)
 
+    @property
+    def any_load(self) -> bool:
+        """Whether it follows a load whose place was not known beforehand."""
+        return kind(contender(self.contender).model).any_load
+
+    def model(self, scene: Scene) -> Model:
+        """The model of a scene with these settings."""
+        entered = contender(self.contender)
+        found, settings = model(scene, entered.model), {**entered.always, **self.settings}
+        return found.varied(**settings) if settings else found
+
 
 def contender(name: str) -> Contender:
-    """The contender of a name. ValueError with those there are."""
-    if name not in CONTENDERS:
-        raise ValueError(f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}")
-    return CONTENDERS[name]
+    """The contender of a name, or the model of that name as it is.
+
+    ValueError with those there are.
+    """
+    if name in CONTENDERS:
+        return CONTENDERS[name]
+    try:
+        kind(name)
+    except ValueError:
+        raise ValueError(
+            f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}, or a model of "
+            "the scene"
+        ) from None
+    return Contender(name, lambda _: iter([{}]))
+
+
+def contenders_of(scene: Scene) -> list[str]:
+    """All contenders, and the scene's own models that are none of them and need no estimate."""
+    entered = {one.model for one in CONTENDERS.values()}
+    own = [name for name in scene.models if name not in entered and not kind(name).is_tuned]
+    return [*CONTENDERS, *own]
 
 
 def configurations(scene: Scene, chosen: Sequence[str] = ()) -> list[Configuration]:
-    """All configurations of the chosen contenders, or of all contenders."""
+    """All configurations of the chosen contenders, or of all that a scene has."""
     return [
         Configuration(name, settings)
-        for name in chosen or CONTENDERS
-        for settings in contender(name).configurations(scene)
+        for name in chosen or contenders_of(scene)
+        for settings in contender(name).settings(scene)
     ]

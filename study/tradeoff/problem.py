@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from study.problem.problem import Problem
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
+from study.sweep.canonical import Plain
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def sampled(scene: Scene) -> Scene:
     )
 
 
-def arguments(scene: Scene) -> dict[str, Any]:
+def arguments(scene: Scene) -> Plain:
     """The scene as plain values, with the SHA-256 of its mesh file if it has one."""
     mesh = scene.organ.mesh
     return {"scene": resolved(scene), "mesh_sha256": None if mesh is None else _sha256(mesh)}
@@ -67,7 +67,7 @@ def _sha256(path: str) -> str:
     return sha256(Path(path).read_bytes()).hexdigest()
 
 
-def stated(scene: dict[str, Any], mesh_sha256: str | None) -> Stated:
+def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
     """The problem of `arguments`, kept for the next run. ValueError if its mesh has changed."""
     # In one order of keys, whichever way it came: control points are numbered by it.
     return _posed(json.dumps(scene, sort_keys=True), mesh_sha256)

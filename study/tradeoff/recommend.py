@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from study.models.lattice import LatticeModel
 from study.progress import Progress
 from study.scene import Scene
 from study.scene.file import write_scene
@@ -23,11 +24,10 @@ from study.sweep.store import Store
 from study.tradeoff import reference, whole
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lattice import FRACTION, lifts, with_settings
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.lineup import FRACTION, Configuration, lacks_poisson_ratio
 from study.tradeoff.problem import Stated, arguments, stated, tidy
 from study.tradeoff.rates import Frame, frame
-from study.tradeoff.reference import Reference
+from study.tradeoff.reference import Truth
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import QUICK_REPEATS
 
@@ -97,7 +97,7 @@ def recommend(
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
     outcomes = whole.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
     given = stated(**arguments(coarser))
-    known = reference.restored(outcomes[0].value or {}, given)
+    known = reference.truth(outcomes[0].value or {}, given)
     found = [errors(outcome, known, given) for outcome in outcomes[1:]]
     kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
@@ -145,8 +145,9 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
 
 
 def _configuration(scene: Scene, spacing: float) -> Configuration:
-    name = "volume-springs" if lifts(scene) else "springs"
-    settings = {"spacing": spacing, "volume_term": lifts(scene), "step_fraction": FRACTION}
+    lacks = lacks_poisson_ratio(scene)
+    name = "volume-springs" if lacks else "springs"
+    settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": FRACTION}
     return Configuration(name, settings)
 
 
@@ -187,7 +188,7 @@ def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
 
 def _verified(
     given: Stated,
-    known: Reference,
+    known: Truth,
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
@@ -200,8 +201,8 @@ def _verified(
     (_, outcome) = whole.solved(given.scene, [configuration], store, how)
     measured = errors(outcome, known, given)
     (cost,) = _costs(given, [chosen.spacing], progress)
-    if outcome.value is not None and outcome.value["step_s"] is not None:
-        cost = replace(cost, step=min(cost.step, outcome.value["step_s"]))
+    if outcome.value is not None:
+        cost = replace(cost, step=min(cost.step, whole.step_of(outcome)))
     again = _frame(cost, wanted)
     met = chosen.meets(wanted) and measured.status in {"resolved", "not resolved"}
     met = met and (again is None or again.in_time)
@@ -213,10 +214,15 @@ def _verified(
 
 
 def recommended_scene(scene: Scene, found: Recommended) -> str:
-    """TOML text of the scene with the recommended lattice, promise and measurement above it."""
-    settings = _configuration(scene, found.candidate.spacing).settings
+    """TOML text of the scene with the recommended lattice, promise and measurement above it.
+
+    It names the model that was measured, springs of the tissue's own modulus, and the reference.
+    """
+    chosen = _configuration(scene, found.candidate.spacing).model(scene)
+    assert isinstance(chosen, LatticeModel)  # noqa: S101 - lattices only are recommended
+    models = tuple(dict.fromkeys(("fem", *scene.models, "tissue")))
     head = "".join(f"# {line}\n" for line in lines(found))
-    return head + "\n" + write_scene(with_settings(scene, settings))
+    return head + "\n" + write_scene(replace(scene, models=models, lattice=chosen.lattice))
 
 
 def lines(found: Recommended) -> list[str]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.progress import Silent
-from study.run.outcome import Outcome
-from study.run.reference import run_reference
+from study.models.finite_elements import FiniteElements
+from study.models.model import SILENT
+from study.models.table import model
+from study.results.records import ElementsRecord, MeshLevel
+from study.sweep.canonical import Plain, restored
 from study.tradeoff.problem import Stated, plain, stated
 
 Floats = NDArray[np.float64]
@@ -19,7 +20,24 @@ FUNCTION = f"{__name__}:solve"
 
 
 @dataclass(frozen=True)
-class Reference:
+class Solved:
+    """A reference as plain values: field at the peak and curves of displacement, flat.
+
+    An error is the sum of those by the mesh, by the subspace and by the steps of the load; None
+    where the organ has no other mesh to tell it.
+    """
+
+    field: list[float]
+    curves: list[float]
+    field_error: float | None
+    curve_errors: list[float] | None
+    unknowns: int
+    element: str
+    levels: tuple[MeshLevel, ...]
+
+
+@dataclass(frozen=True)
+class Truth:
     """What contenders are compared with.
 
     `field` [m] (q, 3) at the peak; `curves` [m] (samples, probes, 3); relative errors of both,
@@ -32,45 +50,44 @@ class Reference:
     curve_errors: Floats
 
 
-def solve(scene: dict[str, Any], mesh_sha256: str | None) -> dict[str, Any]:
-    """Field at the peak, curves of displacement, and relative errors of both.
-
-    An error is the sum of those by the mesh, by the subspace and by the steps of the load. None
-    where the organ has no other mesh to tell it.
-    """
+def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
+    """The reference of a scene, as plain values of `Solved`."""
     given = stated(scene, mesh_sha256)
-    posed = given.problem
-    linear = replace(given.scene.reference, large_strain="none")
-    outcome = Outcome()
-    run_reference(replace(given.scene, reference=linear), posed, outcome, Silent())
-    (record,), found = outcome.models, outcome.runs["fem"]
-    rest = (record["truncation_error"] or 0.0) + max(
-        kinds["displacement"] for kinds in record["time_step_error_by_probe"].values()
+    reference = model(given.scene, "fem")
+    assert isinstance(reference, FiniteElements)  # noqa: S101 - the model of that name
+    run = reference.varied(large_strain="none").prepare(given.problem).run(SILENT)
+    elements, steps = run.record.elements, run.record.time_step_errors
+    assert isinstance(elements, ElementsRecord)  # noqa: S101 - finite elements have one
+    rest = (elements.truncation_error or 0.0) + max(one.displacement for one in steps.values())
+    mesh = elements.mesh_error
+    probes = given.problem.probes
+    return asdict(
+        Solved(
+            field=plain(run.trajectory.volume_field[0]),
+            curves=plain(run.trajectory.displacement),
+            field_error=None if mesh is None else mesh.field_peak + rest,
+            curve_errors=(
+                None if mesh is None else [mesh.by_probe[p].displacement + rest for p in probes]
+            ),
+            unknowns=elements.unknowns,
+            element=elements.element,
+            levels=elements.levels,
+        )
     )
-    mesh = record.get("mesh_error")
-    return {
-        "field": plain(found.volume_field[0]),
-        "curves": plain(found.displacement),
-        "field_error": mesh and mesh["field_peak"] + rest,
-        "curve_errors": mesh
-        and [record["mesh_error_by_probe"][p]["displacement"] + rest for p in posed.probes],
-        "unknowns": record["unknowns"],
-        "element": record["element"],
-        "levels": record["mesh_levels"],
-    }
 
 
-def restored(value: dict[str, Any], given: Stated) -> Reference:
+def truth(value: Plain, given: Stated) -> Truth:
     """The reference of a stored value. ValueError if its error is unknown."""
-    if value["field_error"] is None:
+    found = restored(Solved, value)
+    if found.field_error is None or found.curve_errors is None:
         raise ValueError(
             "the organ has one mesh only, so the error of its reference is unknown and none of a "
             "model can be told from it; refine organ.mesh or give a surface"
         )
     seen = given.problem.observation
-    return Reference(
-        np.reshape(value["field"], (-1, 3)),
-        np.reshape(value["curves"], (len(seen.times), len(seen.probes), 3)),
-        value["field_error"],
-        np.array(value["curve_errors"]),
+    return Truth(
+        np.reshape(found.field, (-1, 3)),
+        np.reshape(found.curves, (len(seen.times), len(seen.probes), 3)),
+        found.field_error,
+        np.array(found.curve_errors),
     )

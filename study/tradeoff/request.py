@@ -66,9 +66,9 @@ def measure(request: Request, progress: Progress) -> list[str]:
     repeats = QUICK_REPEATS if request.quick else REPEATS
     found = whole.study(scene, chosen, _store(folder), request.how, repeats, progress)
     whole.write(found, scene, repeats, folder)
-    own = 100 * found.reference["field_error"]
+    own = 100 * (found.reference.field_error or 0.0)
     return [
-        *table.lines(found.rows),
+        *table.lines(found.entries),
         f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %",
         f"table in {folder / whole.TABLE}",
     ]

@@ -26,19 +26,18 @@ pareto_any_load           the same among those with any_load
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from study.tradeoff.errors import Errors
-from study.tradeoff.lineup import Configuration, contender
+from study.tradeoff.lineup import Configuration
 from study.tradeoff.rates import RATES, frame
 from study.tradeoff.timing import Timing
 
-Row = dict[str, Any]
+Cell = str | float | int | bool | None
 
 SAME = 0.01
 """Of an error: by so little no configuration is more accurate than another."""
@@ -66,110 +65,128 @@ class Cost:
     step: float
     timing: Timing
 
-
-def row(configuration: Configuration, errors: Errors, bar: float, cost: Cost | None) -> Row:
-    """A row without its place on the fronts; without `cost` where nothing could be timed."""
-    return {
-        "contender": configuration.contender,
-        "configuration": configuration.label,
-        "status": errors.status,
-        "message": errors.message,
-        "any_load": contender(configuration.contender).ANY_LOAD,
-        "field_error": errors.field,
-        "field_error_bar": bar,
-        "tool_error": errors.tool,
-        "worst_error": errors.worst,
-    } | (_costs(cost) if cost else {})
+    @property
+    def per_second(self) -> tuple[float, float, float]:
+        """Wall per simulated second: lower quartile, median and upper quartile of the turns."""
+        low, middle, high = self.timing.step
+        return low / self.step, middle / self.step, high / self.step
 
 
-def _costs(cost: Cost) -> Row:
-    low, middle, high = cost.timing.step
-    bare = cost.timing.bare
-    found = {
-        "unknowns": cost.unknowns,
-        "step_s": cost.step,
-        "setup_s": cost.setup,
-        "step_us": 1e6 * middle,
-        "bare_step_us": None if bare is None else 1e6 * float(np.median(bare)),
-        "wall_per_s": middle / cost.step,
-        "wall_per_s_q1": low / cost.step,
-        "wall_per_s_q3": high / cost.step,
-    }
-    for name, rate in RATES.items():
-        one = frame(rate, cost.step, cost.timing.walls)
-        found |= {
-            f"substeps_{name}": one.substeps,
-            f"frame_ms_{name}": 1e3 * one.wall,
-            f"slow_frame_ms_{name}": None if one.slow is None else 1e3 * one.slow,
-            f"real_time_{name}": one.in_time,
-        }
-    return found
+@dataclass(frozen=True)
+class Entry:
+    """A configuration with its errors and, where it was timed, its cost.
 
-
-def with_fronts(rows: Sequence[Row]) -> list[Row]:
-    """The rows with every column, those on a front marked."""
-    eligible = [row for row in rows if row.get("field_error") and row.get("wall_per_s")]
-    whole = front(eligible)
-    held = front([row for row in eligible if row["any_load"]])
-    return [
-        {column: row.get(column) for column in COLUMNS}
-        | {"pareto": _is_in(row, whole), "pareto_any_load": _is_in(row, held)}
-        for row in rows
-    ]
-
-
-def _is_in(row: Row, rows: Sequence[Row]) -> bool:
-    return any(row is other for other in rows)
-
-
-def front(rows: Sequence[Row]) -> list[Row]:
-    """Rows for which no cheaper one is as accurate, and no more accurate one as cheap.
-
-    Errors that differ by less than SAME of themselves are the same: those of one lattice at two
-    steps do.
+    `bar`: the reference's own error of the field.
     """
 
-    def beaten(a: Row) -> bool:
+    configuration: Configuration
+    errors: Errors
+    bar: float
+    cost: Cost | None
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Error of the field and median wall per simulated second, None where one is missing."""
+        if self.cost is None or not self.errors.field:
+            return None
+        return self.errors.field, self.cost.per_second[1]
+
+
+def front(entries: Sequence[Entry]) -> list[Entry]:
+    """Entries for which no cheaper one is as accurate, and no more accurate one as cheap.
+
+    Errors that differ by less than SAME of themselves are the same: those of one lattice at two
+    steps do. An entry without error or cost has no place on it.
+    """
+    places = [one.place for one in entries if one.place is not None]
+
+    def is_beaten(place: tuple[float, float]) -> bool:
+        error, wall = place
         return any(
-            (b["wall_per_s"] <= a["wall_per_s"] and b["field_error"] < a["field_error"])
-            or (
-                b["wall_per_s"] < a["wall_per_s"]
-                and b["field_error"] <= (1.0 + SAME) * a["field_error"]
-            )
-            for b in rows
+            (w <= wall and e < error) or (w < wall and e <= (1.0 + SAME) * error) for e, w in places
         )
 
-    return [row for row in rows if not beaten(row)]
+    return [one for one in entries if one.place is not None and not is_beaten(one.place)]
 
 
-def write(rows: Sequence[Row], path: Path) -> None:
-    """Write the rows as CSV; what does not apply is empty."""
+def fronts(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
+    """That of all entries, and that of those which follow any load."""
+    return front(entries), front([one for one in entries if one.configuration.any_load])
+
+
+def write(entries: Sequence[Entry], path: Path) -> None:
+    """Write a row for each entry as CSV; what does not apply is empty."""
+    whole, any_load = fronts(entries)
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
-        table.writerows({key: _cell(value) for key, value in row.items()} for row in rows)
+        for one in entries:
+            marks = {"pareto": one in whole, "pareto_any_load": one in any_load}
+            table.writerow({k: _printed(v) for k, v in (dict(_cells(one)) | marks).items()})
 
 
-def _cell(value: Any) -> Any:
+def _cells(one: Entry) -> Iterator[tuple[str, Cell]]:
+    """Columns and values of a row, but for its place on the fronts."""
+    configuration, errors = one.configuration, one.errors
+    yield "contender", configuration.contender
+    yield "configuration", configuration.label
+    yield "status", errors.status
+    yield "message", errors.message
+    yield "any_load", configuration.any_load
+    yield "field_error", errors.field
+    yield "field_error_bar", one.bar
+    yield "tool_error", errors.tool
+    yield "worst_error", errors.worst
+    if one.cost is not None:
+        yield from _costs(one.cost)
+
+
+def _costs(cost: Cost) -> Iterator[tuple[str, Cell]]:
+    bare, (low, middle, high) = cost.timing.bare, cost.per_second
+    yield "unknowns", cost.unknowns
+    yield "step_s", cost.step
+    yield "setup_s", cost.setup
+    yield "step_us", 1e6 * cost.timing.step[1]
+    yield "bare_step_us", None if bare is None else 1e6 * float(np.median(bare))
+    yield "wall_per_s", middle
+    yield "wall_per_s_q1", low
+    yield "wall_per_s_q3", high
+    for name, rate in RATES.items():
+        found = frame(rate, cost.step, cost.timing.walls)
+        yield f"substeps_{name}", found.substeps
+        yield f"frame_ms_{name}", 1e3 * found.wall
+        yield f"slow_frame_ms_{name}", None if found.slow is None else 1e3 * found.slow
+        yield f"real_time_{name}", found.in_time
+
+
+def _printed(value: Cell) -> Cell:
     return f"{value:.4g}" if isinstance(value, float) else value
 
 
-def lines(rows: Sequence[Row]) -> list[str]:
-    """The front for a terminal, the cheapest first, and how the others ended."""
-    shown = [row for row in rows if row["pareto"] or row["pareto_any_load"]]
-    shown.sort(key=lambda row: float(row["wall_per_s"]))
+def lines(entries: Sequence[Entry]) -> list[str]:
+    """The fronts for a terminal, the cheapest first, and how the others ended."""
+    whole, any_load = fronts(entries)
+    shown = [(one.place, one, one.cost) for one in entries if one in whole or one in any_load]
     found = [f"{'wall per s':>10}  {'error':>6}  60 Hz  1 kHz  setup"]
     found += [
-        f"{row['wall_per_s']:>10.3g}  {100 * row['field_error']:>4.1f} %  "
-        f"{_yes(row['real_time_60hz']):5}  {_yes(row['real_time_1khz']):5}  "
-        f"{row['setup_s']:.2f} s  {row['contender']} {row['configuration']}"
-        + ("" if row["any_load"] else " (this load only)")
-        for row in shown
+        _line(place, one, cost)
+        for place, one, cost in sorted(shown, key=lambda row: row[0][1] if row[0] else 0.0)
+        if place is not None and cost is not None
     ]
-    states = [row["status"] for row in rows]
+    states = [one.errors.status for one in entries]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-    return [*found, f"{len(rows)} configurations: {counts}"]
+    return [*found, f"{len(entries)} configurations: {counts}"]
 
 
-def _yes(value: bool) -> str:
-    return "yes" if value else "no"
+def _line(place: tuple[float, float], one: Entry, cost: Cost) -> str:
+    (error, wall), configuration = place, one.configuration
+    in_time = (
+        "yes" if frame(RATES[rate], cost.step, cost.timing.walls).in_time else "no"
+        for rate in ("60hz", "1khz")
+    )
+    ready = "  ".join(f"{text:5}" for text in in_time)
+    bound = "" if configuration.any_load else " (this load only)"
+    return (
+        f"{wall:>10.3g}  {100 * error:>4.1f} %  {ready}  {cost.setup:.2f} s  "
+        f"{configuration.contender} {configuration.label}{bound}"
+    )

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.tradeoff.contender import Ready
+from study.models.model import Stepper
 
 Floats = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -46,7 +46,7 @@ class Timing:
 
 
 def in_turns(
-    ready: Sequence[Ready],
+    ready: Sequence[Stepper],
     repeats: int,
     clock: Clock = time.perf_counter,
     on_turn: Callable[[float], None] = lambda _: None,
@@ -68,7 +68,7 @@ def in_turns(
     ]
 
 
-def _count(ready: Ready, clock: Clock) -> int:
+def _count(ready: Stepper, clock: Clock) -> int:
     """Steps in a turn, after some to warm up."""
     if ready.take_bare_steps is not None:
         ready.take_bare_steps(WARM_UP)

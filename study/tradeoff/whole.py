@@ -6,26 +6,26 @@ import json
 import os
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from study.folders import replacing
+from study.models.model import Stepper
 from study.progress import Progress
 from study.results.provenance import provenance
 from study.scene import Scene
 from study.scene.file import write_scene
+from study.sweep.canonical import Plain, restored
 from study.sweep.runner import How, Outcome, run
 from study.sweep.store import Store
 from study.sweep.tally import on_stderr
 from study.sweep.task import Task
 from study.tradeoff import observation, reference, table
-from study.tradeoff.contender import Ready
 from study.tradeoff.errors import errors
-from study.tradeoff.lineup import Configuration, contender
+from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import Stated, arguments, stated
-from study.tradeoff.reference import Reference
-from study.tradeoff.table import Cost, Row
+from study.tradeoff.reference import Solved, Truth
+from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns
 
 TABLE, RECORD = "tradeoff.csv", "tradeoff.json"
@@ -35,16 +35,17 @@ PICTURES = ("exchange.svg", "exchange.pdf")
 
 @dataclass(frozen=True)
 class Found:
-    """Rows of the table, and the reference's own record."""
+    """Entries of the table, and the reference with the errors of its curves by control point."""
 
-    rows: list[Row]
-    reference: dict[str, Any]
+    entries: list[Entry]
+    reference: Solved
+    curve_errors: dict[str, float]
 
 
 def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
     """The reference's run and one for each configuration."""
     same = arguments(scene)
-    runs = [{"name": one.contender, "settings": one.settings} for one in chosen]
+    runs: list[Plain] = [{"name": one.contender, "settings": dict(one.settings)} for one in chosen]
     return [
         Task(reference.FUNCTION, same),
         *(Task(observation.FUNCTION, same | one) for one in runs),
@@ -73,30 +74,29 @@ def study(
     outcomes = solved(scene, chosen, store, how)
     given = stated(**arguments(scene))
     value = outcomes[0].value or {}
-    known = reference.restored(value, given)
-    rows = compared(given, chosen, outcomes[1:], known, repeats, progress, clock)
-    record = {key: value[key] for key in ("element", "unknowns", "field_error", "levels")}
-    by_probe = zip(given.problem.probes, value["curve_errors"], strict=True)
-    return Found(table.with_fronts(rows), record | {"curve_errors": dict(by_probe)})
+    known = reference.truth(value, given)
+    entries = compared(given, chosen, outcomes[1:], known, repeats, progress, clock)
+    by_probe = zip(given.problem.probes, map(float, known.curve_errors), strict=True)
+    return Found(entries, restored(Solved, value), dict(by_probe))
 
 
 def compared(
     given: Stated,
     chosen: Sequence[Configuration],
     outcomes: Sequence[Outcome],
-    known: Reference,
+    known: Truth,
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
-) -> list[Row]:
-    """A row per configuration, all that ran timed in turns."""
+) -> list[Entry]:
+    """An entry per configuration, all that ran timed in turns."""
     found = [errors(outcome, known, given) for outcome in outcomes]
     sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
-    steps = [float((outcomes[k].value or {})["step_s"]) for k in sound]
+    steps = [step_of(outcomes[k]) for k in sound]
     costed = costs(given, [chosen[k] for k in sound], steps, repeats, progress, clock)
     by_place = dict(zip(sound, costed, strict=True))
     return [
-        table.row(one, error, known.field_error, by_place.get(k))
+        Entry(one, error, known.field_error, by_place.get(k))
         for k, (one, error) in enumerate(zip(chosen, found, strict=True))
     ]
 
@@ -112,11 +112,11 @@ def costs(
     """Setup and cost of configurations, at steps [s] that their runs took."""
     with progress.stage("setting up") as advance:
         for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
-            _ready(given, next(one for one in chosen if one.contender == name))
+            _stepper(given, next(one for one in chosen if one.contender == name))
         ready, setups = [], []
         for one in chosen:
             started = clock()
-            ready.append(_ready(given, one))
+            ready.append(_stepper(given, one))
             setups.append(clock() - started)
             advance(len(ready) / len(chosen))
     with progress.stage("timing") as advance:
@@ -127,22 +127,34 @@ def costs(
     ]
 
 
-def _ready(given: Stated, one: Configuration) -> Ready:
-    return contender(one.contender).prepare(given.scene, given.problem, one.settings)
+def _stepper(given: Stated, one: Configuration) -> Stepper:
+    return one.model(given.scene).prepare(given.problem).stepper()
+
+
+def step_of(outcome: Outcome) -> float:
+    """Shortest step [s] of a run that was whole."""
+    found = restored(observation.Observed, outcome.value or {})
+    return float("inf") if found.step_s is None else found.step_s
 
 
 def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
     """Write table, record and scene; the folder appears, or is replaced, at once."""
-    text = write_scene(scene)
+    text, solved = write_scene(scene), found.reference
     record = {
-        "reference": found.reference,
+        "reference": {
+            "element": solved.element,
+            "unknowns": solved.unknowns,
+            "field_error": solved.field_error,
+            "levels": [asdict(level) for level in solved.levels],
+            "curve_errors": found.curve_errors,
+        },
         "repeats": repeats,
         "modulus_pa": scene.tissue.youngs_modulus,
         "load_average": os.getloadavg(),
-        "machine": provenance(text, scene.organ.mesh),
+        "machine": asdict(provenance(text, scene.organ.mesh)),
     }
     with replacing(folder, _foreign, "trade-off study") as partial:
-        table.write(found.rows, partial / TABLE)
+        table.write(found.entries, partial / TABLE)
         content = json.dumps(record, indent=1, allow_nan=False)
         (partial / RECORD).write_text(content + "\n", encoding="utf-8")
         (partial / "scene.toml").write_text(text, encoding="utf-8")

@@ -1,38 +1,48 @@
-"""A scene's own lattice: its critical step, its rest, and its motion under many times its load."""
+"""A scene's own models: critical step and rest of its lattices, motion under many times its load.
+
+Tried are the lattice of the tissue's modulus, with the law, geometry and integrator of the scene,
+and the models that the scene names beside the reference and those of fuzzy estimates, which are the
+same lattice at other moduli.
+"""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from msm.assembly import Assembly, Material, arrays
+from msm.assembly import arrays
 from msm.damping import UNDAMPED
 from msm.integrators import INTEGRATORS
-from msm.model import Automatic, Fixed, Run, Step, critical_time_step, run
+from msm.laws import Law, stiffness
+from msm.model import critical_time_step
 from msm.relaxation import relax
-from msm.stability import DEFAULT
-from msm.statics import static_displacement
-from msm.timestep import whole_steps
 from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known.stability.finding import Finding, at_most, beside, value
 from study.known.stability.growth import longest_stable_step
+from study.models.lattice import LatticeModel, PreparedLattice
+from study.models.model import Prepared
+from study.models.table import kind, model
 from study.problem.problem import Problem
-from study.run import lattices
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
 
 FRACTIONS = (0.5, 0.2)
-"""Of the limit at rest, of the fixed steps."""
+"""Of the limit at rest, or of the model's own step, of the equal ones."""
 LOADS = (1.0, 10.0, 100.0, 1000.0)
 MEASURED, SOLVED = 5e-3, 1e-6
 FINER = 0.02
 """Of the motion, by which symplectic Euler's steps of 0.8 and 0.2 of the limit may differ."""
+WATCHED = {"runge-kutta-4": 1600, "split-volume": 400}
+"""Steps that show growth just above the limit, where 1000 are too few or too dear."""
+LEAPS, LEAP = 40, 1e3
+"""Implicit steps to rest, and how many times the explicit limit each is."""
+NEAR_REST = 1e-9
 HERE = "study.known.stability.cases.own_scene"
 
 
@@ -40,17 +50,25 @@ def cases(scene: Scene) -> Iterator[Case]:
     """Cases of a scene with a body. ValueError for a single control point, which has no lattice."""
     if scene.is_point:
         raise ValueError("organ.shape: a single point has no lattice; give a scene with a body")
-    given = {"scene": resolved(scene), "mesh": _digest(scene)}  # another mesh, another case
-    yield _case("critical step", "steps", given, MEASURED, quick=True)
-    yield _case("rest under its load", "rests", given, SOLVED)
-    for times in LOADS:
-        yield _case(
-            f"motion under {times:g} times its load", "moves", given | {"times": times}, FINER
-        )
+    for name in tried(scene):
+        given = {"name": name, "scene": resolved(scene), "mesh": _digest(scene)}
+        if isinstance(model(scene, name), LatticeModel):
+            if np.isfinite(INTEGRATORS[scene.lattice.integrator].oscillation):
+                yield _case(f"{name}, critical step", "steps", given, MEASURED, quick=True)
+            yield _case(f"{name}, rest under its load", "rests", given, SOLVED)
+        for times in LOADS:
+            title = f"{name}, motion under {times:g} times its load"
+            yield _case(title, "moves", given | {"times": times}, FINER)
+
+
+def tried(scene: Scene) -> list[str]:
+    """Kinds of models that are tried on a scene."""
+    others = (n for n in scene.models if n != "fem" and not kind(n).is_tuned)
+    return list(dict.fromkeys(("tissue", *others)))
 
 
 def _digest(scene: Scene) -> str:
-    """Of the organ's mesh file, if it has one."""
+    """Of the organ's mesh file, if it has one: with another mesh it is another case."""
     path = scene.organ.mesh
     return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
 
@@ -69,85 +87,88 @@ def _case(
     )
 
 
-@dataclass(frozen=True)
-class Lattice:
-    """A scene's lattice with the reference modulus, posed."""
+def steps(name: str, scene: dict[str, Any], mesh: str) -> Finding:
+    """The critical step at rest, predicted and measured, without damping.
 
-    scene: Scene
-    posed: Problem
-    assembly: Assembly
-    material: Material
-
-    def moved(self, step: Step) -> Run:
-        """Its motion over the scene's time."""
-        return run(
-            self.assembly,
-            self.material,
-            self.posed.factor,
-            self.posed.observation,
-            step,
-            integrator=self.scene.lattice.integrator,
-        )
-
-
-def steps(scene: dict[str, Any], mesh: str) -> Finding:
-    """The critical step at rest, predicted and measured."""
-    one = _lattice(scene, mesh)
-    material = replace(one.material, damping=UNDAMPED)
-    predicted = critical_time_step(one.assembly, material)
-    net = arrays(one.assembly, material, linear=True)
+    Of a law with a corner at rest the predicted one may be the shorter: motions feel both slopes.
+    """
+    one, _ = _lattice(name, scene, mesh)
+    integrator = one.model.lattice.integrator
+    material = replace(one.springs.material, damping=UNDAMPED)
+    predicted = float(critical_time_step(one.assembly, material, integrator))
+    net = arrays(one.assembly, material, linear=one.linear)
     net, still = net._replace(load=np.zeros_like(net.load)), np.zeros_like(net.load)
-    method = INTEGRATORS[DEFAULT]
-    return value(predicted, longest_stable_step(material.law, net, method, predicted, still, 1000))
+    watched = WATCHED.get(integrator, 1000)
+    method = INTEGRATORS[integrator]
+    measured = longest_stable_step(material.law, net, method, predicted, still, watched)
+    if _has_corner(material.law):
+        return at_most(measured, predicted, "a law with a corner at rest", "value")
+    return value(predicted, measured)
 
 
-def rests(scene: dict[str, Any], mesh: str) -> Finding:
-    """Linear rest by conjugate gradients beside that by relaxation."""
-    one = _lattice(scene, mesh)
-    net = arrays(one.assembly, one.material, linear=True)
-    found, ended = relax(one.material.law, net)
+def _has_corner(law: Law) -> bool:
+    return not np.isclose(stiffness(law, -NEAR_REST), stiffness(law, NEAR_REST), rtol=1e-6)
+
+
+def rests(name: str, scene: dict[str, Any], mesh: str) -> Finding:
+    """Rest under the full load by relaxation beside that by long implicit steps."""
+    one, _ = _lattice(name, scene, mesh)
+    material = replace(one.springs.material, damping=UNDAMPED)  # which the rest does not depend on
+    law, net = material.law, arrays(one.assembly, material, linear=one.linear)
+    found, ended = relax(law, net)
     if ended.status != "at rest":
         return Finding("error", message=f"relaxation: {ended.status}")
-    return beside(static_displacement(one.assembly, one.material), found)
+    method, dt = INTEGRATORS["implicit-euler"], LEAP * _explicit_limit(one)
+    u, v = np.zeros((2, *net.load.shape))
+    method.advance(law, net, np.ones((LEAPS, len(method.at))), dt, u, v)
+    return beside(u, found)
 
 
-def moves(scene: dict[str, Any], mesh: str, times: float) -> Finding:
-    """Motion of the control points by the automatic step beside that by the finest fixed one.
+def _explicit_limit(one: PreparedLattice) -> float:
+    return float(critical_time_step(one.assembly, one.springs.material, "velocity-verlet"))
 
-    If no fixed step completes, the automatic one may not either, and is to lose the body when the
-    finest does, to within a sampling interval.
+
+def moves(name: str, scene: dict[str, Any], mesh: str, times: float) -> Finding:
+    """Motion of the control points by the model's own steps beside that by the finest equal ones.
+
+    If no equal step completes, its own may not either, and are to lose the body when the finest do,
+    to within a sampling interval.
     """
-    one = _lattice(scene, mesh, times)
-    found = one.moved(Automatic(one.scene.lattice.step_fraction)).trajectory
-    interval = float(one.posed.observation.times[1])
-    limit = critical_time_step(one.assembly, one.material)
-    fixed = [one.moved(_fixed(interval, part * limit)).trajectory for part in FRACTIONS]
-    complete = sum(other.status == "finished" for other in fixed)
-    told = f"{complete} of {len(fixed)} fixed steps complete"
+    one, problem = _prepared(name, scene, mesh, times)
+    own = one.simulate()
+    found, interval = own.trajectory, float(problem.observation.times[1])
+    longest = min(one.critical_time_step, own.step / FRACTIONS[0])
+    equal = [one.simulate(part * longest).trajectory for part in FRACTIONS]
+    complete = sum(other.status == "finished" for other in equal)
+    told = f"{complete} of {len(equal)} fixed steps complete"
     if found.diverged_at is None:
-        whole = [other for other in fixed if other.status == "finished"]
+        whole = [other for other in equal if other.status == "finished"]
         if not whole:
             return Finding("error", message=f"nothing to compare with: {told}")
         return replace(beside(whole[-1].displacement, found.displacement), message=told)
-    finest = fixed[-1].diverged_at
+    finest = equal[-1].diverged_at
     if complete or finest is None:
         return Finding("error", message=f"lost by its step: {told}")
     late = max(0.0, abs(found.diverged_at - finest) - interval) / finest
     return Finding("value", finest, found.diverged_at, late, f"lost by its load: {told}")
 
 
-def _fixed(interval: float, longest: float) -> Fixed:
-    return Fixed(interval / whole_steps(interval, longest))
+def _lattice(name: str, scene: dict[str, Any], mesh: str) -> tuple[PreparedLattice, Problem]:
+    found, problem = _prepared(name, scene, mesh)
+    assert isinstance(found, PreparedLattice)  # noqa: S101 - only lattices have these cases
+    return found, problem
 
 
-def _lattice(table: dict[str, Any], mesh: str, times: float = 1.0) -> Lattice:
+def _prepared(
+    name: str, table: dict[str, Any], mesh: str, times: float = 1.0
+) -> tuple[Prepared, Problem]:
+    """A model of a scene whose steps follow the limit, under so many times the load."""
     scene = validate(table, "scene")
     if _digest(scene) != mesh:
         raise ValueError(f"organ.mesh: {scene.organ.mesh} has changed since the cases were listed")
-    scene = replace(scene, tool=replace(scene.tool, force=times * scene.tool.force))
-    posed = problem_of(scene)
-    assembly = lattices.assemble(scene, posed)
-    modulus = scene.tissue.youngs_modulus
-    material = lattices.elastic(assembly.lattice, modulus, lattices.poisson_ratio(scene))
-    damping = lattices.node_damping(scene, modulus)
-    return Lattice(scene, posed, assembly, replace(material, damping=damping))
+    lattice = replace(scene.lattice, time_step=None, step_rate=None)
+    scene = replace(
+        scene, lattice=lattice, tool=replace(scene.tool, force=times * scene.tool.force)
+    )
+    problem = problem_of(scene)
+    return model(scene, name).prepare(problem), problem

@@ -1,1 +1,0 @@
-"""One file per contender, each named in `study.tradeoff.lineup`."""
