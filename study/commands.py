@@ -211,12 +211,12 @@ def export(
     set_
         Override of a scene, table.key=value. May be repeated.
     """
-    from study.export import Request
+    from study.export import ExportRequest
     from study.export import export as write
     from study.progress import on_stderr
 
     with on_stderr() as progress:
-        folder = write(Request(target=target, to=to, out=out, overrides=set_ or ()), progress)
+        folder = write(ExportRequest(target=target, to=to, out=out, overrides=set_ or ()), progress)
     print(folder)
 
 
@@ -301,7 +301,7 @@ def tradeoff(
     from study.progress import on_stderr
     from study.tradeoff import request as asked
 
-    request = asked.Request(
+    request = asked.TradeoffRequest(
         scene=scene,
         overrides=set_ or (),
         contenders=contender or (),
@@ -356,7 +356,7 @@ def recommend(
     from study.progress import on_stderr
     from study.tradeoff import request as asked
 
-    request = asked.Request(
+    request = asked.TradeoffRequest(
         scene=scene, overrides=set_ or (), out=out, workers=workers, scheduler=scheduler
     )
     with on_stderr() as progress:

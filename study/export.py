@@ -47,7 +47,7 @@ FRAMES = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class ExportRequest:
     """What was asked: a scene or results folder, the format, the folder to write, overrides."""
 
     target: str
@@ -65,7 +65,7 @@ class _Target:
     elements: int | None = None
 
 
-def export(request: Request, progress: Progress) -> Path:
+def export(request: ExportRequest, progress: Progress) -> Path:
     """Write the problem; the folder. ValueError for a target or format that will not do."""
     if request.to not in FORMATS:
         raise ValueError(f"--to {request.to}: use one of {', '.join(FORMATS)}")
@@ -79,7 +79,7 @@ def export(request: Request, progress: Progress) -> Path:
     return folder
 
 
-def _target(request: Request) -> _Target:
+def _target(request: ExportRequest) -> _Target:
     path = Path(request.target)
     if not path.is_dir():
         return _Target(read_scene(request.target, request.overrides), Path(f"{path.stem}-export"))
@@ -99,17 +99,17 @@ def _target(request: Request) -> _Target:
 def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
     from fem_reference.exchange import vtu
 
-    scene, (body, posed) = target.scene, _discretised(target, progress)
-    given = nodal_problem(body, scene.tissue, posed.foundation)
+    scene, (body, problem) = target.scene, _discretised(target, progress)
+    given = nodal_problem(body, scene.tissue, problem.foundation)
     with progress.stage("at rest under full load"):
         displacement = solve_static(body).reshape(-1, 3)
     _write(folder, {VTU: vtu.text(given, displacement), MARK: _about_vtu(scene, given)})
 
 
 def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
-    scene, (body, posed) = target.scene, _discretised(target, progress)
-    given = nodal_problem(body, scene.tissue, posed.foundation)
-    motion = motion_of(scene, posed)
+    scene, (body, problem) = target.scene, _discretised(target, progress)
+    given = nodal_problem(body, scene.tissue, problem.foundation)
+    motion = motion_of(scene, problem)
     _check_memory(body)
     theirs = integrated(body, scene.tissue)
     with progress.stage("at rest under full load"):
@@ -139,10 +139,10 @@ def _check_memory(body: Body) -> None:
 
 def _discretised(target: _Target, progress: Progress) -> tuple[Body, Problem]:
     with progress.stage("organ"):
-        posed = problem_of(target.scene)
-        level = _level(posed, target.elements)
+        problem = problem_of(target.scene)
+        level = _level(problem, target.elements)
     with progress.stage("assembly"):
-        return reference_of(target.scene).prepare(posed).body(level), posed
+        return reference_of(target.scene).prepare(problem).body(level), problem
 
 
 def reference_of(scene: Scene) -> FiniteElements:
@@ -151,10 +151,10 @@ def reference_of(scene: Scene) -> FiniteElements:
     return found
 
 
-def _level(posed: Problem, elements: int | None) -> Level:
+def _level(problem: Problem, elements: int | None) -> Level:
     """The mesh of the scene, or the finer one that its results took for their accuracy."""
     for k in range(FINER + 1):
-        level = posed.geometry.level(k)
+        level = problem.geometry.level(k)
         if level is not None and elements in {None, len(level.mesh.tetrahedra)}:
             return level
     raise ValueError(
@@ -163,11 +163,11 @@ def _level(posed: Problem, elements: int | None) -> Level:
     )
 
 
-def motion_of(scene: Scene, posed: Problem) -> Motion:
+def motion_of(scene: Scene, problem: Problem) -> Motion:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
-    times = posed.observation.times
+    times = problem.observation.times
     count = (len(times) - 1) * scene.reference.steps_per_sample
-    factors = posed.factor(np.linspace(0.0, times[-1], count + 1))
+    factors = problem.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping
     return Motion(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))

@@ -9,9 +9,9 @@ from msm.damping import eq_9
 from msm.lattice import Lattice as LatticeMesh
 from msm.laws import Basafa
 from msm.model import Material
-from study.models.control_point import Oscillator, PointSpring
+from study.models.control_point import PointSpring, SpringDashpot
 from study.models.damping import reference_mass
-from study.models.lattice import LatticeModel, Springs
+from study.models.lattice import LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout
 from study.models.model import Estimates, ModelKind
 from study.problem.problem import PointProblem
@@ -28,15 +28,15 @@ def models(scene: Scene, _: Estimates) -> Iterator[LatticeModel]:
 def on_point(scene: Scene, _: Estimates) -> Iterator[PointSpring]:
     """Eq. (6) on a spring as long as the reference spacing."""
 
-    def make(problem: PointProblem) -> Oscillator:
+    def make(problem: PointProblem) -> SpringDashpot:
         h_0, table = problem.rest_length, scene.basafa
         law = Basafa(table.k1 / h_0, table.k2 / h_0, table.x_c)
-        return Oscillator(law, eq_9(table.gamma_0, table.gamma_1, problem.mass))
+        return SpringDashpot(law, eq_9(table.gamma_0, table.gamma_1, problem.mass))
 
     yield PointSpring(name=NAME, label=LABEL, make=make)
 
 
-def _springs(scene: Scene, mesh: LatticeMesh) -> Springs:
+def _springs(scene: Scene, mesh: LatticeMesh) -> SpringMaterial:
     """Table II carried from the reference spacing to the lattice's.
 
     K (h / h_0)^2 keeps the modulus 2.5 K_1 / h_0^2, gamma (h / h_0)^3 the damping per mass.
@@ -45,7 +45,7 @@ def _springs(scene: Scene, mesh: LatticeMesh) -> Springs:
     per_length = (h / h_0) ** 2 / h
     law = Basafa(table.k1 * per_length, table.k2 * per_length, table.x_c)
     damping = eq_9(table.gamma_0, table.gamma_1, reference_mass(scene))
-    return Springs(_modulus(scene), POISSON_RATIO, Material(law, damping=damping))
+    return SpringMaterial(_modulus(scene), POISSON_RATIO, Material(law, damping=damping))
 
 
 def _modulus(scene: Scene) -> float:

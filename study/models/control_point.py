@@ -19,7 +19,7 @@ from study.results.records import CurveErrors, ModelRecord, PointRecord
 
 
 @dataclass(frozen=True)
-class Oscillator:
+class SpringDashpot:
     """Law of the spring, damping of the point, and Young's modulus [Pa] that they stand for."""
 
     law: Law
@@ -27,7 +27,7 @@ class Oscillator:
     modulus: float | None = None
 
 
-Make = Callable[[PointProblem], Oscillator]
+Make = Callable[[PointProblem], SpringDashpot]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class PointSpring:
         return ModelRun(found, record, bounds=(low, high))
 
     def _record(
-        self, oscillator: Oscillator, problem: PointProblem, found: Trajectory, wall: float
+        self, oscillator: SpringDashpot, problem: PointProblem, found: Trajectory, wall: float
     ) -> ModelRecord:
         k, m = initial_stiffness(oscillator.law), problem.mass
         rate, tolerance = oscillator.damping.gamma_0, control_point.RELATIVE_TOLERANCE
@@ -82,7 +82,7 @@ class PointSpring:
         )
 
 
-def _moved(oscillator: Oscillator, problem: PointProblem) -> Trajectory:
+def _moved(oscillator: SpringDashpot, problem: PointProblem) -> Trajectory:
     def force(t: float) -> float:
         return float(problem.force(np.asarray(t)))
 

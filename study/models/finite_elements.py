@@ -21,7 +21,7 @@ from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors
 from study.models.keeping import recorded
 from study.models.large_strain import compare, is_large
-from study.models.mesh_error import Solved, is_too_coarse, mesh_error, next_size, why_unknown
+from study.models.mesh_error import MeshSolution, is_too_coarse, mesh_error, next_size, why_unknown
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
 from study.problem.problem import Problem
@@ -31,9 +31,9 @@ from study.results.fields import Mesh
 from study.results.records import (
     Check,
     CurveErrors,
+    DiscretisationError,
     ElementsRecord,
     LargeStrain,
-    MeshError,
     MeshLevel,
     ModelRecord,
 )
@@ -86,7 +86,7 @@ class PreparedElements:
 
     model: FiniteElements
     problem: Problem
-    best: Solved | None = field(default=None, init=False)
+    best: MeshSolution | None = field(default=None, init=False)
 
     @property
     def critical_time_step(self) -> float:
@@ -165,7 +165,7 @@ class PreparedElements:
             notes.append(f"The reference's discretisation error is not estimated: {why}.")
         return ModelRun(best.found.trajectory, record, checks, tuple(filter(None, notes)))
 
-    def _solve(self, progress: Progress) -> tuple[list[Solved], MeshError | None]:
+    def _solve(self, progress: Progress) -> tuple[list[MeshSolution], DiscretisationError | None]:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
         levels = [geometry.level(k) for k in range(-COARSER, 1)]
@@ -187,23 +187,25 @@ class PreparedElements:
                 found = level
         return found
 
-    def _solved_on(self, level: Level, progress: Progress) -> Solved:
+    def _solved_on(self, level: Level, progress: Progress) -> MeshSolution:
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
             body = self.body(level)
         with progress.stage(name) as advance:
             problem = self.problem
             arguments = (self.model.damping, problem.factor, problem.observation)
-            return Solved(level, body, fem.run(body, *arguments, self.model.method(), advance))
+            return MeshSolution(
+                level, body, fem.run(body, *arguments, self.model.method(), advance)
+            )
 
-    def _halved(self, solved: Solved, progress: Progress) -> Trajectory:
+    def _halved(self, solved: MeshSolution, progress: Progress) -> Trajectory:
         problem = self.problem
         with progress.stage(f"{self.model.name}: halved steps") as advance:
             arguments = (self.model.damping, problem.factor, problem.observation)
             return fem.run(solved.body, *arguments, self.model.method(2), advance).trajectory
 
     def _at_large_strain(
-        self, solved: Sequence[Solved], progress: Progress
+        self, solved: Sequence[MeshSolution], progress: Progress
     ) -> tuple[LargeStrain | None, str]:
         """Linear beside hyperelastic rest on the scene's own mesh, where strains are large."""
         law, found = self.model.reference.large_strain, solved[-1].found
@@ -216,7 +218,7 @@ class PreparedElements:
             return None, f"No {law} solution at the peak load: {compared}."
         return compared, ""
 
-    def _keep_fields(self, best: Solved, watch: Watch) -> str:
+    def _keep_fields(self, best: MeshSolution, watch: Watch) -> str:
         """Keep the motion of the vertices, if it is wanted; why it cannot be."""
         keeping = watch.keeping
         if keeping is None or keeping.fields is None:
@@ -233,7 +235,7 @@ class PreparedElements:
         return ""
 
     def _record(
-        self, best: Solved, errors: dict[str, CurveErrors], elements: ElementsRecord
+        self, best: MeshSolution, errors: dict[str, CurveErrors], elements: ElementsRecord
     ) -> ModelRecord:
         found, damping = best.found, self.model.damping
         return ModelRecord(
@@ -256,7 +258,10 @@ class PreparedElements:
         )
 
     def _elements(
-        self, solved: Sequence[Solved], error: MeshError | None, strained: LargeStrain | None
+        self,
+        solved: Sequence[MeshSolution],
+        error: DiscretisationError | None,
+        strained: LargeStrain | None,
     ) -> ElementsRecord:
         best, accuracy = solved[-1], self.model.reference.accuracy
         superposed = best.found.superposed
@@ -276,7 +281,7 @@ class PreparedElements:
         )
 
 
-def _level(one: Solved, best: Solved) -> MeshLevel:
+def _level(one: MeshSolution, best: MeshSolution) -> MeshLevel:
     return MeshLevel(
         size=one.level.size / best.level.size,
         elements=one.found.elements,
@@ -285,7 +290,7 @@ def _level(one: Solved, best: Solved) -> MeshLevel:
     )
 
 
-def _subspace_checks(solved: Solved) -> Iterator[Check]:
+def _subspace_checks(solved: MeshSolution) -> Iterator[Check]:
     if solved.found.superposed is not None:
         meaning = "largest relative L2 change of a curve by the last quarter of the subspace"
         error = solved.found.superposed.truncation_error

@@ -10,7 +10,7 @@ from fuzzy.stiffness import Estimate
 from msm.calibration import reference_stiffness
 from msm.damping import eq_2
 from msm.laws import Hooke
-from study.models.control_point import Oscillator, PointSpring
+from study.models.control_point import PointSpring, SpringDashpot
 from study.models.estimates import settings
 from study.models.lattice import LatticeModel
 from study.models.lattice_assumptions import layout, springs
@@ -55,9 +55,9 @@ def _moduli(found: Estimate) -> tuple[float, ...]:
     return (found.estimate, *(found.interval or ()))
 
 
-def _oscillator(modulus: float, zeta: float, problem: PointProblem) -> Oscillator:
+def _oscillator(modulus: float, zeta: float, problem: PointProblem) -> SpringDashpot:
     k = reference_stiffness(modulus, problem.rest_length)
-    return Oscillator(Hooke(k), eq_2(zeta, k, problem.mass), modulus)
+    return SpringDashpot(Hooke(k), eq_2(zeta, k, problem.mass), modulus)
 
 
 def assumptions(scene: Scene) -> list[str]:

@@ -35,7 +35,7 @@ MASS_LIMIT = 0.05
 
 
 @dataclass(frozen=True)
-class Springs:
+class SpringMaterial:
     """What springs are made of: modulus [Pa] and Poisson ratio at small strain, material."""
 
     modulus: float
@@ -43,7 +43,7 @@ class Springs:
     material: Material
 
 
-Make = Callable[[Scene, LatticeMesh], Springs]
+Make = Callable[[Scene, LatticeMesh], SpringMaterial]
 """Springs for a lattice, as a scene and its table `lattice` have them."""
 
 
@@ -113,7 +113,7 @@ class PreparedLattice:
     model: LatticeModel
     problem: Problem
     assembly: Assembly
-    springs: Springs
+    springs: SpringMaterial
 
     @property
     def linear(self) -> bool:

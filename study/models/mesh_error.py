@@ -14,7 +14,7 @@ from fem_reference.discretisation_error import FORMAL_ORDER, Estimate, discretis
 from fem_reference.elasticity import Body
 from study.organ.geometry import Level
 from study.problem.problem import Problem
-from study.results.records import CurveErrors, CurveOrders, MeshError
+from study.results.records import CurveErrors, CurveOrders, DiscretisationError
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ LINEAR_LOCKING = 0.4
 
 
 @dataclass(frozen=True)
-class Solved:
+class MeshSolution:
     """The reference on one mesh."""
 
     level: Level
@@ -33,7 +33,7 @@ class Solved:
     found: fem.Reference
 
 
-def mesh_error(problem: Problem, solved: Sequence[Solved]) -> MeshError | None:
+def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> DiscretisationError | None:
     """Errors of the finest mesh by those before it; none of one mesh, or of elements that lock.
 
     Locked elements approach a wrong solution for long, and seem to have converged. A subspace's
@@ -52,7 +52,7 @@ def mesh_error(problem: Problem, solved: Sequence[Solved]) -> MeshError | None:
             **dict(zip(("displacement", "velocity"), errors, strict=True))
         )
         orders[probe] = CurveOrders(displacement=u.observed, velocity=v.observed)
-    return MeshError(
+    return DiscretisationError(
         field_peak=field.error,
         field_order=field.observed,
         formal_order=FORMAL_ORDER[solved[-1].found.element],
@@ -62,28 +62,28 @@ def mesh_error(problem: Problem, solved: Sequence[Solved]) -> MeshError | None:
 
 
 def _estimate(
-    solved: Sequence[Solved], results: Sequence[Floats], weights: Floats | None = None
+    solved: Sequence[MeshSolution], results: Sequence[Floats], weights: Floats | None = None
 ) -> Estimate:
     sizes = [one.level.size for one in solved]
     return discretisation_error(results, sizes, FORMAL_ORDER[solved[-1].found.element], weights)
 
 
-def _truncation(solved: Solved) -> float:
+def _truncation(solved: MeshSolution) -> float:
     superposed = solved.found.superposed
     return 0.0 if superposed is None else superposed.truncation_error
 
 
-def locks(problem: Problem, solved: Solved) -> bool:
+def locks(problem: Problem, solved: MeshSolution) -> bool:
     """Whether the elements are far too stiff at the tissue's Poisson ratio."""
     return solved.found.element == "p1" and problem.tissue.poisson_ratio > LINEAR_LOCKING
 
 
-def is_too_coarse(accuracy: float | None, error: MeshError | None) -> bool:
+def is_too_coarse(accuracy: float | None, error: DiscretisationError | None) -> bool:
     """Whether an accuracy that is asked for is missed, or not known to be reached."""
     return accuracy is not None and (error is None or error.worst.displacement > accuracy)
 
 
-def next_size(accuracy: float | None, error: MeshError | None) -> float:
+def next_size(accuracy: float | None, error: DiscretisationError | None) -> float:
     """Element size, as a share of the last, at which the accuracy is expected."""
     if error is None or accuracy is None:
         return 1.0
@@ -91,7 +91,7 @@ def next_size(accuracy: float | None, error: MeshError | None) -> float:
     return float(max(excess ** (-1.0 / max(FORMAL_ORDER.values())), LARGEST_JUMP))
 
 
-def why_unknown(problem: Problem, solved: Solved) -> str:
+def why_unknown(problem: Problem, solved: MeshSolution) -> str:
     """What keeps the error from being estimated."""
     if locks(problem, solved):
         return (

@@ -39,7 +39,7 @@ ORDER = 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Superposition:
+class SuperpositionModel:
     """So many Ritz vectors or modes of finite elements, `level` 0 being the scene's mesh."""
 
     element: str
@@ -72,7 +72,7 @@ class Superposition:
 class PreparedSuperposition:
     """The body, and its subspace."""
 
-    model: Superposition
+    model: SuperpositionModel
     problem: Problem
     body: Body
 
@@ -178,10 +178,10 @@ def _modal(body: Body, count: int) -> Subspace:
     return reduce(lambda found, vector: extended(body, found, vector), vectors.T, start)
 
 
-def models(scene: Scene, _: Estimates) -> Iterator[Superposition]:
+def models(scene: Scene, _: Estimates) -> Iterator[SuperpositionModel]:
     """The one superposition of a scene."""
     chosen = scene.superposition
-    yield Superposition(
+    yield SuperpositionModel(
         element=scene.reference.element,
         damping=reference_damping(scene),
         vectors=chosen.vectors,

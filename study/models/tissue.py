@@ -14,20 +14,20 @@ from msm.laws import Hooke, Law, initial_stiffness, piecewise
 from msm.model import Material
 from msm.volume import volume_term
 from study.models.damping import lattice_poisson_ratio, nodal_damping
-from study.models.lattice import LatticeModel, Springs
+from study.models.lattice import LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.scene import Scene
 
 
-def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> Springs:
+def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> SpringMaterial:
     """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""
     nu = lattice_poisson_ratio(scene)
     linear = elastic(mesh, modulus, nu)
     k = initial_stiffness(linear.law)
     law = spring_law(scene, k)
     material = replace(linear, law=law, damping=nodal_damping(scene, modulus))
-    return Springs(modulus * (initial_stiffness(law) / k), nu, material)
+    return SpringMaterial(modulus * (initial_stiffness(law) / k), nu, material)
 
 
 def elastic(mesh: LatticeMesh, modulus: float, nu: float) -> Material:

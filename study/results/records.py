@@ -53,7 +53,7 @@ class MeshLevel:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshError:
+class DiscretisationError:
     """Estimated discretisation error on the finest mesh.
 
     `field_peak`: of the field at the peak; the rest by control point. `formal_order` of the element
@@ -98,7 +98,7 @@ class ElementsRecord:
     truncation_error: float | None = None
     largest_rotation_rad: float = 0.0
     levels: tuple[MeshLevel, ...] = ()
-    mesh_error: MeshError | None = None
+    mesh_error: DiscretisationError | None = None
     accuracy_missed: float | None = None
     large_strain: LargeStrain | None = None
 
@@ -170,7 +170,7 @@ class ModelRecord:
         return None if self.point is None else 1
 
     @property
-    def mesh_error(self) -> MeshError | None:
+    def mesh_error(self) -> DiscretisationError | None:
         """Estimated discretisation error, None where there is none or it is not estimated."""
         return None if self.elements is None else self.elements.mesh_error
 

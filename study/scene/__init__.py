@@ -4,7 +4,7 @@ from study.problem.history import LoadHistory
 from study.problem.tissue import Tissue
 from study.scene.schema import (
     Aetiology,
-    Basafa,
+    BasafaConstants,
     Damping,
     Fuzzy,
     Lattice,
@@ -23,7 +23,7 @@ from study.scene.schema import (
 
 __all__ = [
     "Aetiology",
-    "Basafa",
+    "BasafaConstants",
     "Damping",
     "Fuzzy",
     "Lattice",

@@ -176,7 +176,7 @@ class Damping:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Basafa:
+class BasafaConstants:
     """Table II: constants of eqs. (5)-(9) at `damping.reference_spacing`."""
 
     k1: Annotated[float, Quantity("N", 1e-9, 1e6)] = 0.05
@@ -238,7 +238,7 @@ class Scene:
     fuzzy: Fuzzy = field(default_factory=Fuzzy)
     lattice: Lattice = field(default_factory=Lattice)
     damping: Damping = field(default_factory=Damping)
-    basafa: Basafa = field(default_factory=Basafa)
+    basafa: BasafaConstants = field(default_factory=BasafaConstants)
     reference: Reference = field(default_factory=Reference)
     superposition: Superposition = field(default_factory=Superposition)
     time: Time = field(default_factory=Time)

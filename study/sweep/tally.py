@@ -64,7 +64,7 @@ def silent(_: Tally) -> None:
 
 
 @dataclass
-class Lines:
+class TallyLines:
     """A line at the beginning, at the end, and every so many seconds between."""
 
     name: str
@@ -83,7 +83,7 @@ class Lines:
 def on_stderr(name: str) -> Iterator[Tell]:
     """A bar if stderr is a terminal, else lines."""
     if not sys.stderr.isatty():
-        yield Lines(name)
+        yield TallyLines(name)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn

@@ -70,18 +70,18 @@ def _sha256(path: str) -> str:
 def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
     """The problem of `arguments`, kept for the next run. ValueError if its mesh has changed."""
     # In one order of keys, whichever way it came: control points are numbered by it.
-    return _posed(json.dumps(scene, sort_keys=True), mesh_sha256)
+    return _stated(json.dumps(scene, sort_keys=True), mesh_sha256)
 
 
 @lru_cache(maxsize=2)
-def _posed(scene: str, mesh_sha256: str | None) -> Stated:
+def _stated(scene: str, mesh_sha256: str | None) -> Stated:
     found = validate(json.loads(scene), "scene")
     if found.organ.mesh is not None and _sha256(found.organ.mesh) != mesh_sha256:
         raise ValueError(f"organ.mesh: {found.organ.mesh} has changed since the runs were planned")
-    posed = problem_of(found)
-    rule = over_volume(posed.geometry.mesh, 1)
-    seen = replace(posed.observation, volume_points=rule.points)
-    return Stated(found, replace(posed, volume_rule=rule, observation=seen))
+    problem = problem_of(found)
+    rule = over_volume(problem.geometry.mesh, 1)
+    seen = replace(problem.observation, volume_points=rule.points)
+    return Stated(found, replace(problem, volume_rule=rule, observation=seen))
 
 
 def tidy(value: float) -> float:

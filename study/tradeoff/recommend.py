@@ -21,7 +21,7 @@ from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.runner import How
 from study.sweep.store import Store
-from study.tradeoff import reference, whole
+from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import FRACTION, Configuration, lacks_poisson_ratio
@@ -95,7 +95,7 @@ def recommend(
     """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified."""
     coarser = judged_by(scene)
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
-    outcomes = whole.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
+    outcomes = study.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
     given = stated(**arguments(coarser))
     known = reference.truth(outcomes[0].value or {}, given)
     found = [errors(outcome, known, given) for outcome in outcomes[1:]]
@@ -165,7 +165,7 @@ def _candidates(
 def _costs(given: Stated, spacings: Sequence[float], progress: Progress) -> list[Cost]:
     chosen = [_configuration(given.scene, h) for h in spacings]
     longest = [float("inf")] * len(chosen)  # that at rest is less
-    return whole.costs(given, chosen, longest, QUICK_REPEATS, progress)
+    return study.costs(given, chosen, longest, QUICK_REPEATS, progress)
 
 
 def _frame(cost: Cost, wanted: Demand) -> Frame | None:
@@ -198,11 +198,11 @@ def _verified(
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     chosen = best(candidates, wanted)
     configuration = _configuration(given.scene, chosen.spacing)
-    (_, outcome) = whole.solved(given.scene, [configuration], store, how)
+    (_, outcome) = study.solved(given.scene, [configuration], store, how)
     measured = errors(outcome, known, given)
     (cost,) = _costs(given, [chosen.spacing], progress)
     if outcome.value is not None:
-        cost = replace(cost, step=min(cost.step, whole.step_of(outcome)))
+        cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
     again = _frame(cost, wanted)
     met = chosen.meets(wanted) and measured.status in {"resolved", "not resolved"}
     met = met and (again is None or again.in_time)

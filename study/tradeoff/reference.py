@@ -20,7 +20,7 @@ FUNCTION = f"{__name__}:solve"
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedReference:
     """A reference as plain values: field at the peak and curves of displacement, flat.
 
     An error is the sum of those by the mesh, by the subspace and by the steps of the load; None
@@ -51,7 +51,7 @@ class Truth:
 
 
 def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
-    """The reference of a scene, as plain values of `Solved`."""
+    """The reference of a scene, as plain values of `SolvedReference`."""
     given = stated(scene, mesh_sha256)
     reference = model(given.scene, "fem")
     assert isinstance(reference, FiniteElements)  # noqa: S101 - the model of that name
@@ -62,7 +62,7 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     mesh = elements.mesh_error
     probes = given.problem.probes
     return asdict(
-        Solved(
+        SolvedReference(
             field=plain(run.trajectory.volume_field[0]),
             curves=plain(run.trajectory.displacement),
             field_error=None if mesh is None else mesh.field_peak + rest,
@@ -78,7 +78,7 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
 
 def truth(value: Plain, given: Stated) -> Truth:
     """The reference of a stored value. ValueError if its error is unknown."""
-    found = restored(Solved, value)
+    found = restored(SolvedReference, value)
     if found.field_error is None or found.curve_errors is None:
         raise ValueError(
             "the organ has one mesh only, so the error of its reference is unknown and none of a "

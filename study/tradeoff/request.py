@@ -13,7 +13,7 @@ from study.scene.file import read_scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
 from study.sweep.store import Store
-from study.tradeoff import recommend, table, whole
+from study.tradeoff import recommend, study, table
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.lineup import configurations
 from study.tradeoff.problem import sampled
@@ -21,7 +21,7 @@ from study.tradeoff.timing import QUICK_REPEATS, REPEATS
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class TradeoffRequest:
     """A scene by name or file with overrides, what to write, and where to run."""
 
     scene: str
@@ -52,30 +52,30 @@ class Request:
         return read_scene(self.scene, self.overrides)
 
 
-def planned(request: Request) -> list[str]:
+def planned(request: TradeoffRequest) -> list[str]:
     """What the study would run."""
     scene = sampled(request.read())
     chosen = configurations(scene, request.contenders)
-    return [str(plan(whole.tasks(scene, chosen), _store(request.folder)))]
+    return [str(plan(study.tasks(scene, chosen), _store(request.folder)))]
 
 
-def measure(request: Request, progress: Progress) -> list[str]:
+def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     """Run the study and write its folder; lines for a terminal."""
     scene, folder = sampled(request.read()), request.folder
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
-    found = whole.study(scene, chosen, _store(folder), request.how, repeats, progress)
-    whole.write(found, scene, repeats, folder)
+    found = study.study(scene, chosen, _store(folder), request.how, repeats, progress)
+    study.write(found, scene, repeats, folder)
     own = 100 * (found.reference.field_error or 0.0)
     return [
         *table.lines(found.entries),
         f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %",
-        f"table in {folder / whole.TABLE}",
+        f"table in {folder / study.TABLE}",
     ]
 
 
 def advise(
-    request: Request, rate: str | None, error: str | None, progress: Progress
+    request: TradeoffRequest, rate: str | None, error: str | None, progress: Progress
 ) -> tuple[bool, list[str]]:
     """Whether the demand can be met, and lines; writes the scene if it can."""
     wanted, given = demand(rate, error), request.read()

@@ -24,7 +24,7 @@ from study.tradeoff import observation, reference, table
 from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import Stated, arguments, stated
-from study.tradeoff.reference import Solved, Truth
+from study.tradeoff.reference import SolvedReference, Truth
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns
 
@@ -38,7 +38,7 @@ class Found:
     """Entries of the table, and the reference with the errors of its curves by control point."""
 
     entries: list[Entry]
-    reference: Solved
+    reference: SolvedReference
     curve_errors: dict[str, float]
 
 
@@ -77,7 +77,7 @@ def study(
     known = reference.truth(value, given)
     entries = compared(given, chosen, outcomes[1:], known, repeats, progress, clock)
     by_probe = zip(given.problem.probes, map(float, known.curve_errors), strict=True)
-    return Found(entries, restored(Solved, value), dict(by_probe))
+    return Found(entries, restored(SolvedReference, value), dict(by_probe))
 
 
 def compared(
