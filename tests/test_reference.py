@@ -15,7 +15,8 @@ from fem_reference import model as fem
 from fem_reference import superposition as superposition_module
 from fem_reference.direct import factorised
 from fem_reference.dynamics import Damping
-from fem_reference.elasticity import chosen_element, discretise
+from fem_reference.elasticity import discretise
+from fem_reference.elements import chosen_element
 from fem_reference.iterative import iterative, rigid_motions
 from fem_reference.observation import (
     at_points,

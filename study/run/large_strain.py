@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fem_reference.elasticity import LOCKING, Body
-from fem_reference.hyperelasticity import LawName
+from fem_reference.elasticity import Body
+from fem_reference.elements import LOCKING
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
@@ -41,7 +41,7 @@ def compare_large_strain(
         record["hyperelastic"] = found
 
 
-def _difference(scene: Scene, posed: Problem, body: Body, law: LawName) -> dict[str, Any] | str:
+def _difference(scene: Scene, posed: Problem, body: Body, law: str) -> dict[str, Any] | str:
     """The comparison, or why there is none."""
     if body.element == "taylor-hood":
         return f"elements without a pressure lock at a Poisson ratio above {LOCKING:g}"

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fem_reference import model as fem
-from fem_reference.discretisation_error import FORMAL_ORDER, Estimate, discretisation_error
 from fem_reference.dynamics import ORDER, Damping
 from fem_reference.elasticity import Body
+from fem_reference.elements import ELEMENTS
+from fem_reference.error_estimate import ErrorEstimate, discretisation_error
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -46,8 +47,8 @@ class Solved:
 class Errors:
     """Relative errors of the finest mesh: of each control point's curves by kind, of the field."""
 
-    by_probe: dict[str, dict[str, Estimate]]
-    field: Estimate
+    by_probe: dict[str, dict[str, ErrorEstimate]]
+    field: ErrorEstimate
 
     def worst(self, kind: str) -> float:
         """Largest error of a control point's curve."""
@@ -93,7 +94,8 @@ def _finer(scene: Scene, posed: Problem, last: Level, errors: Errors | None) -> 
     share, found = 1.0, None
     if errors is not None and scene.reference.accuracy is not None:
         excess = errors.worst("displacement") / scene.reference.accuracy
-        share = max(excess ** (-1.0 / max(FORMAL_ORDER.values())), LARGEST_JUMP)
+        order = max(one.formal_order for one in ELEMENTS.values())
+        share = max(excess ** (-1.0 / order), LARGEST_JUMP)
     for level in filter(None, map(posed.geometry.level, range(1, FINER + 1))):
         if level.size < last.size and (found is None or found.size > share * last.size):
             found = level
@@ -175,7 +177,7 @@ def mesh_errors(scene: Scene, posed: Problem, solved: Sequence[Solved]) -> Error
     superposed = solved[-1].found.superposed
     truncated = 0.0 if superposed is None else superposed.truncation_error
     sizes = [one.level.size for one in solved]
-    formal = FORMAL_ORDER[solved[-1].found.element]
+    formal = ELEMENTS[solved[-1].found.element].formal_order
     runs = [one.found.trajectory for one in solved]
     by_probe = {
         probe: {
@@ -192,7 +194,7 @@ def mesh_errors(scene: Scene, posed: Problem, solved: Sequence[Solved]) -> Error
     return Errors(by_probe, discretisation_error(fields, sizes, formal, volumes))
 
 
-def _with(truncated: float, found: Estimate) -> Estimate:
+def _with(truncated: float, found: ErrorEstimate) -> ErrorEstimate:
     return replace(found, error=math.hypot(found.error, truncated))
 
 

@@ -15,7 +15,8 @@ from scipy.linalg import eigh
 
 from fem_reference import model
 from fem_reference.dynamics import ORDER, Damping, March, Oscillator
-from fem_reference.elasticity import Body, ElementName, discretise
+from fem_reference.elasticity import Body, discretise
+from fem_reference.elements import ElementName
 from fem_reference.observation import at_points, evaluation
 from study.known.verification.finding import Finding, convergence
 from study.known.verification.oscillation import factor, response

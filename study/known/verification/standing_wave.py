@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from fem_reference.dynamics import Damping, Oscillator
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ElementName
 from fem_reference.grid import straight
 from fem_reference.model import STEPPING
 from study.known.verification.finding import Finding, observed_order

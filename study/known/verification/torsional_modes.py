@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from scipy.special import spherical_jn
 
 from fem_reference.dynamics import Damping, Oscillator
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ElementName
 from fem_reference.grid import curved
 from fem_reference.stiffness import Stiffness
 from study.known.verification.finding import Finding, observed_order, value
