@@ -11,16 +11,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Damping, Oscillator, hht, march
+from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
 from fem_reference.exchange import calculix
-from fem_reference.exchange.calculix import Motion
+from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed
 from fem_reference.solvers import solve_static
 from study.folders import replacing
 from study.organ.geometry import Level
+from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.results import folder as results
@@ -159,7 +160,7 @@ def _level(posed: Problem, elements: int | None) -> Level:
     )
 
 
-def motion_of(scene: Scene, posed: Problem) -> Motion:
+def motion_of(scene: Scene, posed: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     from study.run.lattices import damping_rates
 
@@ -167,24 +168,24 @@ def motion_of(scene: Scene, posed: Problem) -> Motion:
     count = (len(times) - 1) * scene.reference.steps_per_sample
     factors = posed.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
-    damping = Damping(*damping_rates(scene))
-    return Motion(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
+    damping = RayleighDamping(*damping_rates(scene))
+    return Transient(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
 
 
-def frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+def frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """Times [s] that CalculiX prints of a motion, and the unknowns then."""
     system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
     steps = hht(system, motion.factor, motion.step, motion.count, motion.alpha)
     return _kept(steps, motion)
 
 
-def _own_frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+def _own_frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """The same times in the reference's own steps, mass and quadrature."""
     system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
     return _kept(march(system, motion.factor, motion.step, motion.count), motion)
 
 
-def _kept(steps: Iterator[tuple[Floats, Floats]], motion: Motion) -> list[tuple[float, Floats]]:
+def _kept(steps: Iterator[tuple[Floats, Floats]], motion: Transient) -> list[tuple[float, Floats]]:
     return [(n * motion.step, u) for n, (u, _) in enumerate(steps) if motion.prints(n)]
 
 
@@ -216,7 +217,7 @@ INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration poi
 
 
 def _about_calculix(
-    scene: Scene, given: NodalProblem, motion: Motion, differences: tuple[float, float]
+    scene: Scene, given: NodalProblem, motion: Transient, differences: tuple[float, float]
 ) -> str:
     at_rest, in_motion = differences
     alpha, beta = motion.damping.mass, motion.damping.stiffness

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fem_reference import model as fem
-from fem_reference.dynamics import ORDER, Damping
+from fem_reference.dynamics import ORDER
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
 from fem_reference.error_estimate import ErrorEstimate, discretisation_error
 from study.organ.geometry import Level
+from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.results.fields import Mesh
@@ -40,7 +41,7 @@ class Solved:
 
     level: Level
     body: Body
-    found: fem.Reference
+    found: fem.Solution
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def solved_on(scene: Scene, posed: Problem, level: Level, progress: Progress) ->
     with progress.stage(f"{name}, assembly"):
         body = build(scene, posed, level)
     with progress.stage(name) as advance:
-        damping, method = Damping(*damping_rates(scene)), _method(scene)
+        damping, method = RayleighDamping(*damping_rates(scene)), _method(scene)
         arguments = (body, damping, posed.factor, posed.observation, method)
         return Solved(level, body, fem.run(*arguments, on_progress=advance))
 
@@ -253,7 +254,7 @@ def _add_time_errors(
 ) -> None:
     """The error of the steps is taken on the coarsest mesh, by halving them there."""
     with progress.stage("fem: halved steps") as advance:
-        arguments = (coarsest.body, Damping(*damping_rates(scene)), posed.factor)
+        arguments = (coarsest.body, RayleighDamping(*damping_rates(scene)), posed.factor)
         method = _method(scene, times=2)
         half = fem.run(*arguments, posed.observation, method, advance).trajectory
     whole = coarsest.found.trajectory

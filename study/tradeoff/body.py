@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fem_reference import model as fem
-from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body
+from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.run.lattices import damping_rates
 from study.scene import Scene
@@ -22,6 +22,6 @@ def build(scene: Scene, posed: Problem, element: str, level: int, method: str) -
     return fem.build(found.mesh, scene.tissue, *where, method)
 
 
-def damping(scene: Scene) -> Damping:
+def damping(scene: Scene) -> RayleighDamping:
     """That of the reference."""
-    return Damping(*damping_rates(scene))
+    return RayleighDamping(*damping_rates(scene))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fem_reference import model as fem
-from fem_reference.dynamics import Oscillator, march
+from fem_reference.dynamics import Oscillator, SteppedMotion
 from msm.timestep import whole_steps
 from study.problem.problem import Problem
 from study.scene import Scene
@@ -48,11 +50,9 @@ def prepare(scene: Scene, posed: Problem, settings: Settings) -> Ready:
     body = build(scene, posed, settings["element"], settings["level"], METHOD)
     system = Oscillator(body.mass, body.stiffness, body.load, damping(scene))
     step = 1.0 / settings["rate"]
-    motion = march(system, posed.factor, step, sys.maxsize)
-    u, _ = next(motion)  # rest, and the factors
+    motion = SteppedMotion(system, posed.factor, step)  # at rest, and the factors
 
-    def take_step() -> None:
-        nonlocal u
-        u, _ = next(motion)
+    def displacement() -> NDArray[np.float64]:
+        return motion.displacement.reshape(-1, 3)
 
-    return Ready(take_step, lambda: u.reshape(-1, 3), step, body.stiffness.size)
+    return Ready(motion.take_step, displacement, step, body.stiffness.size)
