@@ -1,7 +1,4 @@
-"""Hyperelastic laws: energy density, stress and tangent of a deformation gradient.
-
-Without finite elements, so that a scene can be read that names a law.
-"""
+"""Hyperelastic laws: energy density, stress and tangent of a deformation gradient."""
 
 from __future__ import annotations
 
