@@ -12,6 +12,7 @@ Earthquake Eng. Struct. Dyn. 5:283.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from scipy.sparse import csc_array
 
 from fem_reference.direct import Solve, factorised
 from fem_reference.stiffness import Stiffness
+from study.problem.damping import RayleighDamping
 
 Floats = NDArray[np.float64]
 March = Callable[
@@ -33,21 +35,13 @@ ALPHA = -0.05
 
 
 @dataclass(frozen=True)
-class Damping:
-    """Rayleigh damping C = mass M + stiffness K, in 1/s and s."""
-
-    mass: float
-    stiffness: float = 0.0
-
-
-@dataclass(frozen=True)
 class Oscillator:
     """M u'' + C u' + K u = factor(t) load."""
 
     mass: csc_array
     stiffness: Stiffness
     load: Floats
-    damping: Damping
+    damping: RayleighDamping
 
     def shifted(self, damped: float, elastic: float) -> Solve:
         """Solution of (M + damped C + elastic K) u = f by factors."""
@@ -114,3 +108,26 @@ def hht(
         u, v = u_hat + step**2 * beta * a, v_hat + step * gamma * a
         before = after
         yield u, v
+
+
+class SteppedMotion:
+    """Motion from rest by steps in time, each of a `step` [s]; the factors are made at the start.
+
+    `factor`: share of the load at times [s]. `displacement` [m] (n,) of all unknowns after the
+    steps taken.
+    """
+
+    def __init__(
+        self,
+        system: Oscillator,
+        factor: Callable[[Floats], Floats],
+        step: float,
+        scheme: March = march,
+    ) -> None:
+        self.step = step
+        self._states = scheme(system, factor, step, sys.maxsize)
+        self.displacement = next(self._states)[0]
+
+    def take_step(self) -> None:
+        """Go one step on, to the displacement there."""
+        self.displacement = next(self._states)[0]

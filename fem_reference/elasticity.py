@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import skfem
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import block_array, csc_array, csr_array, eye_array, kron
 from skfem.models.elasticity import lame_parameters
 
+from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
 from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
@@ -26,16 +27,8 @@ from study.problem.contact import Foundation, ToolPatch
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
-ElementName = Literal["p1", "p2", "taylor-hood"]
-
-ELEMENTS = {"p1": skfem.ElementTetP1, "p2": skfem.ElementTetP2, "taylor-hood": skfem.ElementTetP2}
-CHOICES = ("auto", *ELEMENTS)
-"""Names that `chosen_element` takes."""
-LOCKING = 0.48
-"""Poisson ratio above which a pressure pays: at 0.49 it leaves a seventh of the error."""
-# Degrees that the quadrature integrates: gradients of quadratic functions, their squares; the load
-# and the support vary inside a facet, so more there. Curved cells have no polynomials at all.
-GRADIENT_ORDER = {"p1": 1, "p2": 2, "taylor-hood": 2}
+# Degrees that the quadrature integrates: squares of quadratic functions; the load and the support
+# vary inside a facet, so more there. Gradients in curved cells are no polynomials at all.
 CURVED_ORDER = 4
 MASS_ORDER = 4
 FACET_ORDER = 10
@@ -76,18 +69,8 @@ class Body:
     @cached_property
     def basis(self) -> Any:
         """scikit-fem's basis of displacements, whose unknowns are ordered as those here."""
-        element = skfem.ElementVector(ELEMENTS[self.element]())
+        element = skfem.ElementVector(ELEMENTS[self.element].shapes())
         return skfem.Basis(self.nodes.mesh, element, self.nodes.mapping, intorder=MASS_ORDER)
-
-
-def chosen_element(element: str, poisson_ratio: float) -> ElementName:
-    """The element that is meant: `auto` is quadratic, with a pressure of its own above nu 0.48."""
-    if element == "auto":
-        return "p2" if poisson_ratio <= LOCKING else "taylor-hood"
-    found: dict[str, ElementName] = {"p1": "p1", "p2": "p2", "taylor-hood": "taylor-hood"}
-    if element not in found:
-        raise ValueError(f"reference.element: {element} is not one of auto, {', '.join(found)}")
-    return found[element]
 
 
 def discretise(
@@ -95,7 +78,7 @@ def discretise(
     tissue: Tissue,
     foundation: Foundation,
     tool: ToolPatch,
-    element: str = "auto",
+    element: str = AUTO,
     project: Projection | None = None,
 ) -> Body:
     """Assemble the body.
@@ -107,8 +90,10 @@ def discretise(
     name = chosen_element(element, tissue.poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
     _refuse_flat(mesh)
-    grid = straight(mesh) if project is None or name == "p1" else curved(mesh, project)
-    one = ELEMENTS[name]()
+    kind = ELEMENTS[name]
+    bent = project if kind.quadratic else None
+    grid = straight(mesh) if bent is None else curved(mesh, bent)
+    one = kind.shapes()
     surface = skfem.FacetBasis(grid, one, mapping(grid), intorder=FACET_ORDER)
     support = _by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     if support.nnz == 0 or not support.diagonal().any():
@@ -140,10 +125,11 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
 
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
-    order = CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else GRADIENT_ORDER[name]
-    basis = skfem.Basis(grid, ELEMENTS[name](), mapping(grid), intorder=order)
+    kind = ELEMENTS[name]
+    order = CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else kind.gradient_order
+    basis = skfem.Basis(grid, kind.shapes(), mapping(grid), intorder=order)
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    mixed = name == "taylor-hood" and lame > 0.0  # p = lambda div u says nothing where lambda is 0
+    mixed = kind.mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
     matrix = _interleaved(_blocks(basis, 0.0 if mixed else lame, mu))
     if not mixed:
         return Stiffness(matrix)

@@ -1,4 +1,4 @@
-"""Hyperelasticity at finite strain, total Lagrangian: laws, and the potential energy of a body.
+"""Hyperelasticity at finite strain, total Lagrangian: the potential energy of a body.
 
     Pi(u) = int W(F) dX + u S u / 2 - factor f . u,   F = I + du/dX
 
@@ -9,7 +9,6 @@ and the area of the undeformed body, so that only the tissue's law and geometry 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,127 +16,25 @@ from scipy.sparse import coo_array, csc_array
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elasticity import Body, rows
+from fem_reference.elements import ELEMENTS
+from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LawName = Literal["neo-hookean", "st-venant-kirchhoff"]
 
-IDENTITY = np.eye(3)
-
-
-class Law(Protocol):
-    """Energy density of a deformation gradient F (..., 3, 3) and its derivatives by it [Pa]."""
-
-    def energy(self, F: Floats) -> Floats:
-        """W, shape (...)."""
-
-    def stress(self, F: Floats) -> Floats:
-        """First Piola-Kirchhoff stress P = dW/dF, shape (..., 3, 3)."""
-
-    def tangent(self, F: Floats) -> Floats:
-        """A_iJkL = dP_iJ/dF_kL, shape (..., 3, 3, 3, 3)."""
-
-
-@dataclass(frozen=True)
-class NeoHookean:
-    """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2, with Lame's constants [Pa].
-
-    Bonet and Wood (2008), section 6.4.3. Of the compressible forms the one most codes share, so
-    that others can repeat the numbers; it is linear elasticity at small strain and resists a volume
-    squeezed to nothing without bound. (ln J)^2 stops being convex at J = e, which tissue with a
-    Poisson ratio near 1/2 does not come near.
-    """
-
-    lame: float
-    shear: float
-
-    def energy(self, F: Floats) -> Floats:
-        """Energy density."""
-        log_volume = np.log(np.linalg.det(F))
-        square = (F**2).sum(axis=(-2, -1))
-        return np.asarray(
-            0.5 * self.shear * (square - 3.0)
-            - self.shear * log_volume
-            + 0.5 * self.lame * log_volume**2
-        )
-
-    def stress(self, F: Floats) -> Floats:
-        """P = mu F + (lambda ln J - mu) F^-T."""
-        pressure = self.lame * np.log(np.linalg.det(F)) - self.shear
-        return np.asarray(self.shear * F + pressure[..., None, None] * _inverse_transpose(F))
-
-    def tangent(self, F: Floats) -> Floats:
-        """d(F^-T)_iJ / dF_kL = -F^-T_iL F^-T_kJ does the rest."""
-        G = _inverse_transpose(F)
-        pressure = self.lame * np.log(np.linalg.det(F)) - self.shear
-        return np.asarray(
-            self.shear * np.einsum("ik,JL->iJkL", IDENTITY, IDENTITY)
-            + self.lame * np.einsum("...iJ,...kL->...iJkL", G, G)
-            - pressure[..., None, None, None, None] * np.einsum("...iL,...kJ->...iJkL", G, G)
-        )
-
-
-@dataclass(frozen=True)
-class StVenantKirchhoff:
-    """W = lambda/2 (tr E)^2 + mu E : E of the Green-Lagrange strain E = (C - I)/2.
-
-    Hooke's law for large rotations. For small strains only: squeezed along one axis it softens and
-    gives way at a stretch of 1/sqrt(3), and a volume squeezed to nothing costs a finite energy.
-    """
-
-    lame: float
-    shear: float
-
-    def energy(self, F: Floats) -> Floats:
-        """Energy density."""
-        strain = _green_lagrange(F)
-        volume = np.trace(strain, axis1=-2, axis2=-1)
-        return np.asarray(0.5 * self.lame * volume**2 + self.shear * (strain**2).sum(axis=(-2, -1)))
-
-    def stress(self, F: Floats) -> Floats:
-        """P = F S."""
-        return np.asarray(F @ self._second_stress(F))
-
-    def tangent(self, F: Floats) -> Floats:
-        """Of F at fixed S, and of S, which is linear in E."""
-        left = F @ np.swapaxes(F, -2, -1)
-        return np.asarray(
-            np.einsum("ik,...JL->...iJkL", IDENTITY, self._second_stress(F))
-            + self.lame * np.einsum("...iJ,...kL->...iJkL", F, F)
-            + self.shear * np.einsum("...iL,...kJ->...iJkL", F, F)
-            + self.shear * np.einsum("...ik,JL->...iJkL", left, IDENTITY)
-        )
-
-    def _second_stress(self, F: Floats) -> Floats:
-        strain = _green_lagrange(F)
-        volume = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
-        return np.asarray(self.lame * volume * IDENTITY + 2.0 * self.shear * strain)
-
-
-def _inverse_transpose(F: Floats) -> Floats:
-    return np.swapaxes(np.linalg.inv(F), -2, -1)
-
-
-def _green_lagrange(F: Floats) -> Floats:
-    return np.asarray(0.5 * (np.swapaxes(F, -2, -1) @ F - IDENTITY))
-
-
-def material(tissue: Tissue, law: LawName | Law) -> Law:
+def material(tissue: Tissue, law: str | Law) -> Law:
     """The tissue's Lame constants in a law, or the law given. ValueError for an unknown name."""
     if not isinstance(law, str):
         return law
-    constants = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    if law == "neo-hookean":
-        return NeoHookean(*constants)
-    if law == "st-venant-kirchhoff":
-        return StVenantKirchhoff(*constants)
-    raise ValueError(f"law: {law!r} is unknown; give neo-hookean or st-venant-kirchhoff")
+    if law not in LAWS:
+        raise ValueError(f"law: {law!r} is unknown; give {' or '.join(LAWS)}")
+    return LAWS[law](*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
 
 
 @dataclass(frozen=True)
-class Solid:
+class HyperelasticSolid:
     """The strain and support energy of a body as a function of its displacement u [m] (n,).
 
     `slopes` (t, q, 3, a): derivatives [1/m] of the a shape functions of tetrahedron t at its
@@ -201,12 +98,12 @@ def _element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
     return found.reshape(-1, 3 * count, 3 * count)
 
 
-def solid(body: Body, tissue: Tissue, law: LawName | Law = "neo-hookean") -> Solid:
+def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticSolid:
     """The body's elements, support and load with a law in place of Hooke's.
 
     ValueError for an unknown law, or for a body with a pressure field of its own.
     """
-    if body.element == "taylor-hood":
+    if ELEMENTS[body.element].mixed:
         raise ValueError(
             "hyperelasticity is in displacements alone; discretise with element 'p2', which is "
             "good to a Poisson ratio of 0.49"
@@ -214,7 +111,9 @@ def solid(body: Body, tissue: Tissue, law: LawName | Law = "neo-hookean") -> Sol
     nodes = body.nodes
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
-    return Solid(material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.load)
+    return HyperelasticSolid(
+        material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.load
+    )
 
 
 def largest_log_strain(F: Floats) -> float:

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import LinearOperator, cg, minres
 
 from fem_reference.direct import IMBALANCE, Solve, factorised
 from fem_reference.elasticity import Body
+from fem_reference.elements import ELEMENTS
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ FACTORED_BELOW = 6_000
 def preconditioner(body: Body) -> Solve:
     """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
     matrix = csr_array(body.stiffness.matrix)
-    if body.element == "p1":
+    if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
     prolong = csr_array(kron(_from_vertices(body.nodes.mesh, body.node_count), eye_array(3)))
     vertices = prolong.shape[1] // 3

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 
-from fem_reference.elasticity import chosen_element
+from fem_reference.elements import ELEMENTS, chosen_element
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import edges
 from study.problem.tissue import Tissue
 
-BYTES_PER_UNKNOWN = {"p1": 30_000, "p2": 10_000, "taylor-hood": 13_000}
-"""At the peak of assembly and iterative solution, measured at 20 000 to 100 000 unknowns."""
 FACTORS = 15.0
 """Bytes of the factors are this times unknowns^(5/3), measured at 20 000 and 43 000."""
 SHARE = 0.7
@@ -19,16 +17,15 @@ SHARE = 0.7
 
 def unknowns(mesh: TetrahedralMesh, element: str) -> int:
     """Unknowns of the body on a mesh, displacements and pressures."""
-    vertices = len(mesh.points)
-    if element == "p1":
-        return 3 * vertices
-    pressures = vertices if element == "taylor-hood" else 0
-    return 3 * (vertices + len(edges(mesh.tetrahedra))) + pressures
+    kind, vertices = ELEMENTS[element], len(mesh.points)
+    middles = len(edges(mesh.tetrahedra)) if kind.quadratic else 0
+    return 3 * (vertices + middles) + (vertices if kind.mixed else 0)
 
 
 def needed(count: int, element: str, *, stepping: bool) -> float:
     """Bytes for so many unknowns; stepping in time factors the matrix."""
-    return BYTES_PER_UNKNOWN[element] * count + (FACTORS * count ** (5.0 / 3.0) if stepping else 0)
+    assembled = ELEMENTS[element].bytes_per_unknown * count
+    return assembled + (FACTORS * count ** (5.0 / 3.0) if stepping else 0)
 
 
 def available() -> float:

@@ -5,20 +5,32 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Damping, March, Oscillator, hht, march
+from fem_reference.dynamics import March, Oscillator, hht, march
 from fem_reference.elasticity import Body, discretise
+from fem_reference.elements import AUTO
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
 from fem_reference.recording import Recorder
 from fem_reference.solvers import solve_static
-from fem_reference.superposition import Superposed, superposed
+from fem_reference.subspace import Subspace
+from fem_reference.superposition import (
+    LOAD_STEPS,
+    Posing,
+    Superposed,
+    enough_modes,
+    enough_ritz_vectors,
+    posing,
+    superposed,
+)
 from study.mesh.kinds import TetrahedralMesh
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation, Trajectory
 
@@ -26,21 +38,20 @@ Floats = NDArray[np.float64]
 Factor = Callable[[Floats], Floats]
 Advance = Callable[[float], None]
 
-STEPPING: dict[str, March] = {"tr-bdf2": march, "hht-alpha": hht}
-METHODS = ("ritz-vectors", "modal", *STEPPING)
+DEFAULT = "ritz-vectors"
 
 
 @dataclass(frozen=True)
 class Method:
     """How the motion is found: a name of `METHODS`, steps per sample, modes of `modal`."""
 
-    name: str = "ritz-vectors"
+    name: str = DEFAULT
     steps_per_sample: int = 1
     modes: int = 100
 
 
 @dataclass(frozen=True)
-class Reference:
+class Solution:
     """Trajectory with what it took; `wall` [s] has the solution in it, not the assembly.
 
     `time_step` [s] and `steps`: for a superposition those of the load. `superposed`: how a
@@ -66,14 +77,97 @@ class Reference:
         return solve_static(body) if self.superposed is None else self.superposed.subspace.rest()
 
 
+class MotionMethod(Protocol):
+    """A way to find the motion of a body from rest, an entry of `METHODS`."""
+
+    def solution(
+        self,
+        body: Body,
+        damping: RayleighDamping,
+        factor: Factor,
+        recorder: Recorder,
+        method: Method,
+        advance: Advance,
+    ) -> Solution:
+        """The motion under `factor` times the body's load, as the recorder observes it."""
+
+
+@dataclass(frozen=True)
+class TimeSteps:
+    """Implicit steps in time by a scheme, which factors a matrix of all unknowns."""
+
+    scheme: March
+
+    def solution(
+        self,
+        body: Body,
+        damping: RayleighDamping,
+        factor: Factor,
+        recorder: Recorder,
+        method: Method,
+        advance: Advance,
+    ) -> Solution:
+        """Motion by steps of equal length, a whole number of them per sample."""
+        times, every = recorder.observation.times, method.steps_per_sample
+        step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
+        system = Oscillator(body.mass, body.stiffness, body.load, damping)
+        started, seen = time.perf_counter(), recorder.at_probes
+        for n, (u, v) in enumerate(self.scheme(system, factor, step, count)):
+            if n % every == 0:
+                recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
+                recorder.field(n // every, u)
+                advance(n / count)
+        return _solution(body, recorder, step, count, time.perf_counter() - started)
+
+
+@dataclass(frozen=True)
+class Superposition:
+    """Superposition of the modes of a subspace that `choose` makes as large as it takes."""
+
+    choose: Callable[[Body, Posing, int, Advance], Subspace]
+
+    def solution(
+        self,
+        body: Body,
+        damping: RayleighDamping,
+        factor: Factor,
+        recorder: Recorder,
+        method: Method,
+        advance: Advance,
+    ) -> Solution:
+        """Motion in the subspace, and where a control point is farthest out its strain."""
+        started = time.perf_counter()
+        posed = posing(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
+        found = superposed(posed, self.choose(body, posed, method.modes, advance))
+        wall = time.perf_counter() - started
+        for sample in range(len(recorder.observation.times)):
+            recorder.motion(sample, *(curve[sample] for curve in found.curves))
+        for frame in set(recorder.observation.frames):
+            recorder.field(frame, found.state(frame)[0])
+        farthest = np.linalg.norm(found.curves.displacement, axis=2).max(axis=1).argmax()
+        recorder.look(found.state(int(farthest))[0])
+        seen = _solution(body, recorder, found.time_step, found.steps, wall)
+        return replace(seen, superposed=found)
+
+
+METHODS: dict[str, MotionMethod] = {
+    "ritz-vectors": Superposition(enough_ritz_vectors),
+    "modal": Superposition(enough_modes),
+    "tr-bdf2": TimeSteps(march),
+    "hht-alpha": TimeSteps(hht),
+}
+STEPPING = {name: one.scheme for name, one in METHODS.items() if isinstance(one, TimeSteps)}
+"""Schemes of those that step in time."""
+
+
 def build(
     mesh: TetrahedralMesh,
     tissue: Tissue,
     foundation: Foundation,
     tool: ToolPatch,
-    element: str = "auto",
+    element: str = AUTO,
     project: Projection | None = None,
-    method: str = METHODS[0],
+    method: str = DEFAULT,
 ) -> Body:
     """Discretised body. ValueError, before anything is assembled, if memory does not hold it."""
     refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
@@ -82,19 +176,17 @@ def build(
 
 def run(
     body: Body,
-    damping: Damping,
+    damping: RayleighDamping,
     factor: Factor,
     observation: Observation,
     method: Method = Method(),
     on_progress: Advance = lambda _: None,
-) -> Reference:
-    """Motion from rest."""
+) -> Solution:
+    """Motion from rest under `factor` of the body's load. ValueError for an unknown method."""
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
-    recorder = Recorder(body, observation)
-    if method.name in STEPPING:
-        return _stepped(body, damping, factor, recorder, method, on_progress)
-    return _superposed(body, damping, factor, recorder, method, on_progress)
+    recorded = (Recorder(body, observation), method, on_progress)
+    return METHODS[method.name].solution(body, damping, factor, *recorded)
 
 
 def static_field(body: Body, points: Floats) -> Floats:
@@ -102,49 +194,7 @@ def static_field(body: Body, points: Floats) -> Floats:
     return at_points(evaluation(body, points), solve_static(body))
 
 
-def _stepped(
-    body: Body,
-    damping: Damping,
-    factor: Factor,
-    recorder: Recorder,
-    method: Method,
-    advance: Advance,
-) -> Reference:
-    times, every = recorder.observation.times, method.steps_per_sample
-    step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
-    system = Oscillator(body.mass, body.stiffness, body.load, damping)
-    started, seen = time.perf_counter(), recorder.at_probes
-    for n, (u, v) in enumerate(STEPPING[method.name](system, factor, step, count)):
-        if n % every == 0:
-            recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
-            recorder.field(n // every, u)
-            advance(n / count)
-    return _reference(body, recorder, step, count, time.perf_counter() - started)
-
-
-def _superposed(
-    body: Body,
-    damping: Damping,
-    factor: Factor,
-    recorder: Recorder,
-    method: Method,
-    advance: Advance,
-) -> Reference:
-    modes = method.modes if method.name == "modal" else None
-    started = time.perf_counter()
-    found = superposed(body, damping, factor, recorder, method.steps_per_sample, modes, advance)
-    wall = time.perf_counter() - started
-    for sample in range(len(recorder.observation.times)):
-        recorder.motion(sample, *(curve[sample] for curve in found.curves))
-    for frame in set(recorder.observation.frames):
-        recorder.field(frame, found.state(frame)[0])
-    farthest = np.linalg.norm(found.curves.displacement, axis=2).max(axis=1).argmax()
-    recorder.look(found.state(int(farthest))[0])
-    seen = _reference(body, recorder, found.time_step, found.steps, wall)
-    return replace(seen, superposed=found)
-
-
-def _reference(body: Body, recorder: Recorder, step: float, steps: int, wall: float) -> Reference:
+def _solution(body: Body, recorder: Recorder, step: float, steps: int, wall: float) -> Solution:
     sizes = body.node_count, len(body.mesh.tetrahedra), body.element
     seen = recorder.strain, recorder.rotation
-    return Reference(recorder.trajectory, *sizes, step, steps, wall, *seen)
+    return Solution(recorder.trajectory, *sizes, step, steps, wall, *seen)

@@ -16,7 +16,8 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from fem_reference.elasticity import Body
-from fem_reference.hyperelasticity import Law, LawName, Solid, largest_log_strain, solid
+from fem_reference.hyperelasticity import HyperelasticSolid, largest_log_strain, solid
+from fem_reference.laws import DEFAULT, Law
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -90,7 +91,7 @@ class _Rest:
 def solve(
     body: Body,
     tissue: Tissue,
-    law: LawName | Law = "neo-hookean",
+    law: str | Law = DEFAULT,
     load_factors: Sequence[float] = (1.0,),
 ) -> Path:
     """States of rest under multiples of the body's load, reached from none in the order given.
@@ -110,7 +111,7 @@ def solve(
     return Path(tuple(states), at.load_factor, "")
 
 
-def _state(problem: Solid, at: _Rest, iterations: int) -> State:
+def _state(problem: HyperelasticSolid, at: _Rest, iterations: int) -> State:
     u = at.displacement
     F = problem.deformation(u)
     return State(
@@ -124,7 +125,7 @@ def _state(problem: Solid, at: _Rest, iterations: int) -> State:
     )
 
 
-def _load_up(problem: Solid, at: _Rest, target: float) -> tuple[_Rest, int, str]:
+def _load_up(problem: HyperelasticSolid, at: _Rest, target: float) -> tuple[_Rest, int, str]:
     """The rest at the target, or the last before it, the iterations spent, and why it ended."""
     increment, iterations = target - at.load_factor, 0
     while at.load_factor != target:
@@ -142,7 +143,7 @@ def _load_up(problem: Solid, at: _Rest, target: float) -> tuple[_Rest, int, str]
     return at, iterations, ""
 
 
-def _rest(problem: Solid, start: Floats, factor: float) -> _Rest:
+def _rest(problem: HyperelasticSolid, start: Floats, factor: float) -> _Rest:
     """Newton's method at one load."""
     load, u = factor * problem.load, start
     residuals: list[float] = []
@@ -164,7 +165,9 @@ def _rest(problem: Solid, start: Floats, factor: float) -> _Rest:
     return _Rest(factor, u, tuple(residuals), failure)
 
 
-def _step_length(problem: Solid, load: Floats, u: Floats, direction: Floats, pull: float) -> float:
+def _step_length(
+    problem: HyperelasticSolid, load: Floats, u: Floats, direction: Floats, pull: float
+) -> float:
     """Largest of 1, 1/2, 1/4, ... of Newton's step that the body can take; 0 if there is none.
 
     No element may turn inside out, and the unbalanced forces may not turn against the step by more

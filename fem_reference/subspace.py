@@ -8,8 +8,10 @@ Yuan and Dickens (1982), Earthquake Eng. Struct. Dyn. 10:813.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, partial, reduce
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,14 @@ from scipy.linalg import eigh, expm
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem_reference.direct import Solve
-from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body
+from fem_reference.solvers import solver
+from study.problem.damping import RayleighDamping
 
 Floats = NDArray[np.float64]
+
+LOOSE = 1e-2
+"""Residual of all Ritz vectors but the first: any vector serves, what is projected is exact."""
 
 
 @dataclass(frozen=True)
@@ -71,27 +77,97 @@ def extended(body: Body, found: Subspace, vector: Floats) -> Subspace:
     )
 
 
-def superposition(
-    subspace: Subspace, damping: Damping, factor: Callable[[Floats], Floats], times: Floats
-) -> tuple[Floats, Floats]:
-    """Coordinates and their rates (times, m) in the subspace, from rest.
+def ritz_subspaces(body: Body) -> Iterator[Subspace]:
+    """Of one load-dependent Ritz vector, of two, and so on without end."""
+    found = extended(body, empty(body.stiffness.size), solver(body)(body.load))
+    yield found
+    loose = solver(body, LOOSE)
+    while True:
+        found = extended(body, found, loose(body.mass @ found.vectors[:, -1]))
+        yield found
 
-    Each mode is integrated exactly under a load that is linear between the times, equally spaced.
+
+def ritz_subspace(body: Body, count: int) -> Subspace:
+    """The first `count` load-dependent Ritz vectors. ValueError if the body finds no rest."""
+    if count < 1:
+        raise ValueError(f"{count} Ritz vectors span nothing; give 1 or more")
+    return next(islice(ritz_subspaces(body), count - 1, None))
+
+
+def modal_subspace(body: Body, count: int) -> Subspace:
+    """The static displacement and the `count` lowest modes, or as many as the body has.
+
+    ValueError if the body finds no rest.
     """
-    rates, Q = eigh(subspace.stiffness)
-    step, load = float(times[1] - times[0]), Q.T @ subspace.load
-    moved, f = _transitions(rates, damping, step), factor(times)
-    y = np.zeros((len(times), len(rates), 2))
-    for n in range(len(times) - 1):
-        state = np.stack([*y[n].T, load * f[n], load * (f[n + 1] - f[n]) / step], axis=1)
-        y[n + 1] = np.einsum("mij,mj->mi", moved, state)[:, :2]
-    return y[..., 0] @ Q.T, y[..., 1] @ Q.T
+    size = body.stiffness.size
+    vectors = eigenvectors(body, solver(body), min(count, size - 2))
+    return reduce(partial(extended, body), vectors.T, empty(size))
 
 
-def _transitions(rates: Floats, damping: Damping, step: float) -> Floats:
-    """Of displacement, velocity, load and its slope over one step, (m, 4, 4)."""
-    system = np.zeros((len(rates), 4, 4))
-    system[:, 0, 1] = system[:, 1, 2] = system[:, 2, 3] = 1.0
-    system[:, 1, 0] = -rates
-    system[:, 1, 1] = -(damping.mass + damping.stiffness * rates)
-    return np.asarray(expm(step * system))
+class SubspaceMotion:
+    """Motion from rest in a subspace, exact under a load that is linear over a `step` [s].
+
+    `factor`: share of the body's load at times [s]. `displacement` [m] (n,) of all unknowns after
+    the steps taken. `state` (m, 4): displacement, velocity, load and its slope of each mode of the
+    subspace, whose coordinates there are the columns of `modes` (m, m).
+    """
+
+    def __init__(
+        self,
+        subspace: Subspace,
+        damping: RayleighDamping,
+        factor: Callable[[Floats], Floats],
+        step: float,
+    ) -> None:
+        squares, self.modes = eigh(subspace.stiffness)
+        self.subspace, self.factor, self.step, self.time = subspace, factor, step, 0.0
+        self.state = np.zeros((len(squares), 4))
+        self.displacement = np.zeros(len(subspace.vectors))
+        self._load = self.modes.T @ subspace.load
+        self._moved = transitions(squares, damping, step)
+
+    @cached_property
+    def _shapes(self) -> Floats:
+        return np.asarray(self.subspace.vectors @ self.modes)
+
+    def take_step(self) -> None:
+        """Go one step on, to the displacement there."""
+        self.advance(*self.factor(np.array([self.time, self.time + self.step])))
+        self.time += self.step
+        self.displacement = self._shapes @ self.state[:, 0]
+
+    def advance(self, before: float, after: float) -> None:
+        """Take the state over a step with so much of the load at its start and its end."""
+        state = self.state
+        state[:, 2], state[:, 3] = self._load * before, self._load * (after - before) / self.step
+        state[:, :2] = np.einsum("mij,mj->mi", self._moved, state)[:, :2]
+
+
+def superposition(
+    subspace: Subspace,
+    damping: RayleighDamping,
+    factor: Callable[[Floats], Floats],
+    times: Floats,
+) -> tuple[Floats, Floats]:
+    """Coordinates and their rates (times, m) in the subspace, from rest, at equally spaced times.
+
+    Each mode is integrated exactly under a load that is linear between the times.
+    """
+    motion = SubspaceMotion(subspace, damping, factor, float(times[1] - times[0]))
+    y = np.zeros((len(times), len(motion.state), 2))
+    for n, (before, after) in enumerate(pairwise(factor(times)), start=1):
+        motion.advance(before, after)
+        y[n] = motion.state[:, :2]
+    return y[..., 0] @ motion.modes.T, y[..., 1] @ motion.modes.T
+
+
+def transitions(squares: Floats, damping: RayleighDamping, step: float) -> Floats:
+    """Of displacement, velocity, load and its slope over a step [s], (m, 4, 4), by mode.
+
+    `squares` [1/s^2] (m,): squared angular frequencies; exact for a load that is linear over the
+    step.
+    """
+    rate = np.zeros((len(squares), 4, 4))
+    rate[:, [0, 1, 2], [1, 2, 3]] = 1.0
+    rate[:, 1, 0], rate[:, 1, 1] = -squares, -(damping.mass + damping.stiffness * squares)
+    return np.asarray(expm(step * rate))

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial, reduce
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body
+from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
-from fem_reference.solvers import solver
-from fem_reference.subspace import Subspace, eigenvectors, empty, extended, superposition
+from fem_reference.subspace import Subspace, modal_subspace, ritz_subspaces, superposition
+from study.problem.damping import RayleighDamping
+from study.problem.trajectory import Observation, Trajectory
 
 Floats = NDArray[np.float64]
 Factor = Callable[[Floats], Floats]
@@ -28,11 +29,9 @@ MAX_VECTORS = 80
 TINY = 1e-300
 TRUNCATION = 1e-3
 """Relative L2 change of a control point's motion by the last vectors, at which there are enough."""
-LOOSE = 1e-2
-"""Residual of all Ritz vectors but the first: any vector serves, what is projected is exact."""
 
 
-class Curves(NamedTuple):
+class ProbeCurves(NamedTuple):
     """Displacement [m] and velocity [m/s] of the control points, (samples, probes, 3)."""
 
     displacement: Floats
@@ -50,7 +49,7 @@ class Superposed:
     subspace: Subspace
     coordinates: Floats
     rates: Floats
-    curves: Curves
+    curves: ProbeCurves
     truncation_error: float
     time_step: float
     steps: int
@@ -68,7 +67,7 @@ class Posing:
     Every `every`-th of the times is a sample; `at_probes` takes nodal values to control points.
     """
 
-    damping: Damping
+    damping: RayleighDamping
     factor: Factor
     times: Floats
     every: int
@@ -79,11 +78,13 @@ class Posing:
         y, rate = superposition(subspace, self.damping, self.factor, self.times)
         return y[:: self.every], rate[:: self.every]
 
-    def curves(self, subspace: Subspace) -> Curves:
+    def curves(self, subspace: Subspace) -> ProbeCurves:
         """The motion of the control points."""
         nodes, m = self.at_probes.shape[1], subspace.load.size
         shapes = (self.at_probes @ subspace.vectors.reshape(nodes, 3 * m)).reshape(-1, 3, m)
-        return Curves(*(np.einsum("pdm,tm->tpd", shapes, y) for y in self.coordinates(subspace)))
+        return ProbeCurves(
+            *(np.einsum("pdm,tm->tpd", shapes, y) for y in self.coordinates(subspace))
+        )
 
     def change(self, subspace: Subspace) -> float:
         """Largest relative L2 change of a curve by the last quarter of the vectors."""
@@ -96,43 +97,57 @@ class Posing:
         )
 
 
-def superposed(
-    body: Body,
-    damping: Damping,
-    factor: Factor,
-    recorder: Recorder,
-    steps_per_sample: int,
-    modes: int | None,
-    advance: Advance,
-) -> Superposed:
-    """Motion by so many modes of vibration, or by as many Ritz vectors as it takes."""
-    samples, every = recorder.observation.times, LOAD_STEPS * steps_per_sample
+def posing(damping: RayleighDamping, factor: Factor, recorder: Recorder, every: int) -> Posing:
+    """That of a recorder's samples, with so many steps of the load in each."""
+    samples = recorder.observation.times
     times = np.linspace(samples[0], samples[-1], (len(samples) - 1) * every + 1)
-    posing = Posing(damping, factor, times, every, recorder.at_probes)
-    subspace = _ritz(body, posing, advance) if modes is None else _modal(body, modes)
+    return Posing(damping, factor, times, every, recorder.at_probes)
+
+
+def superposed(posed: Posing, subspace: Subspace) -> Superposed:
+    """Motion in a subspace."""
     return Superposed(
         subspace,
-        *posing.coordinates(subspace),
-        posing.curves(subspace),
-        posing.change(subspace),
-        float(times[1] - times[0]),
-        len(times) - 1,
+        *posed.coordinates(subspace),
+        posed.curves(subspace),
+        posed.change(subspace),
+        float(posed.times[1] - posed.times[0]),
+        len(posed.times) - 1,
     )
 
 
-def _modal(body: Body, modes: int) -> Subspace:
-    vectors = eigenvectors(body, solver(body), min(modes, body.stiffness.size - 2))
-    return reduce(partial(extended, body), vectors.T, empty(body.stiffness.size))
+def subspace_trajectory(
+    body: Body,
+    subspace: Subspace,
+    damping: RayleighDamping,
+    factor: Factor,
+    observation: Observation,
+    steps_per_sample: int,
+) -> Trajectory:
+    """What is observed of a body's motion in a given subspace, by so many steps of the load."""
+    recorder = Recorder(body, observation)
+    seen, V = recorder.at_probes, subspace.vectors
+    coordinates = posing(damping, factor, recorder, steps_per_sample).coordinates(subspace)
+    for sample, (y, rate) in enumerate(zip(*coordinates, strict=True)):
+        u, v = V @ y, V @ rate
+        recorder.motion(sample, at_points(seen, u), at_points(seen, v))
+        recorder.field(sample, u)
+    return recorder.trajectory
 
 
-def _ritz(body: Body, posing: Posing, advance: Advance) -> Subspace:
+def enough_modes(body: Body, posed: Posing, modes: int, advance: Advance) -> Subspace:
+    """So many modes of vibration."""
+    del posed, advance
+    return modal_subspace(body, modes)
+
+
+def enough_ritz_vectors(body: Body, posed: Posing, modes: int, advance: Advance) -> Subspace:
     """Load-dependent Ritz vectors, until the last ones change little."""
-    found = extended(body, empty(body.stiffness.size), solver(body)(body.load))
-    loose, limit = solver(body, LOOSE), min(MAX_VECTORS, body.stiffness.size)
-    change = np.inf
+    del modes
+    growing, limit = ritz_subspaces(body), min(MAX_VECTORS, body.stiffness.size)
+    found, change = next(growing), np.inf
     while found.load.size < limit and change > TRUNCATION:
-        for _ in range(min(GROWTH, limit - found.load.size)):
-            found = extended(body, found, loose(body.mass @ found.vectors[:, -1]))
-        change = posing.change(found)
+        *_, found = islice(growing, min(GROWTH, limit - found.load.size))
+        change = posed.change(found)
         advance(found.load.size / limit)
     return found

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
 from fem_reference.exchange import calculix
-from fem_reference.exchange.calculix import Motion
+from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed
@@ -163,30 +163,30 @@ def _level(problem: Problem, elements: int | None) -> Level:
     )
 
 
-def motion_of(scene: Scene, problem: Problem) -> Motion:
+def motion_of(scene: Scene, problem: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     times = problem.observation.times
     count = (len(times) - 1) * scene.reference.steps_per_sample
     factors = problem.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping
-    return Motion(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
+    return Transient(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
 
 
-def frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+def frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """Times [s] that CalculiX prints of a motion, and the unknowns then."""
     system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
     steps = hht(system, motion.factor, motion.step, motion.count, motion.alpha)
     return _kept(steps, motion)
 
 
-def _own_frames(body: Body, motion: Motion) -> list[tuple[float, Floats]]:
+def _own_frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """The same times in the reference's own steps, mass and quadrature."""
     system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
     return _kept(march(system, motion.factor, motion.step, motion.count), motion)
 
 
-def _kept(steps: Iterator[tuple[Floats, Floats]], motion: Motion) -> list[tuple[float, Floats]]:
+def _kept(steps: Iterator[tuple[Floats, Floats]], motion: Transient) -> list[tuple[float, Floats]]:
     return [(n * motion.step, u) for n, (u, _) in enumerate(steps) if motion.prints(n)]
 
 
@@ -218,7 +218,7 @@ INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration poi
 
 
 def _about_calculix(
-    scene: Scene, given: NodalProblem, motion: Motion, differences: tuple[float, float]
+    scene: Scene, given: NodalProblem, motion: Transient, differences: tuple[float, float]
 ) -> str:
     at_rest, in_motion = differences
     alpha, beta = motion.damping.mass, motion.damping.stiffness

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fem_reference.discretisation_error import (
-    FORMAL_ORDER,
+from fem_reference.elements import ELEMENTS
+from fem_reference.error_estimate import (
     SAFETY,
     SAFETY_ASSUMED,
     discretisation_error,
@@ -36,7 +36,7 @@ def test_an_order_above_the_formal_one_is_not_believed():
     """Of a coarse start; the estimate then stays above the true error."""
     sizes = (0.4, 0.2, 0.1)
     results = sequence(sizes, 5.0)
-    found = discretisation_error(results, sizes, FORMAL_ORDER["p2"])
+    found = discretisation_error(results, sizes, ELEMENTS["p2"].formal_order)
     assert found.observed == pytest.approx(5.0)
     assert found.error == pytest.approx(SAFETY_ASSUMED * true_error(results) * 31 / 7)
 

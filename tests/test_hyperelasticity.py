@@ -9,14 +9,10 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import spsolve
 
+from fem_reference import laws
 from fem_reference.elasticity import discretise
-from fem_reference.hyperelasticity import (
-    NeoHookean,
-    StVenantKirchhoff,
-    largest_log_strain,
-    material,
-    solid,
-)
+from fem_reference.hyperelasticity import largest_log_strain, material, solid
+from fem_reference.laws import NeoHookean, StVenantKirchhoff
 from fem_reference.newton import TOLERANCE, solve
 from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
@@ -28,7 +24,7 @@ EDGE = 0.04
 CUBE = (EDGE, EDGE, EDGE)
 TISSUE = Tissue(youngs_modulus=5e3, poisson_ratio=0.45)
 DOWN = np.array([0.0, 0.0, -1.0])
-LAWS = ("neo-hookean", "st-venant-kirchhoff")
+LAWS = tuple(laws.LAWS)
 MU, LAME = 5e3 / 2.9, 5e3 * 0.45 / (1.45 * 0.1)
 EYE = np.eye(3)
 

@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fem_reference.dynamics import Damping
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.solvers import solve_static
 from study.export import frames
+from study.problem.damping import RayleighDamping
 from tests.oracles import calculix, matrices
 from tests.oracles.cases import CASES, DYNAMIC, build, difference, kept, ramp
 
@@ -91,8 +91,8 @@ def test_the_motion_shows_mass_damping_and_integrator():
     nodes, theirs = kept(f"calculix-{DYNAMIC}", found.problem)
     slips = {
         "consistent mass": (replace(body, mass=found.body.mass), ramp()),
-        "no damping by mass": (body, replace(ramp(), damping=Damping(0.0, 5e-4))),
-        "no damping by stiffness": (body, replace(ramp(), damping=Damping(3.0))),
+        "no damping by mass": (body, replace(ramp(), damping=RayleighDamping(0.0, 5e-4))),
+        "no damping by stiffness": (body, replace(ramp(), damping=RayleighDamping(3.0))),
         "another alpha": (body, replace(ramp(), alpha=0.0)),
         "load a step late": (body, replace(ramp(), factors=np.roll(ramp().factors, 1))),
     }

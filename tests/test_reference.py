@@ -14,8 +14,8 @@ from fem_reference import memory
 from fem_reference import model as fem
 from fem_reference import superposition as superposition_module
 from fem_reference.direct import factorised
-from fem_reference.dynamics import Damping
-from fem_reference.elasticity import chosen_element, discretise
+from fem_reference.elasticity import discretise
+from fem_reference.elements import chosen_element
 from fem_reference.iterative import iterative, rigid_motions
 from fem_reference.observation import (
     at_points,
@@ -27,6 +27,7 @@ from fem_reference.solvers import solve_static
 from fem_reference.subspace import eigenvectors, empty, extended, superposition
 from study.mesh.tetrahedra import volumes
 from study.organ.block import block_mesh
+from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.run import reference
 from study.run.outcome import Outcome
@@ -36,7 +37,7 @@ from study.scene.problem import geometry_of, problem_of
 from tests.benchmarks import error_bar
 from tests.test_limits import changed
 
-DAMPING = Damping(mass=40.0, stiffness=4e-3)
+DAMPING = RayleighDamping(mass=40.0, stiffness=4e-3)
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +198,7 @@ def test_every_method_finds_the_same_motion(
 
 def test_a_damping_left_out_is_seen(body, observation, stepped):
     """Negative control of the above, for either coefficient."""
-    for wrong in (Damping(40.0, 0.0), Damping(0.0, 4e-3)):
+    for wrong in (RayleighDamping(40.0, 0.0), RayleighDamping(0.0, 4e-3)):
         found = fem.run(body, wrong, history, observation).trajectory
         assert relative(found.velocity, stepped.trajectory.velocity) > 0.02
 
@@ -238,7 +239,7 @@ def test_a_mode_under_a_linear_load_is_integrated_exactly(body):
     one = extended(body, empty(body.load.size), solve_static(body))
     w, g = one.stiffness[0, 0], one.load[0]
     c, times = 3.0, np.linspace(0.0, 1.0, 4)
-    y, rate = superposition(one, Damping(c), lambda t: t, times)
+    y, rate = superposition(one, RayleighDamping(c), lambda t: t, times)
     a = g / w
     root = np.sqrt(w - c * c / 4)
     # y = a t - a c / w + e^(-ct/2) (A cos + B sin), at rest at the start.

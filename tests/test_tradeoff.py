@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem_reference.dynamics import Damping
 from fem_reference.observation import evaluation
+from fem_reference.subspace import transitions
 from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
+from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.run.lattices import assemble
 from study.scene.file import read_scene
@@ -22,7 +23,6 @@ from study.tradeoff import recommend as advice
 from study.tradeoff import table, whole
 from study.tradeoff.body import build
 from study.tradeoff.contender import Ready
-from study.tradeoff.contenders.superposition import transitions
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lattice import with_settings
@@ -298,7 +298,7 @@ def test_a_mode_of_the_superposition_moves_as_its_closed_form():
     w, dt = 30.0, 0.01
     state = np.array([0.0, 0.0, 2.0, 0.0])  # a constant load of 2
     for _ in range(7):
-        state = transitions(np.array([w**2]), Damping(0.0), dt)[0] @ state
+        state = transitions(np.array([w**2]), RayleighDamping(0.0), dt)[0] @ state
     assert state[0] == pytest.approx(2.0 / w**2 * (1 - math.cos(7 * w * dt)), rel=1e-12)
 
 

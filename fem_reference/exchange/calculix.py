@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Damping
 from fem_reference.exchange.nodal import DIRECTIONS, NodalProblem
+from study.problem.damping import RayleighDamping
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ MODEL = ("*INCLUDE, INPUT=mesh.inp", "*INCLUDE, INPUT=foundation.inp")
 
 
 @dataclass(frozen=True)
-class Motion:
+class Transient:
     """Steps of a motion from rest by HHT with `alpha`, and its Rayleigh damping.
 
     `factors` of the load at 0, `step` [s], 2 `step`, ...; the first is zero, for CalculiX takes the
@@ -35,7 +35,7 @@ class Motion:
 
     step: float
     factors: Floats
-    damping: Damping
+    damping: RayleighDamping
     alpha: float
     kept: int
 
@@ -53,7 +53,7 @@ class Motion:
         return step > 0 and (step % self.kept == 0 or step == self.count)
 
 
-def files(problem: NodalProblem, motion: Motion | None = None) -> dict[str, str]:
+def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, str]:
     """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion."""
     named = {
         "mesh.inp": _lines(_mesh(problem, motion)),
@@ -76,7 +76,7 @@ def _number(value: float) -> str:
     return text if len(text) <= FIELD else f"{value:.12e}"
 
 
-def _mesh(problem: NodalProblem, motion: Motion | None) -> Iterator[str]:
+def _mesh(problem: NodalProblem, motion: Transient | None) -> Iterator[str]:
     yield "*NODE, NSET=ALL"
     for number, (x, y, z) in enumerate(problem.nodes, 1):
         yield f"{number}, {_number(x)}, {_number(y)}, {_number(z)}"
@@ -136,7 +136,7 @@ def _static() -> Iterator[str]:
     yield from ("*NODE PRINT, NSET=ALL", "U", "*END STEP")
 
 
-def _dynamic(motion: Motion) -> Iterator[str]:
+def _dynamic(motion: Transient) -> Iterator[str]:
     yield from MODEL
     times = motion.step * np.arange(len(motion.factors))
     yield "*AMPLITUDE, NAME=HISTORY"

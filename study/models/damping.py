@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fem_reference.dynamics import Damping as RayleighDamping
 from msm.calibration import POISSON_RATIO, reference_stiffness
 from msm.damping import Damping, eq_2
+from study.problem.damping import RayleighDamping
 from study.scene import Scene
 
 

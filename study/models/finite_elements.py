@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -11,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.dynamics import ORDER, Oscillator, march
-from fem_reference.dynamics import Damping as RayleighDamping
+from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
@@ -24,6 +22,7 @@ from study.models.large_strain import compare, is_large
 from study.models.mesh_error import MeshSolution, is_too_coarse, mesh_error, next_size, why_unknown
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
+from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
@@ -140,14 +139,12 @@ class PreparedElements:
         """Steps of TR-BDF2 at the rate, factors made once, whatever the method of a run."""
         body, step = self.body(), 1.0 / (self.model.rate or FRAME_RATE)
         system = Oscillator(body.mass, body.stiffness, body.load, self.model.damping)
-        motion = march(system, self.problem.factor, step, sys.maxsize)
-        u, _ = next(motion)  # rest, and the factors
+        motion = SteppedMotion(system, self.problem.factor, step)  # at rest, and the factors
 
-        def take_step() -> None:
-            nonlocal u
-            u, _ = next(motion)
+        def displacement() -> Floats:
+            return motion.displacement.reshape(-1, 3)
 
-        return Stepper(take_step, lambda: u.reshape(-1, 3), step, body.stiffness.size)
+        return Stepper(motion.take_step, displacement, step, body.stiffness.size)
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion on the finest of the meshes that show its error."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fem_reference.elasticity import LOCKING, Body
+from fem_reference.elasticity import Body
+from fem_reference.elements import LOCKING
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
@@ -30,7 +31,7 @@ def compare(problem: Problem, body: Body, law: str) -> LargeStrain | str:
     if body.element == "taylor-hood":
         return f"elements without a pressure lock at a Poisson ratio above {LOCKING:g}"
     try:
-        path = solve(body, problem.tissue, law)  # type: ignore[arg-type] # a name of the table
+        path = solve(body, problem.tissue, law)
     except ValueError as error:
         return str(error)
     if not path.converged:

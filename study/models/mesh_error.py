@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.discretisation_error import FORMAL_ORDER, Estimate, discretisation_error
 from fem_reference.elasticity import Body
+from fem_reference.elements import ELEMENTS
+from fem_reference.error_estimate import ErrorEstimate, discretisation_error
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.results.records import CurveErrors, CurveOrders, DiscretisationError
@@ -30,7 +31,7 @@ class MeshSolution:
 
     level: Level
     body: Body
-    found: fem.Reference
+    found: fem.Solution
 
 
 def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> DiscretisationError | None:
@@ -55,7 +56,7 @@ def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> Discretisati
     return DiscretisationError(
         field_peak=field.error,
         field_order=field.observed,
-        formal_order=FORMAL_ORDER[solved[-1].found.element],
+        formal_order=_formal_order(solved[-1]),
         by_probe=by_probe,
         order_by_probe=orders,
     )
@@ -63,9 +64,13 @@ def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> Discretisati
 
 def _estimate(
     solved: Sequence[MeshSolution], results: Sequence[Floats], weights: Floats | None = None
-) -> Estimate:
+) -> ErrorEstimate:
     sizes = [one.level.size for one in solved]
-    return discretisation_error(results, sizes, FORMAL_ORDER[solved[-1].found.element], weights)
+    return discretisation_error(results, sizes, _formal_order(solved[-1]), weights)
+
+
+def _formal_order(solved: MeshSolution) -> float:
+    return ELEMENTS[solved.found.element].formal_order
 
 
 def _truncation(solved: MeshSolution) -> float:
@@ -88,7 +93,8 @@ def next_size(accuracy: float | None, error: DiscretisationError | None) -> floa
     if error is None or accuracy is None:
         return 1.0
     excess = error.worst.displacement / accuracy
-    return float(max(excess ** (-1.0 / max(FORMAL_ORDER.values())), LARGEST_JUMP))
+    highest = max(one.formal_order for one in ELEMENTS.values())
+    return float(max(excess ** (-1.0 / highest), LARGEST_JUMP))
 
 
 def why_unknown(problem: Problem, solved: MeshSolution) -> str:

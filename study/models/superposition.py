@@ -7,25 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh, expm
 
 from fem_reference import model as fem
-from fem_reference.dynamics import Damping as RayleighDamping
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points, evaluation
-from fem_reference.recording import Recorder
-from fem_reference.solvers import solver
-from fem_reference.subspace import Subspace, eigenvectors, empty, extended, superposition
-from fem_reference.superposition import LOOSE
+from fem_reference.subspace import Subspace, SubspaceMotion, modal_subspace, ritz_subspace
+from fem_reference.superposition import subspace_trajectory
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import estimated_run
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.results.records import ElementsRecord
 from study.scene import Scene
@@ -79,7 +76,8 @@ class PreparedSuperposition:
     @cached_property
     def subspace(self) -> Subspace:
         """The vectors, and the body among them."""
-        return (_ritz if self.model.vectors == "ritz" else _modal)(self.body, self.model.count)
+        make = ritz_subspace if self.model.vectors == "ritz" else modal_subspace
+        return make(self.body, self.model.count)
 
     @property
     def critical_time_step(self) -> float:
@@ -94,17 +92,10 @@ class PreparedSuperposition:
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion, exact in the subspace for a load that is linear over steps of a frame."""
         seen, subspace = self.problem.observation, self.subspace
-        samples = seen.times
-        every = whole_steps(float(samples[1]), longest or STEP)
-        times = np.linspace(samples[0], samples[-1], (len(samples) - 1) * every + 1)
-        y, rates = superposition(subspace, self.model.damping, self.problem.factor, times)
-        recorder, V = Recorder(self.body, seen), subspace.vectors
-        for sample in range(len(samples)):
-            u, v = V @ y[sample * every], V @ rates[sample * every]
-            probes = recorder.at_probes
-            recorder.motion(sample, at_points(probes, u), at_points(probes, v))
-            recorder.field(sample, u)
-        return Simulation(recorder.trajectory, float(times[1]))
+        sample = float(seen.times[1])
+        every = whole_steps(sample, longest or STEP)
+        where = (self.model.damping, self.problem.factor, seen, every)
+        return Simulation(subspace_trajectory(self.body, subspace, *where), sample / every)
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its error by the steps of the load, and what it is made of."""
@@ -134,48 +125,13 @@ class PreparedSuperposition:
 
     def stepper(self) -> Stepper:
         """Steps of a frame, each of which gives the displacement of all nodes."""
-        subspace, factor = self.subspace, self.problem.factor
-        squares, Q = eigh(subspace.stiffness)
-        shapes, load = subspace.vectors @ Q, Q.T @ subspace.load
-        moved = transitions(squares, self.model.damping, STEP)
-        state = np.zeros((len(squares), 4))
-        t, u = 0.0, np.zeros(len(shapes))
+        subspace = self.subspace
+        motion = SubspaceMotion(subspace, self.model.damping, self.problem.factor, STEP)
 
-        def take_step() -> None:
-            nonlocal t, u
-            before, after = factor(np.array([t, t + STEP]))
-            state[:, 2], state[:, 3] = load * before, load * (after - before) / STEP
-            state[:, :2] = np.einsum("mij,mj->mi", moved, state)[:, :2]
-            u = shapes @ state[:, 0]
-            t += STEP
+        def displacement() -> Floats:
+            return motion.displacement.reshape(-1, 3)
 
-        return Stepper(take_step, lambda: u.reshape(-1, 3), STEP, len(squares))
-
-
-def transitions(squares: Floats, damped: RayleighDamping, step: float) -> Floats:
-    """Of displacement, velocity, load and its slope over a step [s], (m, 4, 4), by mode.
-
-    `squares` (m,): squared frequencies; exact for a load that is linear over the step.
-    """
-    rate = np.zeros((len(squares), 4, 4))
-    rate[:, [0, 1, 2], [1, 2, 3]] = 1.0
-    rate[:, 1, 0], rate[:, 1, 1] = -squares, -(damped.mass + damped.stiffness * squares)
-    return np.asarray(expm(step * rate))
-
-
-def _ritz(body: Body, count: int) -> Subspace:
-    found = extended(body, empty(body.stiffness.size), solver(body)(body.load))
-    loose = solver(body, LOOSE)
-    for _ in range(count - 1):
-        found = extended(body, found, loose(body.mass @ found.vectors[:, -1]))
-    return found
-
-
-def _modal(body: Body, count: int) -> Subspace:
-    """The static displacement and so many modes."""
-    vectors = eigenvectors(body, solver(body), count)
-    start = empty(body.stiffness.size)
-    return reduce(lambda found, vector: extended(body, found, vector), vectors.T, start)
+        return Stepper(motion.take_step, displacement, STEP, subspace.load.size)
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[SuperpositionModel]:

@@ -25,8 +25,9 @@ Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
 ModelName = Annotated[str, Choice("study.models.table:MODELS")]
 IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
-ElementName = Annotated[str, Choice("fem_reference.elasticity:CHOICES")]
+ElementName = Annotated[str, Choice("fem_reference.elements:CHOICES")]
 MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
+LargeStrain = Annotated[str, Choice("fem_reference.laws:LARGE_STRAIN")]
 Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
 
 
@@ -203,7 +204,7 @@ class Reference:
     method: MethodName = "ritz-vectors"
     modes: Annotated[int, Quantity("", 1, 1000)] = 100
     steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
-    large_strain: Literal["neo-hookean", "st-venant-kirchhoff", "none"] = "neo-hookean"
+    large_strain: LargeStrain = "neo-hookean"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.discretisation_error import FORMAL_ORDER, discretisation_error
 from fem_reference.elasticity import discretise
+from fem_reference.elements import ELEMENTS
+from fem_reference.error_estimate import discretisation_error
 from fem_reference.grid import Projection
 from fem_reference.model import static_field
 from study.mesh.kinds import TetrahedralMesh
@@ -39,5 +40,5 @@ def converged(
     """Solution at points [m] (q, 3) on the last of three meshes, coarse to fine by their sizes."""
     bodies = [discretise(m, tissue, foundation, tool, project=project) for m in meshes]
     fields = [static_field(body, points) for body in bodies]
-    formal = FORMAL_ORDER[bodies[-1].element]
+    formal = ELEMENTS[bodies[-1].element].formal_order
     return Converged(fields[-1], discretisation_error(fields, sizes, formal, volumes).error)

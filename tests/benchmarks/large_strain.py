@@ -25,7 +25,7 @@ from scipy.sparse import csc_array, diags_array
 
 from fem_reference.direct import factorised
 from fem_reference.elasticity import Body, discretise
-from fem_reference.hyperelasticity import Law, LawName
+from fem_reference.laws import Law
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from msm.assembly import Assembly, Material, arrays
@@ -216,7 +216,7 @@ def elements(case: Case, loads: Sequence[float], sizes: tuple[float, float]) -> 
     rule, tissue = over_volume(coarse.mesh, 2), case.tissue(NU)
     at = evaluation(fine, rule.points)
 
-    def fields(law: LawName | Law) -> tuple[list[Floats], list[float]]:
+    def fields(law: str | Law) -> tuple[list[Floats], list[float]]:
         states = solve(fine, tissue, law, loads).states
         missing = [np.full_like(rule.points, np.nan)] * (len(loads) - len(states))
         found = [at_points(at, s.displacement) for s in states]

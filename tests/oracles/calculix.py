@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.exchange.calculix import Motion, files
+from fem_reference.exchange.calculix import Transient, files
 from fem_reference.exchange.nodal import NodalProblem
 
 PROGRAM = shutil.which("ccx")
@@ -28,7 +28,7 @@ def at_rest(given: NodalProblem) -> np.ndarray:
     return found
 
 
-def moving(given: NodalProblem, motion: Motion) -> list[np.ndarray]:
+def moving(given: NodalProblem, motion: Transient) -> list[np.ndarray]:
     """Displacement [m] (n, 3) at each time that is printed."""
     return _solve(files(given, motion), "dynamic")
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.dynamics import Damping
 from fem_reference.elasticity import Body, discretise
-from fem_reference.exchange.calculix import Motion
+from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 
@@ -86,10 +86,12 @@ def wavy(points: np.ndarray) -> np.ndarray:
     return points + 7e-4 * np.sin(60.0 * points[:, [1, 2, 0]])
 
 
-def ramp() -> Motion:
+def ramp() -> Transient:
     """A load that rises over ten steps and stays: damped, with inertia that matters."""
     factors = np.minimum(np.arange(21) / 10.0, 1.0)
-    return Motion(step=0.002, factors=factors, damping=Damping(3.0, 5e-4), alpha=-0.05, kept=10)
+    return Transient(
+        step=0.002, factors=factors, damping=RayleighDamping(3.0, 5e-4), alpha=-0.05, kept=10
+    )
 
 
 def fingerprint(found: NodalProblem) -> str:

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ElementName
 from fem_reference.grid import straight
 from study.known.verification.finding import Finding, observed_order, value
 from study.known.verification.moduli import shear_modulus

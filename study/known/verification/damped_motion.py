@@ -14,20 +14,22 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from fem_reference import model
-from fem_reference.dynamics import ORDER, Damping, March, Oscillator
-from fem_reference.elasticity import Body, ElementName, discretise
+from fem_reference.dynamics import ORDER, March, Oscillator
+from fem_reference.elasticity import Body, discretise
+from fem_reference.elements import ElementName
 from fem_reference.observation import at_points, evaluation
 from study.known.verification.finding import Finding, convergence
 from study.known.verification.oscillation import factor, response
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 
 Floats = NDArray[np.float64]
 
 SIZE = (0.06, 0.05, 0.04)
-DAMPING = Damping(mass=10.0, stiffness=2e-3)
+DAMPING = RayleighDamping(mass=10.0, stiffness=2e-3)
 PERIOD, DURATION = 0.2, 0.15
 """[s]"""
 STEPS = (75, 150)

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fem_reference.direct import factorised
-from fem_reference.elasticity import ElementName, discretise
+from fem_reference.elasticity import discretise
+from fem_reference.elements import ElementName
 from fem_reference.iterative import iterative
 from fem_reference.solvers import TOLERANCE
 from study.known.verification.finding import Finding

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ElementName
 from fem_reference.grid import straight
 from study.known.verification.finding import Finding, convergence
 from study.known.verification.moduli import lame_lambda, oedometric, shear_modulus

@@ -7,11 +7,10 @@ Irons and Razzaque (1972); Taylor, Simo, Zienkiewicz and Chan (1986), Int. J. Nu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import get_args
 
 import numpy as np
 
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ELEMENTS, ElementName
 from fem_reference.grid import straight
 from study.known.verification.finding import Finding, value
 from study.known.verification.moduli import lame_lambda, rounding, shear_modulus
@@ -27,7 +26,7 @@ RATIOS = (0.3, 0.4999)
 
 def findings() -> Iterator[Finding]:
     """Displacement and energy of each element."""
-    for name in get_args(ElementName):
+    for name in ELEMENTS:
         for nu in RATIOS:
             yield from _patch(name, Tissue(poisson_ratio=nu))
 

@@ -13,7 +13,8 @@ from scipy.sparse import csc_array, eye_array, kron
 from skfem.models.poisson import mass as product
 
 from fem_reference.direct import factorised
-from fem_reference.elasticity import ELEMENTS, FACET_ORDER, ElementName, elastic, rows
+from fem_reference.elasticity import FACET_ORDER, elastic, rows
+from fem_reference.elements import ELEMENTS, ElementName
 from fem_reference.stiffness import Stiffness
 from study.problem.tissue import Tissue
 
@@ -40,7 +41,7 @@ class Solid:
 
 def solid(grid: Any, name: ElementName, tissue: Tissue) -> Solid:
     """The body on a mesh of scikit-fem's."""
-    nodes = skfem.Basis(grid, ELEMENTS[name](), intorder=FIELD_ORDER)
+    nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), intorder=FIELD_ORDER)
     return Solid(nodes, elastic(grid, name, tissue))
 
 

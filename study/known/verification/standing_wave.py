@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.dynamics import Damping, Oscillator
-from fem_reference.elasticity import ElementName
+from fem_reference.dynamics import Oscillator
+from fem_reference.elements import ElementName
 from fem_reference.grid import straight
 from fem_reference.model import STEPPING
 from study.known.verification.finding import Finding, observed_order
@@ -24,6 +24,7 @@ from study.known.verification.moduli import shear_modulus
 from study.known.verification.oscillation import factor, response
 from study.known.verification.solid import body_force, l2_error, mass_matrix, restricted, solid
 from study.organ.block import block_mesh
+from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -52,7 +53,7 @@ def findings() -> Iterator[Finding]:
 def error(name: ElementName, tissue: Tissue, method: str, cells: int) -> float:
     """Relative L2 error at the end of the motion."""
     omega = float(np.sqrt(3.0 * shear_modulus(tissue) / tissue.density) * np.pi)
-    damping = Damping(2.0 * RATIO * omega * (1.0 - SHARE), 2.0 * RATIO / omega * SHARE)
+    damping = RayleighDamping(2.0 * RATIO * omega * (1.0 - SHARE), 2.0 * RATIO / omega * SHARE)
     end, count = PERIODS * 2.0 * np.pi / omega, STEPS_PER_CELL * cells
     body = solid(straight(block_mesh((1.0, 1.0, 1.0), 1.0 / cells)), name, tissue)
     sliding = ((body.points > 1e-9) & (body.points < 1.0 - 1e-9)).ravel()

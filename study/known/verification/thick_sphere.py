@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.elasticity import ElementName
+from fem_reference.elements import ElementName
 from fem_reference.grid import curved, straight
 from study.known.verification.finding import Finding, observed_order
 from study.known.verification.round_shapes import shell_octant

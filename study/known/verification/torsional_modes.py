@@ -16,14 +16,15 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 from scipy.special import spherical_jn
 
-from fem_reference.dynamics import Damping, Oscillator
-from fem_reference.elasticity import ElementName
+from fem_reference.dynamics import Oscillator
+from fem_reference.elements import ElementName
 from fem_reference.grid import curved
 from fem_reference.stiffness import Stiffness
 from study.known.verification.finding import Finding, observed_order, value
 from study.known.verification.moduli import shear_modulus
 from study.known.verification.round_shapes import ball, ball_octant
 from study.known.verification.solid import Solid, mass_matrix, restricted, solid
+from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -80,7 +81,9 @@ def _lowest(stiffness: Stiffness, mass: csc_array, shift: float, count: int) -> 
     """Squared frequencies [1/s^2], shifted by a positive one as those of rigid motion are zero."""
     size = stiffness.size
     operator = partial(LinearOperator, (size, size), dtype=np.float64)
-    solve = Oscillator(mass, stiffness, np.zeros(size), Damping(0.0)).shifted(0.0, 1.0 / shift)
+    solve = Oscillator(mass, stiffness, np.zeros(size), RayleighDamping(0.0)).shifted(
+        0.0, 1.0 / shift
+    )
     squared = eigsh(
         operator(lambda u: stiffness @ u),
         count,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import Damping, Oscillator, hht, march
+from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body, discretise
 from fem_reference.solvers import solve_static
 from study.known.stability.bodies import DOWN
@@ -22,6 +22,7 @@ from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -135,7 +136,7 @@ def reacts(radius: float) -> Finding:
 def leaps(method: str) -> Finding:
     """Steps, each far longer than any period, under a constant load with damping."""
     body = _body(block_mesh(SIZE, CELL), Tissue(), "p2")
-    system = Oscillator(body.mass, body.stiffness, body.load, Damping(10.0))
+    system = Oscillator(body.mass, body.stiffness, body.load, RayleighDamping(10.0))
     # HHT's first step overshoots by (omega dt)^2, of which each step leaves nine tenths.
     scheme, count = {"tr-bdf2": (march, 100), "hht-alpha": (hht, 800)}[method]
     *_, (u, _) = scheme(system, np.ones_like, 1e4, count)

@@ -26,8 +26,6 @@ SAFETY_ASSUMED = 3.0
 ASSUMED_ORDER = 2.0
 """Of two meshes: that of flat facets, of edges of a support, and of most user's meshes."""
 LEAST_ORDER = 1.0
-FORMAL_ORDER = {"p1": 2.0, "p2": 3.0, "taylor-hood": 3.0}
-"""Of displacement; the estimate never takes more."""
 BEYOND = 0.5
 """An observed order outside by more shows meshes that are not yet in the range of convergence."""
 FLATTEST, STEEPEST = 1e-6, 12.0
@@ -35,7 +33,7 @@ TINY = 1e-300
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ErrorEstimate:
     """Relative error of the finest mesh, and the order behind it.
 
     `observed`: order that the three finest meshes show; none of two meshes, or where their results
@@ -48,11 +46,11 @@ class Estimate:
 
 def discretisation_error(
     results: Sequence[Floats], sizes: Sequence[float], formal: float, weights: Floats | None = None
-) -> Estimate:
+) -> ErrorEstimate:
     """From results (n, 3) on at least two meshes, coarse to fine by element size, in relative L2.
 
-    `weights` (n,) of the points. An order outside 1 to `formal` counts as the nearer of the two;
-    well outside, it is an assumed one.
+    `weights` (n,) of the points. An order outside 1 to `formal`, the element's own, counts as the
+    nearer of the two; well outside, it is an assumed one.
     """
     w = np.ones(len(results[-1])) if weights is None else weights
     steps = [fine - coarse for coarse, fine in pairwise(results)]
@@ -60,14 +58,14 @@ def discretisation_error(
     norms = [math.sqrt(_product(step, step, w) / whole) for step in steps]
     ratio = sizes[-2] / sizes[-1]
     if len(results) == 2:
-        return Estimate(SAFETY_ASSUMED * norms[-1] / (ratio**ASSUMED_ORDER - 1.0), None)
+        return ErrorEstimate(SAFETY_ASSUMED * norms[-1] / (ratio**ASSUMED_ORDER - 1.0), None)
     if _product(steps[-2], steps[-1], w) < 0.0:
-        return Estimate(SAFETY_ASSUMED * 0.5 * max(norms[-2:]), None)
+        return ErrorEstimate(SAFETY_ASSUMED * 0.5 * max(norms[-2:]), None)
     observed = observed_order(norms[-2], norms[-1], sizes[-3:])
     shown = LEAST_ORDER - 2 * BEYOND if observed is None else observed
     order = min(max(shown, LEAST_ORDER), formal)
     safety = SAFETY if abs(shown - order) <= BEYOND else SAFETY_ASSUMED
-    return Estimate(safety * norms[-1] / (ratio**order - 1.0), observed)
+    return ErrorEstimate(safety * norms[-1] / (ratio**order - 1.0), observed)
 
 
 def _product(a: Floats, b: Floats, weights: Floats) -> float:
