@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.inference import SYSTEMS, Options
-from fuzzy.knowledge import parameters
-from fuzzy.liver import liver_system
-from fuzzy.settings import Settings
-from fuzzy.stiffness import (
+from fuzzy.liver.knowledge import parameters
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.stiffness import (
     PA_PER_KPA,
     UNIT,
     Estimate,
@@ -23,7 +21,9 @@ from fuzzy.stiffness import (
     liver_row,
     patient_system,
 )
-from fuzzy.system import System
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.inference import SYSTEMS, Options
+from fuzzy.systems.system import System
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
@@ -132,8 +132,8 @@ def _numbers(found: Estimate) -> dict[str, object]:
 
 
 def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iterator[str]:
-    from fuzzy.explain import explain
-    from fuzzy.explanation_text import explanation_lines
+    from fuzzy.systems.explain import explain
+    from fuzzy.systems.explanation_text import explanation_lines
 
     unit = UNIT if request.rule_base is None else ""
     options = settings_of(request.settings).options
@@ -146,7 +146,7 @@ def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iter
 
 
 def _table(request: Request, inputs: Path) -> Answer:
-    from fuzzy.table import evaluate_table
+    from fuzzy.systems.table import evaluate_table
 
     _check_table(request)
     system, unit = _rule_base(request.rule_base, request.settings)
@@ -181,7 +181,7 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str
     """The system of a file, or the liver's; and the unit of its readings where it is known."""
     if path is None:
         return liver_system(settings_of(given)), UNIT
-    from fuzzy.rule_base import read_rule_base
+    from fuzzy.systems.files import read_rule_base
 
     options = {one.name for one in fields(Options)}
     for key in given:
@@ -194,7 +194,7 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str
 
 
 def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.float64]:
-    from fuzzy.table import read_readings
+    from fuzzy.systems.table import read_readings
 
     X = read_readings(inputs, system)
     number = 1 if row is None else row
@@ -230,9 +230,9 @@ def rule_base_lines(
     path: Path | None, given: Mapping[str, Any], out: Path | None, *, sugeno: bool
 ) -> Sequence[str]:
     """Audit a rule base, the liver's if there is no `path`, or write it to `out`."""
-    from fuzzy.audit import audit, audit_lines
-    from fuzzy.conversion import sugeno_of, type_1_of
-    from fuzzy.rule_base import write_rule_base
+    from fuzzy.systems.audit import audit, audit_lines
+    from fuzzy.systems.conversion import sugeno_of, type_1_of
+    from fuzzy.systems.files import write_rule_base
 
     system, _ = _rule_base(path, given)
     if out is None:

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.conversion import type_1_of
-from fuzzy.inference import Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.rule_base import read_rule_base, write_rule_base
-from fuzzy.sets import Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.system import Rule, System, Term, Variable
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.conversion import type_1_of
+from fuzzy.systems.files import read_rule_base, write_rule_base
+from fuzzy.systems.inference import Options, infer
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import Rule, System, Term, Variable
 
 ROOT = Path(__file__).resolve().parent.parent
 

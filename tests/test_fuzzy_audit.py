@@ -6,15 +6,15 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fuzzy.audit import audit, audit_lines
-from fuzzy.coverage import Gap, spread_readings
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.redundancy import Pair, dominated
-from fuzzy.rule_text import rule_text
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.system import Operators, Rule, System, Term, Variable, firing_strengths
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.audit import audit, audit_lines
+from fuzzy.systems.coverage import Gap, spread_readings
+from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.redundancy import Pair, dominated
+from fuzzy.systems.rule_text import rule_text
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
+from fuzzy.systems.system import Operators, Rule, System, Term, Variable, firing_strengths
 
 LOW, HIGH = 0, 1
 COLD, WARM = Term(0, LOW), Term(0, HIGH)

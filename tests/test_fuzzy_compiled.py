@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy import interval_type2, kernel, mamdani, sugeno
-from fuzzy.compiled import KERNEL_FORMS, compiled
-from fuzzy.control_system import control_system
-from fuzzy.inference import LEAST_STRENGTH, SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.redundancy import dominated
-from fuzzy.sets import FORMS, TYPE_1, Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.system import Operators, Rule, System, Term, Variable
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems import interval_type2, kernel, mamdani, sugeno
+from fuzzy.systems.compiled import KERNEL_FORMS, compiled
+from fuzzy.systems.inference import LEAST_STRENGTH, SYSTEMS, Options, infer
+from fuzzy.systems.redundancy import dominated
+from fuzzy.systems.scikit_fuzzy import control_system
+from fuzzy.systems.sets import FORMS, TYPE_1, Footprint, FuzzySet
+from fuzzy.systems.system import Operators, Rule, System, Term, Variable
 
 LIVER = liver_system(Settings())
 INSIDE = np.random.default_rng(20240917).uniform(2.0, 75.0, (300, 5))

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import expit
 
-from fuzzy import exact
-from fuzzy.inference import Options, infer
-from fuzzy.sets import (
+from fuzzy.systems import exact
+from fuzzy.systems.inference import Options, infer
+from fuzzy.systems.sets import (
     FORMS,
     TYPE_1,
     Footprint,
@@ -19,7 +19,7 @@ from fuzzy.sets import (
     membership,
     upper_membership,
 )
-from fuzzy.system import Operators, Rule, System, Term, Variable, memberships, union
+from fuzzy.systems.system import Operators, Rule, System, Term, Variable, memberships, union
 
 
 def system_of(*sets, low=0.0, high=1.0, implication="min"):

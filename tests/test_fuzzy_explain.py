@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy.explain import Explanation, explain, shown_rules
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.explanation_text import explanation_lines
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.quadrature import sampled
-from fuzzy.sets import Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.stiffness import liver_row, patient_system
-from fuzzy.system import Rule, System, Term, Variable
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.stiffness import liver_row, patient_system
+from fuzzy.systems.explain import Explanation, explain, shown_rules
+from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.explanation_text import explanation_lines
+from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.quadrature import sampled
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import Rule, System, Term, Variable
 
 # Both sides are sums of some hundred products of numbers of order 10.
 ROUNDING = 1e-12

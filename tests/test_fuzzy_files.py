@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy.conversion import sugeno_of, type_1_of
-from fuzzy.fis_file import FisError, fis_text, read_fis, write_fis
-from fuzzy.inference import Options, infer
-from fuzzy.json_file import JsonError, json_text, read_json, write_json
-from fuzzy.rule_base import read_rule_base, write_rule_base
-from fuzzy.sets import FORMS, Footprint, FuzzySet
-from fuzzy.system import Operators, Rule, System, Term, Variable
-from fuzzy.table import TableError, evaluate_table
+from fuzzy.systems.conversion import sugeno_of, type_1_of
+from fuzzy.systems.files import read_rule_base, write_rule_base
+from fuzzy.systems.fis_file import FisError, fis_text, read_fis, write_fis
+from fuzzy.systems.inference import Options, infer
+from fuzzy.systems.json_file import JsonError, json_text, read_json, write_json
+from fuzzy.systems.sets import FORMS, Footprint, FuzzySet
+from fuzzy.systems.system import Operators, Rule, System, Term, Variable
+from fuzzy.systems.table import TableError, evaluate_table
 
 TIPPER = """\
 [System]
@@ -426,9 +426,9 @@ def test_defaults_may_be_written_or_left_out(read_document, document, tipper):
 
 
 def test_the_example_of_the_documentation_is_a_system(read_document):
-    import fuzzy.json_file
+    import fuzzy.systems.json_file
 
-    example = re.search(r"\n    \{\n.*?\n    \}\n", fuzzy.json_file.__doc__, re.DOTALL)[0]
+    example = re.search(r"\n    \{\n.*?\n    \}\n", fuzzy.systems.json_file.__doc__, re.DOTALL)[0]
     example = re.sub(r" +#.*", "", example)
     low, high = ({"name": n, "kind": "trimf", "parameters": [0, 0, 1]} for n in ("low", "high"))
     example = example.replace("[...]", json.dumps([low, high]))

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from fuzzy.knowledge import (
+from fuzzy.liver.knowledge import (
     OUTPUT,
     SEVERITIES,
     elastography,
@@ -17,11 +17,11 @@ from fuzzy.knowledge import (
     parameters,
     rows,
 )
-from fuzzy.liver import liver_system, records_in_use, unsourced
-from fuzzy.readings import READINGS
-from fuzzy.sets import TYPE_1, Footprint, lower_membership, upper_membership
-from fuzzy.settings import LARGEST_FACTOR, Settings
-from fuzzy.table1 import AETIOLOGIES
+from fuzzy.liver.readings import READINGS
+from fuzzy.liver.settings import LARGEST_FACTOR, Settings
+from fuzzy.liver.system import liver_system, records_in_use, unsourced
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.sets import TYPE_1, Footprint, lower_membership, upper_membership
 
 # Derived values are stored with four decimals.
 STORED = 0.51e-4

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.conversion import sugeno_of, type_1_of
-from fuzzy.fis_file import read_fis
-from fuzzy.inference import Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.settings import Settings
-from fuzzy.system import Operators
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.conversion import sugeno_of, type_1_of
+from fuzzy.systems.fis_file import read_fis
+from fuzzy.systems.inference import Options, infer
+from fuzzy.systems.system import Operators
 
 FOLDER = Path(__file__).parent / "data" / "octave"
 OCTAVE = Options(sampling="octave")

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fuzzy.compiled import compiled
-from fuzzy.inference import COMPILED_FROM_ROWS, LEAST_STRENGTH, SYSTEMS, Options, infer
-from fuzzy.sets import FuzzySet
-from fuzzy.system import Rule, System, Term, Variable
-from fuzzy.table import evaluate_table
+from fuzzy.systems.compiled import compiled
+from fuzzy.systems.inference import COMPILED_FROM_ROWS, LEAST_STRENGTH, SYSTEMS, Options, infer
+from fuzzy.systems.sets import FuzzySet
+from fuzzy.systems.system import Rule, System, Term, Variable
+from fuzzy.systems.table import evaluate_table
 
 MIDDLE = 15.0
 

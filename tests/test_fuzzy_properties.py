@@ -7,12 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.quadrature import centroid, sampled
-from fuzzy.sets import FORMS, Footprint, FuzzySet, lower_membership, membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.system import (
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.quadrature import centroid, sampled
+from fuzzy.systems.sets import (
+    FORMS,
+    Footprint,
+    FuzzySet,
+    lower_membership,
+    membership,
+    upper_membership,
+)
+from fuzzy.systems.system import (
     Operators,
     Rule,
     System,

@@ -5,11 +5,9 @@ from math import prod
 
 import pytest
 
-from fuzzy.assumptions import assumptions
-from fuzzy.inference import Options
-from fuzzy.knowledge import SEVERITIES
-from fuzzy.liver import liver_system
-from fuzzy.readings import (
+from fuzzy.liver.assumptions import assumptions
+from fuzzy.liver.knowledge import SEVERITIES
+from fuzzy.liver.readings import (
     MISSING_TRIPLE,
     READINGS,
     UNSUPPORTED,
@@ -18,9 +16,11 @@ from fuzzy.readings import (
     reading_named,
     rule_count,
 )
-from fuzzy.rules import governing
-from fuzzy.settings import Settings
-from fuzzy.table1 import AETIOLOGIES, cells, is_odd
+from fuzzy.liver.rules import governing
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES, cells, is_odd
+from fuzzy.systems.inference import Options
 
 # Most sets that the data describe: F1 to F4 of HCV and HBV, F2 to F4 of the others.
 MOST_SETS = (4, 4, 3, 3, 3)

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy.inference import SYSTEMS, Options
-from fuzzy.sensitivity import (
+from fuzzy.liver.sensitivity import (
     AXES,
     EXACT_ROWS,
     LARGEST_READING,
@@ -20,8 +19,9 @@ from fuzzy.sensitivity import (
     sensitivity,
     spread_readings,
 )
-from fuzzy.settings import Settings
-from fuzzy.stiffness import AETIOLOGIES, NORMAL_LIVER, estimate, evaluate
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.stiffness import AETIOLOGIES, NORMAL_LIVER, estimate, evaluate
+from fuzzy.systems.inference import SYSTEMS, Options
 
 READINGS = {"hcv": 9.5e3, "nafld": 12e3}
 TYPE_2 = "interval-type-2"

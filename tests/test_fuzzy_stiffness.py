@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.assumptions import assumptions
-from fuzzy.inference import infer
-from fuzzy.knowledge import rows
-from fuzzy.liver import liver_system
-from fuzzy.stiffness import (
+from fuzzy.liver.assumptions import assumptions
+from fuzzy.liver.knowledge import rows
+from fuzzy.liver.stiffness import (
     AETIOLOGIES,
     NORMAL_LIVER,
     SYSTEMS,
@@ -26,6 +24,8 @@ from fuzzy.stiffness import (
     rule_count,
     surface,
 )
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.inference import infer
 
 HCV = {"hcv": 9.5e3}
 
@@ -356,7 +356,7 @@ def test_stated_limit_a_healthy_liver_is_estimated_far_too_stiff(system):
 
 def test_import_is_light():
     code = (
-        "import sys, fuzzy.stiffness as s; s.estimate({'hcv': 9.5e3}, 'interval-type-2');"
+        "import sys, fuzzy.liver.stiffness as s; s.estimate({'hcv': 9.5e3}, 'interval-type-2');"
         "print(sorted({'scipy', 'skfuzzy', 'numba', 'pandas', 'matplotlib'} & set(sys.modules)))"
     )
     root = Path(__file__).parents[1]

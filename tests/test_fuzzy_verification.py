@@ -10,12 +10,12 @@ import skfuzzy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy import exact, sugeno
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.interval_type2 import eiasc, karnik_mendel
-from fuzzy.quadrature import Quadrature, centroid, sampled
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, membership, upper_membership
-from fuzzy.system import Operators, Rule, System, Term, Variable, memberships
+from fuzzy.systems import exact, sugeno
+from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.interval_type2 import eiasc, karnik_mendel
+from fuzzy.systems.quadrature import Quadrature, centroid, sampled
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, membership, upper_membership
+from fuzzy.systems.system import Operators, Rule, System, Term, Variable, memberships
 
 GRID = np.linspace(0, 10, 101)
 SUMS = Quadrature(GRID, np.ones(101))
@@ -472,7 +472,7 @@ def test_a_negated_term_uses_the_opposite_bound():
     x = Variable("x", 0, 10, (uncertain,))
     sets = (FuzzySet("a", "trimf", (0.0, 20.0, 40.0)), FuzzySet("b", "trimf", (35.0, 55.0, 75.0)))
     system = System((x,), Variable("y", 0, 75, sets), (rule([(0, 0, True)], 0), rule([(0, 0)], 1)))
-    from fuzzy.interval_type2 import bounds_of_firing
+    from fuzzy.systems.interval_type2 import bounds_of_firing
 
     lower, upper = bounds_of_firing(system, np.array([[2.0]]))
     assert [lower[1, 0], upper[1, 0]] == pytest.approx([0.2, 0.6])

@@ -11,11 +11,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fuzzy.explain import explain
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.inference import SYSTEMS
-from fuzzy.settings import Settings
-from fuzzy.stiffness import liver_row, patient_system
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.stiffness import liver_row, patient_system
+from fuzzy.systems.explain import explain
+from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.inference import SYSTEMS
 from reports import canvas
 from reports.fuzzy_figures import (
     draw_sets,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fuzzy.assumptions import assumptions as fuzzy_assumptions
+from fuzzy.liver.assumptions import assumptions as fuzzy_assumptions
 from study.run.estimates import settings
 from study.run.outcome import Outcome
 from study.scene import Scene, SpringLaw

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy import stiffness
-from fuzzy.explain import explain
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.liver import records_in_use
-from fuzzy.sensitivity import sensitivity
-from fuzzy.stiffness import Estimate, Options, Settings
+from fuzzy.liver import stiffness
+from fuzzy.liver.sensitivity import sensitivity
+from fuzzy.liver.stiffness import Estimate, Options, Settings
+from fuzzy.liver.system import records_in_use
+from fuzzy.systems.explain import explain
+from fuzzy.systems.explanation_arrays import drawing_arrays
 from study.results.folder import Row
 from study.scene import Scene
 

@@ -27,7 +27,7 @@ from study.run.outcome import Outcome, model_record
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.stiffness import Estimate
+    from fuzzy.liver.stiffness import Estimate
 
 MASS_LIMIT = 0.05
 

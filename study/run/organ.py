@@ -13,7 +13,7 @@ from study.run.outcome import Outcome
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.stiffness import Estimate
+    from fuzzy.liver.stiffness import Estimate
     from study.run.keeping import Keeping
 
 GRAVITY = 9.81

@@ -18,7 +18,7 @@ from study.run.outcome import Outcome, model_record
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.stiffness import Estimate
+    from fuzzy.liver.stiffness import Estimate
 
 
 def benchmark_law(scene: Scene) -> Basafa:

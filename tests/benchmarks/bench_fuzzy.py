@@ -18,13 +18,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from fuzzy import interval_type2, mamdani, sugeno
-from fuzzy.compiled import compiled
-from fuzzy.control_system import control_system
-from fuzzy.inference import Options
-from fuzzy.liver import liver_system
-from fuzzy.sets import Footprint, FuzzySet, core
-from fuzzy.settings import Settings
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems import interval_type2, mamdani, sugeno
+from fuzzy.systems.compiled import compiled
+from fuzzy.systems.inference import Options
+from fuzzy.systems.scikit_fuzzy import control_system
+from fuzzy.systems.sets import Footprint, FuzzySet, core
 
 ROWS = 100_000
 TURNS = 7

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.interval_type2 import bounds_of_firing
-from fuzzy.liver import liver_system
-from fuzzy.quadrature import sampled
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.stiffness import AETIOLOGIES, estimate
-from fuzzy.system import Rule, System, Term, Variable, memberships, union
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.stiffness import AETIOLOGIES, estimate
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.interval_type2 import bounds_of_firing
+from fuzzy.systems.quadrature import sampled
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
+from fuzzy.systems.system import Rule, System, Term, Variable, memberships, union
 from study.known.stability.case import Case
 from study.known.stability.finding import Finding, beside, value
 

@@ -1,0 +1,235 @@
+"""Liver stiffness [Pa] from elastography readings [Pa] by three fuzzy systems.
+
+The face of the package. Elastography is published in kPa and the fuzzy systems work in kPa; this
+module alone converts.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fuzzy.liver.knowledge import parameters
+from fuzzy.liver.settings import Settings
+from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems import exact
+from fuzzy.systems.inference import SYSTEMS, Inferred, Options, SystemName, infer
+from fuzzy.systems.sets import Array, lower_membership, membership, upper_membership
+from fuzzy.systems.system import System, memberships
+
+__all__ = [
+    "AETIOLOGIES",
+    "NORMAL_LIVER",
+    "PA_PER_KPA",
+    "SYSTEMS",
+    "Curves",
+    "Estimate",
+    "Options",
+    "Settings",
+    "SystemName",
+    "estimate",
+    "evaluate",
+    "liver_row",
+    "membership_curves",
+    "patient_system",
+    "rule_count",
+    "surface",
+]
+
+UNIT = "kPa"
+PA_PER_KPA = 1e3
+NORMAL_LIVER = parameters()["normal_liver"] * PA_PER_KPA  # [Pa]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Small-strain Young's modulus of the liver on the transient-elastography scale [Pa].
+
+    `interval` is the range of centroids of interval type-2, None for the others.
+    `quadrature_error` is the distance to the same system without sampling, or the tolerance of
+    exact sampling; it says nothing about the data or the rules. `notes` tell what was done to the
+    readings, `method` how the answer was computed.
+    """
+
+    system: str
+    estimate: float
+    interval: tuple[float, float] | None
+    quadrature_error: float
+    notes: tuple[str, ...]
+    method: str
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Membership of x [Pa], shape (P,), in each named set of a variable, each shape (sets, P)."""
+
+    sets: tuple[str, ...]
+    x: Array
+    principal: Array
+    lower: Array
+    upper: Array
+
+
+def estimate(
+    readings: Mapping[str, float], system: str, settings: Settings | None = None
+) -> Estimate:
+    """Stiffness [Pa] for elastography readings [Pa] by aetiology.
+
+    An aetiology without a reading takes NORMAL_LIVER, or its rules are left out, as `absent` says;
+    either leaves a note, as does a reading outside the instrument's scale. Raises ValueError for an
+    unknown aetiology or system, and for a reading that is not finite, not positive, so far off that
+    its unit must be wrong, or refused by `out_of_range`.
+    """
+    settings = settings or Settings()
+    liver, row = patient_system(readings, settings), liver_row(readings)
+    found = infer(liver, row, system, settings.options, UNIT)
+    return Estimate(
+        system=system,
+        estimate=float(found.value[0]) * PA_PER_KPA,
+        interval=_interval(found),
+        quadrature_error=_quadrature_error(liver, row, system, settings, found),
+        notes=(*_missing_notes(readings, settings), *found.notes),
+        method=found.method,
+    )
+
+
+def evaluate(
+    X: Array, system: str, settings: Settings | None = None, present: Collection[str] = AETIOLOGIES
+) -> tuple[Array, Array | None]:
+    """Stiffness [Pa] (N,), and the interval (N, 2) of interval type-2, for readings X (N, 5) [Pa].
+
+    Columns follow AETIOLOGIES; with absent="silent" only those `present` take part. Readings are
+    checked as in `estimate`.
+    """
+    settings = settings or Settings()
+    found = infer(
+        liver_system(settings, _present(present, settings)),
+        _plausible(np.asarray(X, dtype=np.float64)) / PA_PER_KPA,
+        system,
+        settings.options,
+        UNIT,
+    )
+    interval = None if found.interval is None else found.interval * PA_PER_KPA
+    return found.value * PA_PER_KPA, interval
+
+
+def rule_count(settings: Settings | None = None) -> int:
+    """Number of rules; 247 with the default reading of Table I and all aetiologies present."""
+    return len(liver_system(settings or Settings()).rules)
+
+
+def patient_system(readings: Mapping[str, float], settings: Settings) -> System:
+    """The fuzzy system, in kPa, that answers for these aetiologies."""
+    return liver_system(settings, _present(readings, settings))
+
+
+def _present(names: Collection[str], settings: Settings) -> tuple[str, ...]:
+    if settings.absent == "normal":
+        return AETIOLOGIES
+    return tuple(name for name in AETIOLOGIES if name in names)
+
+
+def liver_row(readings: Mapping[str, float]) -> Array:
+    """The readings [Pa] as one row (1, 5) in kPa, a normal liver where there is none."""
+    row = np.full((1, len(AETIOLOGIES)), NORMAL_LIVER)
+    for name, reading in readings.items():
+        row[0, _column(name)] = reading
+    return _plausible(row) / PA_PER_KPA
+
+
+def surface(
+    system: str,
+    x_name: str,
+    y_name: str,
+    *,
+    points: int = 41,
+    settings: Settings | None = None,
+    base: Mapping[str, float] | None = None,
+) -> tuple[Array, Array, Array]:
+    """Stiffness over two readings on the instrument's scale: x (P,), y (P,), z (P, P), all [Pa].
+
+    z[i, j] belongs to y[i] and x[j]. The other aetiologies keep their `base` readings.
+    """
+    i, j = _column(x_name), _column(y_name)
+    if i == j:
+        raise ValueError(f"surface over {x_name!r} twice: name two different aetiologies")
+    base = base or {}
+    low, high = _scale()
+    x = y = np.geomspace(low, high, points)  # where the sets are, near the lower end
+    X = np.tile(liver_row(base) * PA_PER_KPA, (points * points, 1))
+    X[:, i], X[:, j] = (axis.ravel() for axis in np.meshgrid(x, y))
+    z, _ = evaluate(X, system, settings, {*base, x_name, y_name})
+    return x, y, z.reshape(points, points)
+
+
+def membership_curves(settings: Settings | None = None, points: int = 401) -> dict[str, Curves]:
+    """Curves of every input and of the output, by variable name."""
+    liver = liver_system(settings or Settings())
+    curves = {}
+    for variable in (*liver.inputs, liver.output):
+        x = np.linspace(variable.low, variable.high, points)
+        curves[variable.name] = Curves(
+            sets=tuple(fuzzy_set.name for fuzzy_set in variable.sets),
+            x=x * PA_PER_KPA,
+            principal=memberships(variable, x, membership),
+            lower=memberships(variable, x, lower_membership),
+            upper=memberships(variable, x, upper_membership),
+        )
+    return curves
+
+
+def _interval(found: Inferred) -> tuple[float, float] | None:
+    if found.interval is None:
+        return None
+    low, high = found.interval[0] * PA_PER_KPA
+    return float(low), float(high)
+
+
+def _quadrature_error(
+    liver: System, row: Array, system: str, settings: Settings, found: Inferred
+) -> float:
+    if settings.options.sampling == "exact":
+        return exact.TOLERANCE * (liver.output.high - liver.output.low) * PA_PER_KPA
+    continuous = infer(liver, row, system, replace(settings.options, sampling="exact"), UNIT)
+    return abs(float(found.value[0] - continuous.value[0])) * PA_PER_KPA
+
+
+def _column(name: str) -> int:
+    if name not in AETIOLOGIES:
+        raise ValueError(f"aetiology {name!r}: use one of {', '.join(AETIOLOGIES)}")
+    return AETIOLOGIES.index(name)
+
+
+def _scale() -> tuple[float, float]:
+    """The instrument's scale [Pa]."""
+    return parameters()["input_low"] * PA_PER_KPA, parameters()["input_high"] * PA_PER_KPA
+
+
+def _plausible(X: Array) -> Array:
+    """X [Pa] once no reading is beyond any liver."""
+    low, high = (parameters()[key] * PA_PER_KPA for key in ("plausible_low", "plausible_high"))
+    # Written so that NaN, for which no comparison holds, counts as implausible.
+    bad = np.argwhere(~((low <= X) & (high >= X)))
+    if bad.size:
+        row, column = bad[0]
+        raise ValueError(_refusal(AETIOLOGIES[column], X[row, column]))
+    return X
+
+
+def _refusal(name: str, reading: float) -> str:
+    if not np.isfinite(reading) or reading <= 0:
+        return f"{name} = {reading} Pa: give a finite positive reading, or leave it out"
+    low, high = parameters()["plausible_low"], parameters()["plausible_high"]
+    return (
+        f"{name} = {reading:g} Pa is outside {low:g}-{high:g} kPa, beyond any liver: give Pa "
+        "(9.5 kPa is 9500) on the transient-elastography scale"
+    )
+
+
+def _missing_notes(readings: Mapping[str, float], settings: Settings) -> list[str]:
+    done = {
+        "normal": f"the normal liver's {NORMAL_LIVER / PA_PER_KPA:g} kPa taken",
+        "silent": "the rules that name it left out",
+    }[settings.absent]
+    return [f"{name}: no reading; {done}" for name in AETIOLOGIES if name not in readings]
