@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import (
     PA_PER_KPA,
     UNIT,
-    Estimate,
+    StiffnessEstimate,
     estimate,
     liver_row,
     patient_system,
 )
 from fuzzy.liver.system import liver_system
-from fuzzy.systems.inference import SYSTEMS, Options
-from fuzzy.systems.system import System
+from fuzzy.systems.inference import SYSTEMS, InferenceOptions
+from fuzzy.systems.system import FuzzySystem
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
@@ -34,7 +34,7 @@ class Request:
     """What was asked on the command line.
 
     `readings` [kPa] by aetiology; `systems` empty for all three; `settings` the given fields of
-    Settings and Options by name; `row` of the table to explain, from 1.
+    LiverSettings and InferenceOptions by name; `row` of the table to explain, from 1.
     """
 
     readings: Mapping[str, float] = field(default_factory=dict)
@@ -58,12 +58,12 @@ class Answer:
     notes: tuple[str, ...] = ()
 
 
-def settings_of(given: Mapping[str, Any]) -> Settings:
+def settings_of(given: Mapping[str, Any]) -> LiverSettings:
     """Settings with the given fields in place of the defaults. ValueError naming a wrong one."""
-    names = {one.name for one in fields(Options)}
-    options = Options(**{key: value for key, value in given.items() if key in names})
+    names = {one.name for one in fields(InferenceOptions)}
+    options = InferenceOptions(**{key: value for key, value in given.items() if key in names})
     liver = {key: value for key, value in given.items() if key not in names}
-    return Settings(**liver, options=options)
+    return LiverSettings(**liver, options=options)
 
 
 def answer(request: Request) -> Answer:
@@ -111,17 +111,17 @@ def _check_plausible(kpa: float, where: str) -> None:
         raise ValueError(f"{where}: no liver has that; give kPa, {low:g} to {high:g}")
 
 
-def _line(found: Estimate) -> str:
+def _line(found: StiffnessEstimate) -> str:
     bounds = [f"{bound / PA_PER_KPA:.2f}" for bound in found.interval or ()]
     interval = f"   [{', '.join(bounds)}]" if bounds else ""
     return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval}"
 
 
-def _as_json(found: Sequence[Estimate]) -> str:
+def _as_json(found: Sequence[StiffnessEstimate]) -> str:
     return json.dumps({one.system: _numbers(one) for one in found}, indent=1)
 
 
-def _numbers(found: Estimate) -> dict[str, object]:
+def _numbers(found: StiffnessEstimate) -> dict[str, object]:
     numbers: dict[str, object] = {
         "estimate_pa": found.estimate,
         "quadrature_error_pa": found.quadrature_error,
@@ -131,7 +131,7 @@ def _numbers(found: Estimate) -> dict[str, object]:
     return numbers | ({"interval_pa": list(found.interval)} if found.interval else {})
 
 
-def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iterator[str]:
+def _explained(request: Request, system: FuzzySystem, x: NDArray[np.float64]) -> Iterator[str]:
     from fuzzy.systems.explain import explain
     from fuzzy.systems.explanation_text import explanation_lines
 
@@ -177,13 +177,13 @@ def _check_table(request: Request) -> None:
         raise ValueError("--row: only with --explain; leave it out")
 
 
-def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str]:
+def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[FuzzySystem, str]:
     """The system of a file, or the liver's; and the unit of its readings where it is known."""
     if path is None:
         return liver_system(settings_of(given)), UNIT
     from fuzzy.systems.files import read_rule_base
 
-    options = {one.name for one in fields(Options)}
+    options = {one.name for one in fields(InferenceOptions)}
     for key in given:
         if key not in options:
             flag = "--" + key.replace("_", "-")
@@ -193,7 +193,7 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str
     return read_rule_base(path), ""
 
 
-def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.float64]:
+def _table_row(inputs: Path, row: int | None, system: FuzzySystem) -> NDArray[np.float64]:
     from fuzzy.systems.table import read_readings
 
     X = read_readings(inputs, system)
@@ -207,7 +207,7 @@ def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.floa
 
 
 def _draw(
-    folder: Path, request: Request, readings: Mapping[str, float], settings: Settings
+    folder: Path, request: Request, readings: Mapping[str, float], settings: LiverSettings
 ) -> Iterator[str]:
     """Write the figures into the folder; their paths."""
     from reports.fuzzy_figures import draw_sets, draw_surfaces

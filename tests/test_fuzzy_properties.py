@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
-from fuzzy.systems.inference import SYSTEMS, Options, infer
+from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
 from fuzzy.systems.quadrature import centroid, sampled
 from fuzzy.systems.sets import (
     FORMS,
@@ -20,9 +20,9 @@ from fuzzy.systems.sets import (
     upper_membership,
 )
 from fuzzy.systems.system import (
+    FuzzySystem,
     Operators,
     Rule,
-    System,
     Term,
     Variable,
     firing_strengths,
@@ -33,8 +33,8 @@ from fuzzy.systems.system import (
 READING = st.floats(2, 75)
 ROW = st.lists(READING, min_size=5, max_size=5).map(lambda row: np.array([row]))
 quick = settings(max_examples=50, deadline=None, derandomize=True)
-LIVER = liver_system(Settings())
-TYPE_1 = liver_system(Settings(footprint_factor=0.0))
+LIVER = liver_system(LiverSettings())
+TYPE_1 = liver_system(LiverSettings(footprint_factor=0.0))
 
 
 def interval(system, row):
@@ -45,7 +45,7 @@ def interval(system, row):
 @given(ROW, st.integers(0, 20), st.integers(1, 20))
 def test_interval_grows_with_the_footprint(row, tenths, more):
     narrow, wide = (
-        interval(liver_system(Settings(footprint_factor=n / 20)), row)
+        interval(liver_system(LiverSettings(footprint_factor=n / 20)), row)
         for n in (tenths, tenths + more)
     )
     assert wide[0] <= narrow[0] + 1e-10
@@ -62,7 +62,7 @@ def test_zero_footprint_is_mamdani_on_the_liver(row):
 
 def every_answer(system, row):
     one_by_one = [infer(system, row, kind).value[0] for kind in SYSTEMS]
-    merged = infer(system, row, "sugeno", Options(sugeno_aggregation="max")).value[0]
+    merged = infer(system, row, "sugeno", InferenceOptions(sugeno_aggregation="max")).value[0]
     return [*one_by_one, merged, *interval(system, row)]
 
 
@@ -77,7 +77,7 @@ def test_rule_order_changes_nothing(row, order):
 @quick
 @given(ROW)
 def test_repeated_rules_change_the_sugeno_sum_only(row):
-    dropped = liver_system(Settings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
     kept, once = every_answer(LIVER, row), every_answer(dropped, row)
     at_sum = SYSTEMS.index("sugeno")
     assert kept[:at_sum] == once[:at_sum]
@@ -86,7 +86,7 @@ def test_repeated_rules_change_the_sugeno_sum_only(row):
 
 def test_a_repeated_rule_does_change_the_sugeno_sum():
     row = np.array([[9.5, 4.1, 4.1, 4.1, 4.1]])
-    dropped = liver_system(Settings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
     kept, once = (infer(system, row, "sugeno").value[0] for system in (LIVER, dropped))
     assert abs(kept - once) > 1e-3
 
@@ -171,6 +171,6 @@ def test_a_mirrored_system_gives_the_middle(kind):
     y = FuzzySet("low", "gaussmf", (5.0, 20.0)), FuzzySet("high", "gaussmf", (5.0, 55.0))
     x = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
     rules = tuple(Rule((Term(0, 0),), k) for k in (0, 1))
-    mirrored = System((x,), Variable("y", 0, 75, y), rules)
+    mirrored = FuzzySystem((x,), Variable("y", 0, 75, y), rules)
     # The sets are cut 4 sd from the ends of the universe, alike on both sides.
     assert infer(mirrored, [[0.5]], kind).value[0] == pytest.approx(37.5, abs=1e-12)

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from math import prod
 
 from fuzzy.liver.knowledge import OUTPUT, SetRecord, elastography, output_records, parameters
-from fuzzy.liver.readings import READINGS, Reading, disease_sets, reading_named, rule_count
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.readings import READINGS, TableReading, disease_sets, reading_named, rule_count
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system, records_in_use, relative_half_width
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.inference import SYSTEMS, method
@@ -49,13 +49,13 @@ OUT_OF_RANGE = {
 }
 
 
-def assumptions(settings: Settings | None = None) -> tuple[str, ...]:
+def assumptions(settings: LiverSettings | None = None) -> tuple[str, ...]:
     """Every reading and modelling choice in force, one sentence each."""
-    settings = settings or Settings()
+    settings = settings or LiverSettings()
     return (*_rules(settings), *_data(settings), *_footprints(settings), *_inference(settings))
 
 
-def _rules(settings: Settings) -> tuple[str, ...]:
+def _rules(settings: LiverSettings) -> tuple[str, ...]:
     reading = reading_named(settings.reading)
     return (
         _count(settings.reading, reading),
@@ -70,7 +70,7 @@ def _rules(settings: Settings) -> tuple[str, ...]:
     )
 
 
-def _count(name: str, reading: Reading) -> str:
+def _count(name: str, reading: TableReading) -> str:
     number = rule_count(reading)
     others = [x for x in READINGS if x != name and rule_count(READINGS[x]) == PAPER_RULES]
     verdict = (
@@ -87,7 +87,7 @@ def _count(name: str, reading: Reading) -> str:
     )
 
 
-def _duplicates(reading: Reading) -> str:
+def _duplicates(reading: TableReading) -> str:
     counts = dict(zip(AETIOLOGIES, reading.counts, strict=True))
     rules = prod(counts[disease] for disease in REPEATED_TRIPLE)
     if reading.duplicates == "keep":
@@ -95,7 +95,7 @@ def _duplicates(reading: Reading) -> str:
     return "enters once"
 
 
-def _dominance(settings: Settings) -> str:
+def _dominance(settings: LiverSettings) -> str:
     system = liver_system(settings)
     number = len(system.rules)
     left = number - len(dominated(system))
@@ -107,7 +107,7 @@ def _dominance(settings: Settings) -> str:
     )
 
 
-def _data(settings: Settings) -> tuple[str, ...]:
+def _data(settings: LiverSettings) -> tuple[str, ...]:
     used = records_in_use(settings)
     inputs = [record for record in used if record.aetiology != OUTPUT]
     normal = parameters()["normal_liver"]
@@ -129,7 +129,7 @@ def _data(settings: Settings) -> tuple[str, ...]:
     )
 
 
-def _centres(settings: Settings, inputs: list[SetRecord]) -> tuple[str, ...]:
+def _centres(settings: LiverSettings, inputs: list[SetRecord]) -> tuple[str, ...]:
     cut_offs = [record for record in inputs if record.placement == "cut-off"]
     centres = f"Centres of {_names(cut_offs)} are cut-offs between stages, used as centres"
     if settings.placement == "stage-mean":
@@ -157,7 +157,7 @@ def _graded(inputs: list[SetRecord]) -> Iterable[str]:
         )
 
 
-def _footprints(settings: Settings) -> tuple[str, ...]:
+def _footprints(settings: LiverSettings) -> tuple[str, ...]:
     if settings.footprint_factor == 0:
         return ("The footprint is switched off, so interval type-2 repeats Mamdani.",)
     by_stage = {record.stage: record for record in elastography()}
@@ -185,7 +185,7 @@ def _between_studies(by_stage: dict[str, SetRecord]) -> str:
     return ", ".join(f"{by_stage[stage].between_study:.2f}" for stage in ("F2", "F3", "F4"))
 
 
-def _inference(settings: Settings) -> tuple[str, ...]:
+def _inference(settings: LiverSettings) -> tuple[str, ...]:
     system, p = liver_system(settings), parameters()
     return (
         "The lowest set of each input stays at 1 below its centre and the highest at 1 above, "

@@ -20,7 +20,7 @@ MISSING_TRIPLE = ("ald", "cld", "nafld")
 
 
 @dataclass(frozen=True)
-class Reading:
+class TableReading:
     """One way of counting rules.
 
     `counts`: fuzzy sets of each aetiology, in the order of AETIOLOGIES. `sizes`: the cells that
@@ -40,21 +40,21 @@ class Reading:
 SINGLES_TO_TRIPLES = (1, 2, 3)
 PAIRS_AND_TRIPLES = (2, 3)
 
-READINGS: dict[str, Reading] = {
-    "R1": Reading((2, 3, 2, 2, 2)),
-    "R1-no-duplicates": Reading((2, 3, 2, 2, 2), duplicates="drop"),
-    "R1-literal": Reading((2, 3, 2, 2, 2), odd_cell="literal"),
-    "R1-literal-hcv3": Reading((3, 2, 2, 2, 2), odd_cell="literal"),
-    "R2": Reading((2, 2, 2, 2, 3), diagonal="square", odd_cell="pair"),
-    "R3-pair": Reading((3, 2, 2, 2, 2), diagonal="square", odd_cell="pair", duplicates="drop"),
-    "R3-literal": Reading(
+READINGS: dict[str, TableReading] = {
+    "R1": TableReading((2, 3, 2, 2, 2)),
+    "R1-no-duplicates": TableReading((2, 3, 2, 2, 2), duplicates="drop"),
+    "R1-literal": TableReading((2, 3, 2, 2, 2), odd_cell="literal"),
+    "R1-literal-hcv3": TableReading((3, 2, 2, 2, 2), odd_cell="literal"),
+    "R2": TableReading((2, 2, 2, 2, 3), diagonal="square", odd_cell="pair"),
+    "R3-pair": TableReading((3, 2, 2, 2, 2), diagonal="square", odd_cell="pair", duplicates="drop"),
+    "R3-literal": TableReading(
         (2, 2, 2, 2, 3), diagonal="square", odd_cell="literal", duplicates="drop"
     ),
-    "R4-drop": Reading((2, 3, 2, 3, 3), PAIRS_AND_TRIPLES, odd_cell="drop"),
-    "R4-pair": Reading((3, 2, 2, 3, 3), PAIRS_AND_TRIPLES, odd_cell="pair"),
-    "R5-hbv4": Reading((2, 4, 3, 2, 2), SINGLES_TO_TRIPLES, odd_cell="drop"),
-    "R5-hcv4": Reading((4, 3, 2, 2, 2), SINGLES_TO_TRIPLES, odd_cell="drop"),
-    "R5-pair": Reading((4, 2, 3, 2, 2), SINGLES_TO_TRIPLES, odd_cell="pair"),
+    "R4-drop": TableReading((2, 3, 2, 3, 3), PAIRS_AND_TRIPLES, odd_cell="drop"),
+    "R4-pair": TableReading((3, 2, 2, 3, 3), PAIRS_AND_TRIPLES, odd_cell="pair"),
+    "R5-hbv4": TableReading((2, 4, 3, 2, 2), SINGLES_TO_TRIPLES, odd_cell="drop"),
+    "R5-hcv4": TableReading((4, 3, 2, 2, 2), SINGLES_TO_TRIPLES, odd_cell="drop"),
+    "R5-pair": TableReading((4, 2, 3, 2, 2), SINGLES_TO_TRIPLES, odd_cell="pair"),
 }
 """Readings that the data can carry; all give 247 rules but R1-no-duplicates, which gives 235."""
 
@@ -67,7 +67,7 @@ UNSUPPORTED = {
 """Readings that reach 247 with sets that no data of ours describe, and what they need."""
 
 
-def reading_named(name: str) -> Reading:
+def reading_named(name: str) -> TableReading:
     """The reading of that name. ValueError if there is none or the data cannot carry it."""
     if name in READINGS:
         return READINGS[name]
@@ -76,7 +76,7 @@ def reading_named(name: str) -> Reading:
     raise ValueError(f"reading = {name!r}{reason}: use one of {', '.join(READINGS)}")
 
 
-def disease_sets(reading: Reading) -> list[Cell]:
+def disease_sets(reading: TableReading) -> list[Cell]:
     """The antecedents' diseases, one entry per cell that counts, in the order of Table I."""
     printed = list(dict.fromkeys(cells())) if reading.duplicates == "drop" else list(cells())
     odd = [_odd(cell, reading.odd_cell) if is_odd(cell) else cell for cell in printed]
@@ -96,7 +96,7 @@ def _odd(cell: Cell, meaning: OddCell) -> Cell:
     return ()
 
 
-def rule_count(reading: Reading) -> int:
+def rule_count(reading: TableReading) -> int:
     """Number of rules, by counting grids."""
     counts = dict(zip(AETIOLOGIES, reading.counts, strict=True))
     return sum(prod(counts[disease] for disease in cell) for cell in disease_sets(reading))

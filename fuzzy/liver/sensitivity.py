@@ -13,8 +13,9 @@ import numpy as np
 
 from fuzzy.liver.knowledge import parameters
 from fuzzy.liver.readings import READINGS
-from fuzzy.liver.settings import CHOICES, Settings
-from fuzzy.liver.stiffness import AETIOLOGIES, PA_PER_KPA, evaluate, liver_row
+from fuzzy.liver.settings import CHOICES, LiverSettings
+from fuzzy.liver.stiffness import PA_PER_KPA, evaluate, liver_row
+from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.inference import CHOICES as OPTIONS
 from fuzzy.systems.inference import SYSTEMS, SystemName
 from fuzzy.systems.sets import Array
@@ -35,7 +36,7 @@ SUGENO: tuple[SystemName, ...] = ("sugeno",)
 
 
 class Axis(NamedTuple):
-    """A field of Settings, or of its options, the values it is given, and the systems it moves."""
+    """A field of LiverSettings or of its options, the values it takes, the systems it moves."""
 
     key: str
     values: tuple[Any, ...]
@@ -103,11 +104,11 @@ class _Case(NamedTuple):
 
     X: Array
     system: str
-    settings: Settings
+    settings: LiverSettings
     present: Collection[str] = AETIOLOGIES
 
 
-def sensitivity(readings: Mapping[str, float], base: Settings, rows: int = 256) -> Screening:
+def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 256) -> Screening:
     """Every alternative of every choice against `base`, at the readings [Pa] and over `rows` more.
 
     Those are spread log-uniformly over each aetiology, see `spread_readings`; exact sampling is
@@ -130,23 +131,23 @@ def sensitivity(readings: Mapping[str, float], base: Settings, rows: int = 256) 
     return Screening((*found, *_between_systems(readings, base, rows)), tuple(left_out))
 
 
-def _value(settings: Settings, key: str) -> Any:
+def _value(settings: LiverSettings, key: str) -> Any:
     return getattr(settings if hasattr(settings, key) else settings.options, key)
 
 
-def _is_idle(key: str, base: Settings) -> bool:
+def _is_idle(key: str, base: LiverSettings) -> bool:
     """Whether a choice has no part in the answer: exact sampling takes no samples."""
     return key == "samples" and base.options.sampling == "exact"
 
 
-def _changed(base: Settings, key: str, value: Any) -> Settings:
+def _changed(base: LiverSettings, key: str, value: Any) -> LiverSettings:
     if hasattr(base, key):
         return replace(base, **{key: value})
     return replace(base, options=replace(base.options, **{key: value}))
 
 
 def _changes(
-    readings: Mapping[str, float], base: Settings, axis: Axis, value: Any, rows: int
+    readings: Mapping[str, float], base: LiverSettings, axis: Axis, value: Any, rows: int
 ) -> list[Sensitivity]:
     labels = axis.key, _label(_value(base, axis.key)), _label(value)
     if axis.key != "sampling":
@@ -180,19 +181,19 @@ def _require_absent(present: Collection[str]) -> None:
         )
 
 
-def _sampled(settings: Settings) -> Settings:
+def _sampled(settings: LiverSettings) -> LiverSettings:
     if settings.options.sampling != "exact":
         return settings
     return replace(settings, options=replace(settings.options, **STAND_IN))
 
 
-def _rows(base: Settings, other: Settings, rows: int) -> int:
+def _rows(base: LiverSettings, other: LiverSettings, rows: int) -> int:
     exact = "exact" in (base.options.sampling, other.options.sampling)
     return min(rows, EXACT_ROWS) if exact else rows
 
 
 def _between_systems(
-    readings: Mapping[str, float], base: Settings, rows: int
+    readings: Mapping[str, float], base: LiverSettings, rows: int
 ) -> Iterator[Sensitivity]:
     X, base = spread_readings(rows), _sampled(base)
     for one, other in combinations(SYSTEMS, 2):

@@ -7,7 +7,7 @@ from fuzzy.liver.knowledge import Placement, input_records
 from fuzzy.liver.readings import reading_named
 from fuzzy.liver.rules import Consequent
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import Options
+from fuzzy.systems.inference import InferenceOptions
 
 FootprintKind = Literal["uncertain-mean", "uncertain-spread", "scaled"]
 Absent = Literal["normal", "silent"]
@@ -23,7 +23,7 @@ LARGEST_FACTOR = 3.0
 
 
 @dataclass(frozen=True)
-class Settings:
+class LiverSettings:
     """How the rule base is read, placed on the data and evaluated.
 
     `reading` is a name of READINGS. `placement` puts the centres of HCV's and HBV's sets on the
@@ -39,7 +39,7 @@ class Settings:
     footprint: FootprintKind = "uncertain-mean"
     footprint_factor: float = 1.0
     absent: Absent = "normal"
-    options: Options = field(default_factory=Options)
+    options: InferenceOptions = field(default_factory=InferenceOptions)
 
     def __post_init__(self) -> None:
         for key, allowed in CHOICES.items():

@@ -1,7 +1,6 @@
 """Liver stiffness [Pa] from elastography readings [Pa] by three fuzzy systems.
 
-The face of the package. Elastography is published in kPa and the fuzzy systems work in kPa; this
-module alone converts.
+Elastography is published in kPa and the fuzzy systems work in kPa; this module alone converts.
 """
 
 from collections.abc import Collection, Mapping
@@ -10,32 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems import exact
-from fuzzy.systems.inference import SYSTEMS, Inferred, Options, SystemName, infer
+from fuzzy.systems.inference import Inferred, infer
 from fuzzy.systems.sets import Array, lower_membership, membership, upper_membership
-from fuzzy.systems.system import System, memberships
-
-__all__ = [
-    "AETIOLOGIES",
-    "NORMAL_LIVER",
-    "PA_PER_KPA",
-    "SYSTEMS",
-    "Curves",
-    "Estimate",
-    "Options",
-    "Settings",
-    "SystemName",
-    "estimate",
-    "evaluate",
-    "liver_row",
-    "membership_curves",
-    "patient_system",
-    "rule_count",
-    "surface",
-]
+from fuzzy.systems.system import FuzzySystem, memberships
 
 UNIT = "kPa"
 PA_PER_KPA = 1e3
@@ -43,7 +23,7 @@ NORMAL_LIVER = parameters()["normal_liver"] * PA_PER_KPA  # [Pa]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StiffnessEstimate:
     """Small-strain Young's modulus of the liver on the transient-elastography scale [Pa].
 
     `interval` is the range of centroids of interval type-2, None for the others.
@@ -61,7 +41,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Curves:
+class MembershipCurves:
     """Membership of x [Pa], shape (P,), in each named set of a variable, each shape (sets, P)."""
 
     sets: tuple[str, ...]
@@ -72,8 +52,8 @@ class Curves:
 
 
 def estimate(
-    readings: Mapping[str, float], system: str, settings: Settings | None = None
-) -> Estimate:
+    readings: Mapping[str, float], system: str, settings: LiverSettings | None = None
+) -> StiffnessEstimate:
     """Stiffness [Pa] for elastography readings [Pa] by aetiology.
 
     An aetiology without a reading takes NORMAL_LIVER, or its rules are left out, as `absent` says;
@@ -81,10 +61,10 @@ def estimate(
     unknown aetiology or system, and for a reading that is not finite, not positive, so far off that
     its unit must be wrong, or refused by `out_of_range`.
     """
-    settings = settings or Settings()
+    settings = settings or LiverSettings()
     liver, row = patient_system(readings, settings), liver_row(readings)
     found = infer(liver, row, system, settings.options, UNIT)
-    return Estimate(
+    return StiffnessEstimate(
         system=system,
         estimate=float(found.value[0]) * PA_PER_KPA,
         interval=_interval(found),
@@ -95,14 +75,17 @@ def estimate(
 
 
 def evaluate(
-    X: Array, system: str, settings: Settings | None = None, present: Collection[str] = AETIOLOGIES
+    X: Array,
+    system: str,
+    settings: LiverSettings | None = None,
+    present: Collection[str] = AETIOLOGIES,
 ) -> tuple[Array, Array | None]:
     """Stiffness [Pa] (N,), and the interval (N, 2) of interval type-2, for readings X (N, 5) [Pa].
 
     Columns follow AETIOLOGIES; with absent="silent" only those `present` take part. Readings are
     checked as in `estimate`.
     """
-    settings = settings or Settings()
+    settings = settings or LiverSettings()
     found = infer(
         liver_system(settings, _present(present, settings)),
         _plausible(np.asarray(X, dtype=np.float64)) / PA_PER_KPA,
@@ -114,17 +97,17 @@ def evaluate(
     return found.value * PA_PER_KPA, interval
 
 
-def rule_count(settings: Settings | None = None) -> int:
+def rule_count(settings: LiverSettings | None = None) -> int:
     """Number of rules; 247 with the default reading of Table I and all aetiologies present."""
-    return len(liver_system(settings or Settings()).rules)
+    return len(liver_system(settings or LiverSettings()).rules)
 
 
-def patient_system(readings: Mapping[str, float], settings: Settings) -> System:
+def patient_system(readings: Mapping[str, float], settings: LiverSettings) -> FuzzySystem:
     """The fuzzy system, in kPa, that answers for these aetiologies."""
     return liver_system(settings, _present(readings, settings))
 
 
-def _present(names: Collection[str], settings: Settings) -> tuple[str, ...]:
+def _present(names: Collection[str], settings: LiverSettings) -> tuple[str, ...]:
     if settings.absent == "normal":
         return AETIOLOGIES
     return tuple(name for name in AETIOLOGIES if name in names)
@@ -144,7 +127,7 @@ def surface(
     y_name: str,
     *,
     points: int = 41,
-    settings: Settings | None = None,
+    settings: LiverSettings | None = None,
     base: Mapping[str, float] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Stiffness over two readings on the instrument's scale: x (P,), y (P,), z (P, P), all [Pa].
@@ -163,13 +146,15 @@ def surface(
     return x, y, z.reshape(points, points)
 
 
-def membership_curves(settings: Settings | None = None, points: int = 401) -> dict[str, Curves]:
+def membership_curves(
+    settings: LiverSettings | None = None, points: int = 401
+) -> dict[str, MembershipCurves]:
     """Curves of every input and of the output, by variable name."""
-    liver = liver_system(settings or Settings())
+    liver = liver_system(settings or LiverSettings())
     curves = {}
     for variable in (*liver.inputs, liver.output):
         x = np.linspace(variable.low, variable.high, points)
-        curves[variable.name] = Curves(
+        curves[variable.name] = MembershipCurves(
             sets=tuple(fuzzy_set.name for fuzzy_set in variable.sets),
             x=x * PA_PER_KPA,
             principal=memberships(variable, x, membership),
@@ -187,7 +172,7 @@ def _interval(found: Inferred) -> tuple[float, float] | None:
 
 
 def _quadrature_error(
-    liver: System, row: Array, system: str, settings: Settings, found: Inferred
+    liver: FuzzySystem, row: Array, system: str, settings: LiverSettings, found: Inferred
 ) -> float:
     if settings.options.sampling == "exact":
         return exact.TOLERANCE * (liver.output.high - liver.output.low) * PA_PER_KPA
@@ -227,7 +212,7 @@ def _refusal(name: str, reading: float) -> str:
     )
 
 
-def _missing_notes(readings: Mapping[str, float], settings: Settings) -> list[str]:
+def _missing_notes(readings: Mapping[str, float], settings: LiverSettings) -> list[str]:
     done = {
         "normal": f"the normal liver's {NORMAL_LIVER / PA_PER_KPA:g} kPa taken",
         "silent": "the rules that name it left out",

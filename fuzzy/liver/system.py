@@ -13,14 +13,14 @@ from fuzzy.liver.knowledge import (
 )
 from fuzzy.liver.readings import disease_sets, reading_named
 from fuzzy.liver.rules import rule_base
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.sets import Footprint, FuzzySet
-from fuzzy.systems.system import System, Variable
+from fuzzy.systems.system import FuzzySystem, Variable
 
 
 @cache
-def liver_system(settings: Settings, present: tuple[str, ...] = AETIOLOGIES) -> System:
+def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES) -> FuzzySystem:
     """Table I over the elastography sets.
 
     Only antecedents whose diseases are all `present` make rules; the inputs stay all five.
@@ -31,7 +31,7 @@ def liver_system(settings: Settings, present: tuple[str, ...] = AETIOLOGIES) -> 
         name: [SEVERITIES.index(record.severity) for record in found]
         for name, found in records.items()
     }
-    return System(
+    return FuzzySystem(
         inputs=tuple(_input(name, found, settings) for name, found in records.items()),
         output=_output(settings),
         rules=rule_base(_antecedents(settings, present), severities, settings.consequent),
@@ -39,18 +39,18 @@ def liver_system(settings: Settings, present: tuple[str, ...] = AETIOLOGIES) -> 
     )
 
 
-def records_in_use(settings: Settings) -> tuple[SetRecord, ...]:
+def records_in_use(settings: LiverSettings) -> tuple[SetRecord, ...]:
     """Record behind every set of the system: inputs in the order of AETIOLOGIES, then output."""
     inputs = _input_records(settings).values()
     return (*(record for found in inputs for record in found), *output_records())
 
 
-def unsourced(settings: Settings) -> tuple[SetRecord, ...]:
+def unsourced(settings: LiverSettings) -> tuple[SetRecord, ...]:
     """Records in use whose centre or within-stage spread is not published for that very stage."""
     return tuple(record for record in records_in_use(settings) if record.sourced != "yes")
 
 
-def _input_records(settings: Settings) -> dict[str, tuple[SetRecord, ...]]:
+def _input_records(settings: LiverSettings) -> dict[str, tuple[SetRecord, ...]]:
     counts = reading_named(settings.reading).counts
     return {
         name: input_records(name, count, settings.placement)
@@ -58,7 +58,7 @@ def _input_records(settings: Settings) -> dict[str, tuple[SetRecord, ...]]:
     }
 
 
-def _antecedents(settings: Settings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
+def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
     unknown = [name for name in present if name not in AETIOLOGIES]
     if unknown:
         raise ValueError(f"aetiology {unknown[0]!r}: use one of {', '.join(AETIOLOGIES)}")
@@ -73,7 +73,7 @@ def _antecedents(settings: Settings, present: tuple[str, ...]) -> list[tuple[str
     return found
 
 
-def _input(name: str, records: tuple[SetRecord, ...], settings: Settings) -> Variable:
+def _input(name: str, records: tuple[SetRecord, ...], settings: LiverSettings) -> Variable:
     """An aetiology whose outer sets stay at 1 beyond their centres.
 
     A reading beyond the last centre is then fully in that set, and the system cannot forget its
@@ -100,17 +100,17 @@ def _input(name: str, records: tuple[SetRecord, ...], settings: Settings) -> Var
     return Variable(name, parameters()["input_low"], parameters()["input_high"], sets)
 
 
-def _output(settings: Settings) -> Variable:
+def _output(settings: LiverSettings) -> Variable:
     sets = tuple(_gaussian(record, record.severity, settings) for record in output_records())
     return Variable(OUTPUT, parameters()["output_low"], parameters()["output_high"], sets)
 
 
-def _gaussian(record: SetRecord, name: str, settings: Settings) -> FuzzySet:
+def _gaussian(record: SetRecord, name: str, settings: LiverSettings) -> FuzzySet:
     shape = (record.within_stage_sd, record.centre)
     return FuzzySet(name, "gaussmf", shape, footprint(record, settings))
 
 
-def footprint(record: SetRecord, settings: Settings) -> Footprint:
+def footprint(record: SetRecord, settings: LiverSettings) -> Footprint:
     """Footprint of a set.
 
     That the width of the flanks, or the height, is as uncertain as the centre is a choice of this
@@ -125,6 +125,6 @@ def footprint(record: SetRecord, settings: Settings) -> Footprint:
     return Footprint(scale=1.0 - relative)
 
 
-def relative_half_width(record: SetRecord, settings: Settings) -> float:
+def relative_half_width(record: SetRecord, settings: LiverSettings) -> float:
     """Half-width of a footprint over the centre: between studies and operators, independent."""
     return settings.footprint_factor * hypot(record.between_study, record.between_operator)

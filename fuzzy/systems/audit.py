@@ -12,7 +12,7 @@ from fuzzy.systems import coverage, redundancy
 from fuzzy.systems.coverage import Coverage, Gap
 from fuzzy.systems.redundancy import Pair
 from fuzzy.systems.rule_text import rule_text
-from fuzzy.systems.system import System
+from fuzzy.systems.system import FuzzySystem
 
 THRESHOLD = 0.05
 """Strength up to which a reading counts as uncovered; a Gaussian falls to it at 2.4 SD."""
@@ -38,7 +38,7 @@ class Audit:
     threshold: float
 
 
-def audit(system: System, *, samples: int = 4096, threshold: float = THRESHOLD) -> Audit:
+def audit(system: FuzzySystem, *, samples: int = 4096, threshold: float = THRESHOLD) -> Audit:
     """Findings on the system. ValueError for no samples or a threshold outside 0 to 1."""
     if samples < 1:
         raise ValueError(f"samples = {samples}: give at least 1")
@@ -58,7 +58,7 @@ def audit(system: System, *, samples: int = 4096, threshold: float = THRESHOLD) 
     )
 
 
-def _unused(system: System) -> Iterator[tuple[str, str]]:
+def _unused(system: FuzzySystem) -> Iterator[tuple[str, str]]:
     used = {(term.input, term.set) for rule in system.rules for term in rule.antecedents}
     for i, variable in enumerate(system.inputs):
         for k, one in enumerate(variable.sets):
@@ -70,7 +70,7 @@ def _unused(system: System) -> Iterator[tuple[str, str]]:
             yield system.output.name, one.name
 
 
-def audit_lines(found: Audit, system: System, examples: int = 3) -> tuple[str, ...]:
+def audit_lines(found: Audit, system: FuzzySystem, examples: int = 3) -> tuple[str, ...]:
     """The findings as sentences, each kind followed by its first `examples` rules."""
     return (
         _headline(system),
@@ -99,12 +99,12 @@ def audit_lines(found: Audit, system: System, examples: int = 3) -> tuple[str, .
     )
 
 
-def _headline(system: System) -> str:
+def _headline(system: FuzzySystem) -> str:
     counts = ", ".join(f"{len(variable.sets)} of {variable.name}" for variable in system.inputs)
     return f"{system.name}: {len(system.rules)} rules on the sets {counts}"
 
 
-def _pairs(found: Sequence[Pair], system: System, examples: int, what: str) -> Iterator[str]:
+def _pairs(found: Sequence[Pair], system: FuzzySystem, examples: int, what: str) -> Iterator[str]:
     if found:
         yield f"{_counted(len(found), system)} {what}"
     for pair in found[:examples]:
@@ -112,7 +112,7 @@ def _pairs(found: Sequence[Pair], system: System, examples: int, what: str) -> I
     yield from _more(found, examples)
 
 
-def _dominance(found: Audit, system: System, examples: int) -> Iterator[str]:
+def _dominance(found: Audit, system: FuzzySystem, examples: int) -> Iterator[str]:
     if not found.dominated:
         return
     left = len(system.rules) - len(found.dominated) - len(found.weightless)
@@ -130,7 +130,7 @@ def _dominance(found: Audit, system: System, examples: int) -> Iterator[str]:
     yield from _more(found.dominated, examples)
 
 
-def _rules(found: Sequence[int], system: System, examples: int, what: str) -> Iterator[str]:
+def _rules(found: Sequence[int], system: FuzzySystem, examples: int, what: str) -> Iterator[str]:
     if found:
         yield f"{_counted(len(found), system)} {what}"
     yield from (f"  rule {rule + 1}: {_text(rule, system)}" for rule in found[:examples])
@@ -142,7 +142,7 @@ def _more(found: Sequence[object], examples: int) -> Iterator[str]:
         yield f"  and {len(found) - examples} more"
 
 
-def _covered(found: Audit, system: System) -> str:
+def _covered(found: Audit, system: FuzzySystem) -> str:
     values = zip(system.inputs, found.coverage.least_covered, strict=True)
     reading = ", ".join(f"{variable.name} = {x:.4g}" for variable, x in values)
     share = found.coverage.uncovered
@@ -157,9 +157,9 @@ def _covered(found: Audit, system: System) -> str:
     )
 
 
-def _counted(number: int, system: System) -> str:
+def _counted(number: int, system: FuzzySystem) -> str:
     return f"{number} of {len(system.rules)} rules"
 
 
-def _text(rule: int, system: System) -> str:
+def _text(rule: int, system: FuzzySystem) -> str:
     return rule_text(system.rules[rule], system)

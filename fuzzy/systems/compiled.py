@@ -14,7 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fuzzy.systems import kernel
-from fuzzy.systems.inference import LEAST_STRENGTH, Options, check_kind, infer, require_readings
+from fuzzy.systems.inference import (
+    LEAST_STRENGTH,
+    InferenceOptions,
+    check_kind,
+    infer,
+    require_readings,
+)
 from fuzzy.systems.interval_type2 import LEAST_AREA
 from fuzzy.systems.quadrature import Output, sampled
 from fuzzy.systems.redundancy import dominated
@@ -29,7 +35,7 @@ from fuzzy.systems.sets import (
     upper_membership,
 )
 from fuzzy.systems.sugeno import consequents
-from fuzzy.systems.system import Membership, Operators, Rule, System, memberships
+from fuzzy.systems.system import FuzzySystem, Membership, Operators, Rule, memberships
 
 KERNEL_FORMS: dict[str, tuple[int, Callable[[Parameters], tuple[float, ...]]]] = {
     "gaussmf": (kernel.GAUSSIAN, lambda p: (*p, *p)),
@@ -54,7 +60,7 @@ ONE_ROW: dict[str, Callable[..., kernel.Single]] = {
 }
 
 
-class Answer(NamedTuple):
+class CompiledAnswer(NamedTuple):
     """One answer, in the output's unit.
 
     `lower` and `upper` are the ends of the type-2 interval; for the other systems both are `value`.
@@ -74,9 +80,9 @@ class Answer(NamedTuple):
 class Compiled:
     """A system as the arrays of the kernel; `compiled` makes it."""
 
-    system: System
+    system: FuzzySystem
     kind: str
-    options: Options
+    options: InferenceOptions
     universes: Array
     arguments: tuple[Any, ...]
 
@@ -100,7 +106,7 @@ class Compiled:
         clamps = self.options.out_of_range == "clamp"
         return ONE_ROW[self.kind], *kernel.pack(self.universes, clamps, *self.arguments)
 
-    def one(self, x: Sequence[float] | Array) -> Answer:
+    def one(self, x: Sequence[float] | Array) -> CompiledAnswer:
         """The answer to one reading per input, in range as `options.out_of_range` says.
 
         ValueError as from `infer`: a wrong number of readings, one that is not finite or is
@@ -116,17 +122,19 @@ class Compiled:
         policy = self.options.out_of_range
         allowed = outside == 0 or (outside > 0 and policy != "raise")
         if allowed and strength >= LEAST_STRENGTH and math.isfinite(upper - lower):
-            return Answer(value, lower, upper, outside > 0 and policy == "clamp", False)
+            return CompiledAnswer(value, lower, upper, outside > 0 and policy == "clamp", False)
         return self._exceptional(x)
 
-    def _exceptional(self, x: Sequence[float] | Array) -> Answer:
+    def _exceptional(self, x: Sequence[float] | Array) -> CompiledAnswer:
         """What `infer` makes of readings refused or without an answer: an error, or the middle."""
         found = infer(self.system, np.array([x]), self.kind, self.options)
         ends = found.value if found.interval is None else found.interval[0]
-        return Answer(found.value.item(), ends[0].item(), ends[-1].item(), False, True)
+        return CompiledAnswer(found.value.item(), ends[0].item(), ends[-1].item(), False, True)
 
 
-def compiled(system: System, kind: str, options: Options, *, pruned: bool = True) -> Compiled:
+def compiled(
+    system: FuzzySystem, kind: str, options: InferenceOptions, *, pruned: bool = True
+) -> Compiled:
     """The system ready for many answers of one `kind`; the last few are kept.
 
     `pruned` leaves out dominated rules wherever rules merge by max, which changes no answer.
@@ -142,7 +150,7 @@ def compiled(system: System, kind: str, options: Options, *, pruned: bool = True
 
 
 @lru_cache(maxsize=32)
-def _compiled(system: System, kind: str, options: Options, pruned: bool) -> Compiled:
+def _compiled(system: FuzzySystem, kind: str, options: InferenceOptions, pruned: bool) -> Compiled:
     summed = kind == "sugeno" and options.sugeno_aggregation == "sum"
     idle = {pair.rule for pair in dominated(system)} if pruned and not summed else set()
     rules = [rule for number, rule in enumerate(system.rules) if number not in idle]
@@ -155,7 +163,7 @@ def _compiled(system: System, kind: str, options: Options, pruned: bool) -> Comp
     return Compiled(system, kind, options, universes, (*packed, *_output(system, kind, options)))
 
 
-def _output(system: System, kind: str, options: Options) -> tuple[Any, ...]:
+def _output(system: FuzzySystem, kind: str, options: InferenceOptions) -> tuple[Any, ...]:
     """The last arguments of the kernel."""
     if kind == "sugeno":
         return (consequents(system, options.sampling, options.samples),)
@@ -166,7 +174,7 @@ def _output(system: System, kind: str, options: Options) -> tuple[Any, ...]:
 
 
 def _packed_sets(
-    system: System, rules: Sequence[Rule], used: Sequence[tuple[int, int]], *, type_1: bool
+    system: FuzzySystem, rules: Sequence[Rule], used: Sequence[tuple[int, int]], *, type_1: bool
 ) -> kernel.Sets:
     sets = [system.inputs[i].sets[s] for i, s in used]
     forms = [KERNEL_FORMS[one.kind] for one in sets]
@@ -192,7 +200,7 @@ def _core(one: FuzzySet) -> tuple[float, float]:
 
 
 def _packed_rules(
-    system: System, rules: Sequence[Rule], used: Sequence[tuple[int, int]], summed: bool
+    system: FuzzySystem, rules: Sequence[Rule], used: Sequence[tuple[int, int]], summed: bool
 ) -> kernel.Rules:
     place = {one: 2 * number for number, one in enumerate(used)}
     members = [_members(rule, place) for rule in rules]
@@ -223,7 +231,7 @@ def _operator(rule: Rule, operators: Operators) -> int:
 
 
 def _packed_grid(
-    system: System, options: Options, bounds: tuple[Membership, Membership]
+    system: FuzzySystem, options: InferenceOptions, bounds: tuple[Membership, Membership]
 ) -> kernel.Grid:
     y, weights = sampled(system.output, options.samples, options.sampling)
     lower, upper = (memberships(system.output, y, bound) for bound in bounds)

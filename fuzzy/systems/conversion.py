@@ -5,10 +5,12 @@ from dataclasses import replace
 from fuzzy.systems.quadrature import Sampling
 from fuzzy.systems.sets import TYPE_1, FuzzySet
 from fuzzy.systems.sugeno import constants
-from fuzzy.systems.system import System, Variable
+from fuzzy.systems.system import FuzzySystem, Variable
 
 
-def sugeno_of(system: System, sampling: Sampling = "matlab", samples: int = 101) -> System:
+def sugeno_of(
+    system: FuzzySystem, sampling: Sampling = "matlab", samples: int = 101
+) -> FuzzySystem:
     """The system with every output set replaced by the constant at its centroid.
 
     Evaluated as sugeno it answers as the system it was made from; a Sugeno one is left as it is.
@@ -23,7 +25,7 @@ def sugeno_of(system: System, sampling: Sampling = "matlab", samples: int = 101)
     return replace(system, output=replace(system.output, sets=sets))
 
 
-def type_1_of(system: System) -> System:
+def type_1_of(system: FuzzySystem) -> FuzzySystem:
     """The system without footprints, which Mamdani and Sugeno inference do not look at."""
     inputs = tuple(_principal(variable) for variable in system.inputs)
     return replace(system, inputs=inputs, output=_principal(system.output))

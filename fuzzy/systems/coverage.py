@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzzy.systems.sets import Array, corners, lower_membership, membership, upper_membership
 from fuzzy.systems.spread import spread
-from fuzzy.systems.system import System, Term, Variable, firing_strengths, memberships
+from fuzzy.systems.system import FuzzySystem, Term, Variable, firing_strengths, memberships
 
 LEAST_STRENGTH = 1e-12
 """A rule that stays below it at every reading is one that never fires."""
@@ -34,7 +34,7 @@ class Coverage(NamedTuple):
     least_strength: float
 
 
-def unreachable(system: System) -> tuple[int, ...]:
+def unreachable(system: FuzzySystem) -> tuple[int, ...]:
     """Rules that no reading in the universe fires, whatever their weight.
 
     Each input is searched for the reading that suits the rule's terms on it best; inputs vary
@@ -49,7 +49,7 @@ def unreachable(system: System) -> tuple[int, ...]:
     )
 
 
-def _best_readings(system: System) -> Array:
+def _best_readings(system: FuzzySystem) -> Array:
     """Reading at which each rule is strongest, shape (rules, inputs)."""
     best = np.tile(_ends(system)[0], (len(system.rules), 1))
     for i, variable in enumerate(system.inputs):
@@ -66,11 +66,11 @@ def _best_readings(system: System) -> Array:
     return best
 
 
-def _terms_on(system: System, rule: int, i: int) -> tuple[Term, ...]:
+def _terms_on(system: FuzzySystem, rule: int, i: int) -> tuple[Term, ...]:
     return tuple(term for term in system.rules[rule].antecedents if term.input == i)
 
 
-def _strengths(system: System, X: Array) -> Array:
+def _strengths(system: FuzzySystem, X: Array) -> Array:
     return firing_strengths(system, X, upper_membership, lower_membership)
 
 
@@ -81,7 +81,7 @@ def _points(variable: Variable) -> Array:
     return np.sort(np.concatenate([np.linspace(variable.low, variable.high, POINTS), inside]))
 
 
-def gaps(system: System, threshold: float) -> tuple[Gap, ...]:
+def gaps(system: FuzzySystem, threshold: float) -> tuple[Gap, ...]:
     """Gaps of each input by itself; their ends are right to a thousandth of the universe."""
     return tuple(gap for variable in system.inputs for gap in _gaps_of(variable, threshold))
 
@@ -95,7 +95,7 @@ def _gaps_of(variable: Variable, threshold: float) -> Iterator[Gap]:
             yield Gap(variable.name, float(x[places[0]]), float(x[places[-1]]))
 
 
-def coverage(system: System, samples: int, threshold: float) -> Coverage:
+def coverage(system: FuzzySystem, samples: int, threshold: float) -> Coverage:
     """Coverage of evenly spread readings; the corners of the universe can be the least covered."""
     X = np.concatenate([spread_readings(system, samples), _corner_readings(system)])
     strongest = firing_strengths(system, X, membership).max(axis=0)
@@ -107,13 +107,13 @@ def coverage(system: System, samples: int, threshold: float) -> Coverage:
     )
 
 
-def spread_readings(system: System, samples: int) -> Array:
+def spread_readings(system: FuzzySystem, samples: int) -> Array:
     """Evenly spread readings of the universe, shape (samples, inputs)."""
     low, high = _ends(system)
     return np.asarray(low + (high - low) * spread(samples, len(system.inputs)))
 
 
-def _corner_readings(system: System) -> Array:
+def _corner_readings(system: FuzzySystem) -> Array:
     """All combinations of the universe's ends; only the two extreme ones if inputs are many."""
     low, high = _ends(system)
     if len(system.inputs) > MOST_INPUTS_WITH_CORNERS:
@@ -121,7 +121,7 @@ def _corner_readings(system: System) -> Array:
     return np.array(list(product(*zip(low, high, strict=True))))
 
 
-def _ends(system: System) -> tuple[Array, Array]:
+def _ends(system: FuzzySystem) -> tuple[Array, Array]:
     low = np.array([variable.low for variable in system.inputs])
     high = np.array([variable.high for variable in system.inputs])
     return low, high

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.systems.sets import Array, FuzzySet, core, corners, lower_membership, upper_membership
-from fuzzy.systems.system import Membership, System, Variable, memberships
+from fuzzy.systems.system import FuzzySystem, Membership, Variable, memberships
 
 TOLERANCE = 1e-10
 """Largest estimated error of an answer, over the width of the universe."""
@@ -52,7 +52,7 @@ EXCESS[::2] -= _clenshaw_curtis(8)[1]
 class Union(NamedTuple):
     """The union of a system's output sets implied at `heights` (sets,)."""
 
-    system: System
+    system: FuzzySystem
     heights: Array
     membership: Membership
 
@@ -108,7 +108,7 @@ class Panels(NamedTuple):
         return np.asarray(self.area_doubt[curve] * distance + self.moment_doubt[curve])
 
 
-class Switch(NamedTuple):
+class SwitchPanel(NamedTuple):
     """Where one end of the interval passes from curve `first` to curve `second`.
 
     It lies on `panel`, near `near` from the low end. `area` and `moment` are those of `first`
@@ -134,7 +134,7 @@ class Reduction(NamedTuple):
 LOWER, UPPER = 0, 1
 
 
-def centroid(system: System, heights: Array, membership: Membership) -> float:
+def centroid(system: FuzzySystem, heights: Array, membership: Membership) -> float:
     """Centroid of the union of the output sets implied at `heights` (sets,).
 
     NaN if it is empty on the universe. ValueError if TOLERANCE cannot be reached.
@@ -145,7 +145,7 @@ def centroid(system: System, heights: Array, membership: Membership) -> float:
     return system.output.low + float(panels.moment.sum() / panels.area.sum())
 
 
-def reduce(system: System, lower_heights: Array, upper_heights: Array) -> Reduction:
+def reduce(system: FuzzySystem, lower_heights: Array, upper_heights: Array) -> Reduction:
     """Type reduction of the band between two unions of output sets.
 
     NaN if the upper one is empty on the universe. If the lower one is, the interval is the support
@@ -286,7 +286,7 @@ def _parts_of_interval(panels: Panels) -> Array:
     return np.asarray(np.max(parts, axis=0))
 
 
-def _part_of_end(panels: Panels, switch: Switch) -> Array:
+def _part_of_end(panels: Panels, switch: SwitchPanel) -> Array:
     k = switch.panel
     part = np.zeros_like(panels.left)
     part[: k + 1] = panels.doubt(switch.first, switch.near)[: k + 1] / switch.mass
@@ -296,11 +296,11 @@ def _part_of_end(panels: Panels, switch: Switch) -> Array:
     return part
 
 
-def _switches(panels: Panels) -> tuple[Switch, Switch]:
+def _switches(panels: Panels) -> tuple[SwitchPanel, SwitchPanel]:
     return _switch(panels, UPPER, LOWER), _switch(panels, LOWER, UPPER)
 
 
-def _switch(panels: Panels, first: int, second: int) -> Switch:
+def _switch(panels: Panels, first: int, second: int) -> SwitchPanel:
     """The panel on which the moment about the switch changes its sign, for it falls throughout."""
     areas = _before(panels.area[first]), _after(panels.area[second])
     moments = _before(panels.moment[first]), _after(panels.moment[second])
@@ -312,7 +312,7 @@ def _switch(panels: Panels, first: int, second: int) -> Switch:
     near = float(ends[k] + share * (ends[k + 1] - ends[k]))
     # Not by differences, which would lose a small area beside a large one.
     area, moment = (float(before[k] + after[k + 1]) for before, after in (areas, moments))
-    return Switch(first, second, k, near, area, moment, area + float(panels.area[LOWER, k]))
+    return SwitchPanel(first, second, k, near, area, moment, area + float(panels.area[LOWER, k]))
 
 
 def _before(integrals: Array) -> Array:
@@ -325,7 +325,7 @@ def _after(integrals: Array) -> Array:
     return np.append(np.cumsum(integrals[::-1])[::-1], 0.0)
 
 
-def _end(curves: list[Union], panels: Panels, switch: Switch) -> float:
+def _end(curves: list[Union], panels: Panels, switch: SwitchPanel) -> float:
     """The centroid at which the switch lies: Newton's method, kept on the panel by bisection.
 
     The slope of the moment about the switch is the area, so a step leads to the centroid.

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.systems import sugeno
-from fuzzy.systems.inference import LEAST_STRENGTH, Options, in_range, infer
+from fuzzy.systems.inference import LEAST_STRENGTH, InferenceOptions, in_range, infer
 from fuzzy.systems.quadrature import sampled
 from fuzzy.systems.sets import Array, lower_membership, membership, upper_membership
 from fuzzy.systems.system import (
+    FuzzySystem,
     Membership,
     Rule,
-    System,
     firing_strengths,
     memberships,
     merged,
@@ -66,7 +66,7 @@ class OutputSet(NamedTuple):
     share: float | None
 
 
-class Curve(NamedTuple):
+class OutputCurve(NamedTuple):
     """Bounds (M,) of the union of the implied output sets at the points y (M,)."""
 
     y: Array
@@ -74,7 +74,7 @@ class Curve(NamedTuple):
     upper: Array
 
 
-class Switch(NamedTuple):
+class SwitchPoint(NamedTuple):
     """Where an end of the type-2 interval passes from one bound to the other.
 
     The first `samples` points lie on one side, up to `before`; the next is `after`. Both are the
@@ -95,16 +95,16 @@ class Explanation:
     exact sampling the curve is still given at `options.samples` points, for drawing.
     """
 
-    system: System
+    system: FuzzySystem
     kind: str
     readings: Array
     degrees: tuple[Degree, ...]
     rules: tuple[Firing, ...]
     outputs: tuple[OutputSet, ...]
-    curve: Curve | None
+    curve: OutputCurve | None
     answer: float
     interval: tuple[float, float] | None
-    switches: tuple[Switch, Switch] | None
+    switches: tuple[SwitchPoint, SwitchPoint] | None
     notes: tuple[str, ...]
     method: str
 
@@ -122,13 +122,17 @@ class _Fired(NamedTuple):
 
 
 def explain(
-    system: System, x: Array, kind: str, options: Options | None = None, unit: str = ""
+    system: FuzzySystem,
+    x: Array,
+    kind: str,
+    options: InferenceOptions | None = None,
+    unit: str = "",
 ) -> Explanation:
     """The answer of `infer` to the readings x (inputs,), explained.
 
     `unit` is named in notes. Raises ValueError as `infer` does.
     """
-    options = options or Options()
+    options = options or InferenceOptions()
     X = np.asarray(x, dtype=np.float64)[np.newaxis]
     found = infer(system, X, kind, options, unit)
     X, _ = in_range(system, X, options.out_of_range, unit)
@@ -161,7 +165,7 @@ def bounds_of(kind: str) -> tuple[Membership, Membership]:
     return membership, membership
 
 
-def _degrees(system: System, x: Array, kind: str) -> tuple[Degree, ...]:
+def _degrees(system: FuzzySystem, x: Array, kind: str) -> tuple[Degree, ...]:
     lower, upper = bounds_of(kind)
     return tuple(
         Degree(variable.name, one.name, float(lower(one, reading)), float(upper(one, reading)))
@@ -170,7 +174,7 @@ def _degrees(system: System, x: Array, kind: str) -> tuple[Degree, ...]:
     )
 
 
-def _fire(system: System, X: Array, kind: str, options: Options) -> _Fired:
+def _fire(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -> _Fired:
     low, high = bounds_of(kind)
     lower, upper = firing_strengths(system, X, low, high), firing_strengths(system, X, high, low)
     adds = kind == "sugeno" and options.sugeno_aggregation == "sum"
@@ -184,13 +188,13 @@ def _fire(system: System, X: Array, kind: str, options: Options) -> _Fired:
     return _Fired(consequents, *columns)
 
 
-def _constants(system: System, X: Array, options: Options) -> Array:
+def _constants(system: FuzzySystem, X: Array, options: InferenceOptions) -> Array:
     """What each consequent of a Sugeno system answers on its own, shape (output sets,)."""
     table = sugeno.consequents(system, options.sampling, options.samples)
     return np.asarray(table[:, :-1] @ X[0] + table[:, -1])
 
 
-def _shares(fired: _Fired, options: Options) -> Array:
+def _shares(fired: _Fired, options: InferenceOptions) -> Array:
     """Part of a Sugeno system's total weight that each rule has, shape (rules,)."""
     weights = fired.upper
     if options.sugeno_aggregation == "max":
@@ -200,7 +204,7 @@ def _shares(fired: _Fired, options: Options) -> Array:
     return weights / total if total > 0 else weights
 
 
-def _order(system: System, fired: _Fired) -> NDArray[np.intp]:
+def _order(system: FuzzySystem, fired: _Fired) -> NDArray[np.intp]:
     """Rules that fire, strongest first; the one with fewer terms first among equals."""
     lengths = np.array([len(rule.antecedents) for rule in system.rules])
     order = np.lexsort((lengths, -fired.lower, -fired.upper))
@@ -208,7 +212,7 @@ def _order(system: System, fired: _Fired) -> NDArray[np.intp]:
 
 
 def _firings(
-    system: System, fired: _Fired, shares: Array | None, order: NDArray[np.intp]
+    system: FuzzySystem, fired: _Fired, shares: Array | None, order: NDArray[np.intp]
 ) -> tuple[Firing, ...]:
     return tuple(
         Firing(
@@ -225,7 +229,7 @@ def _firings(
 
 
 def _outputs(
-    system: System,
+    system: FuzzySystem,
     fired: _Fired,
     constants: Array | None,
     shares: Array | None,
@@ -248,14 +252,14 @@ def _outputs(
     )
 
 
-def _curve(system: System, fired: _Fired, kind: str, samples: int) -> Curve:
+def _curve(system: FuzzySystem, fired: _Fired, kind: str, samples: int) -> OutputCurve:
     y = sampled(system.output, samples, "matlab").y
     heights = (fired.lower_heights, fired.upper_heights)
     lower, upper = (
         union(level[:, np.newaxis], memberships(system.output, y, bound), system.operators)[0]
         for level, bound in zip(heights, bounds_of(kind), strict=True)
     )
-    return Curve(y, lower, upper)
+    return OutputCurve(y, lower, upper)
 
 
 def _pair(ends: Array) -> tuple[float, float]:
@@ -263,13 +267,13 @@ def _pair(ends: Array) -> tuple[float, float]:
 
 
 def _switches(
-    curve: Curve | None, interval: tuple[float, float] | None, options: Options
-) -> tuple[Switch, Switch] | None:
+    curve: OutputCurve | None, interval: tuple[float, float] | None, options: InferenceOptions
+) -> tuple[SwitchPoint, SwitchPoint] | None:
     """An end is the centroid of a set that switches between its bounds at that very end."""
     if curve is None or interval is None or not curve.upper.max() > 0:
         return None
     if options.sampling == "exact":
-        left, right = (Switch(None, end, end) for end in interval)
+        left, right = (SwitchPoint(None, end, end) for end in interval)
         return left, right
     # A sample on the end itself belongs to the upper bound, which may be all there is.
     left = _switch(curve.y, int(np.searchsorted(curve.y, interval[0], side="right")))
@@ -277,9 +281,9 @@ def _switches(
     return left, right
 
 
-def _switch(y: Array, samples: int) -> Switch:
+def _switch(y: Array, samples: int) -> SwitchPoint:
     last = len(y) - 1
-    return Switch(samples, float(y[max(samples - 1, 0)]), float(y[min(samples, last)]))
+    return SwitchPoint(samples, float(y[max(samples - 1, 0)]), float(y[min(samples, last)]))
 
 
 def shown_rules(explanation: Explanation, count: int) -> tuple[Firing, ...]:

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from fuzzy.systems.fis_file import read_fis, write_fis
 from fuzzy.systems.json_file import read_json, write_json
-from fuzzy.systems.system import System
+from fuzzy.systems.system import FuzzySystem
 
 
-def read_rule_base(path: Path) -> System:
+def read_rule_base(path: Path) -> FuzzySystem:
     """The system of a `.fis` or `.json` file.
 
     ValueError naming file, line or place, and remedy.
@@ -15,7 +15,7 @@ def read_rule_base(path: Path) -> System:
     return read_fis(path) if _is_fis(path) else read_json(path)
 
 
-def write_rule_base(system: System, path: Path) -> None:
+def write_rule_base(system: FuzzySystem, path: Path) -> None:
     """Write the system as its suffix says; ValueError if a `.fis` file cannot hold it."""
     if _is_fis(path):
         write_fis(system, path)

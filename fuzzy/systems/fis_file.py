@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from fuzzy.systems.fis_sections import TYPE_2, FisError, Line, Section, Values, read_sections, words
 from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
-from fuzzy.systems.system import Operators, Rule, System, Term, Variable
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
 SYSTEM_KEYS = (
     "Name",
@@ -42,7 +42,7 @@ _SET = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*(\[.*\])")
 _RULE = re.compile(r"([^()]*)\(\s*([^()\s]*)\s*\)\s*:\s*([12])")
 
 
-def read_fis(path: Path) -> System:
+def read_fis(path: Path) -> FuzzySystem:
     """The system of a `.fis` file. FisError naming file, line and remedy."""
     sections = read_sections(path)
     values = sections["system"].values(SYSTEM_KEYS)
@@ -56,7 +56,7 @@ def read_fis(path: Path) -> System:
     rules = tuple(_rule(line, inputs, output) for line in lines)
     name = values["Name"].unquoted()
     with values.head.blamed():
-        return System(inputs, output, rules, _operators(values, kind), name)
+        return FuzzySystem(inputs, output, rules, _operators(values, kind), name)
 
 
 def _kind(values: Values) -> str:
@@ -174,7 +174,7 @@ def _check_index(line: Line, number: int, variable: Variable) -> None:
         )
 
 
-def write_fis(system: System, path: Path) -> None:
+def write_fis(system: FuzzySystem, path: Path) -> None:
     """Write a type-1 system; ValueError, and no file, if a `.fis` file cannot hold it."""
     text = fis_text(system)
     try:
@@ -183,7 +183,7 @@ def write_fis(system: System, path: Path) -> None:
         raise FisError(f"{path}: cannot be written ({error.strerror})") from None
 
 
-def fis_text(system: System) -> str:
+def fis_text(system: FuzzySystem) -> str:
     """Text of the `.fis` file of a type-1 system; ValueError if it cannot hold the system."""
     _check_writable(system)
     sections = [
@@ -195,7 +195,7 @@ def fis_text(system: System) -> str:
     return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
 
 
-def _check_writable(system: System) -> None:
+def _check_writable(system: FuzzySystem) -> None:
     for variable in (*system.inputs, system.output):
         for one in variable.sets:
             if one.footprint != TYPE_1:
@@ -220,7 +220,7 @@ def _check_names(*names: str) -> None:
             )
 
 
-def _system_lines(system: System) -> list[str]:
+def _system_lines(system: FuzzySystem) -> list[str]:
     kind = "sugeno" if system.is_sugeno else "mamdani"
     values = (
         f"'{system.name}'",

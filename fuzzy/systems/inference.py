@@ -15,7 +15,7 @@ from fuzzy.systems import interval_type2, mamdani, sugeno
 from fuzzy.systems.interval_type2 import Reducer
 from fuzzy.systems.quadrature import SAMPLINGS, Output, Sampling
 from fuzzy.systems.sets import Array
-from fuzzy.systems.system import Merge, System, Variable
+from fuzzy.systems.system import FuzzySystem, Merge, Variable
 
 SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
 SYSTEMS: tuple[SystemName, ...] = get_args(SystemName)
@@ -37,7 +37,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Options:
+class InferenceOptions:
     """How a system is evaluated.
 
     `samples` points carry the output's universe (101 is MATLAB's default); `exact` sampling takes
@@ -75,14 +75,18 @@ class Inferred:
 
 
 def infer(
-    system: System, X: Array, kind: str, options: Options | None = None, unit: str = ""
+    system: FuzzySystem,
+    X: Array,
+    kind: str,
+    options: InferenceOptions | None = None,
+    unit: str = "",
 ) -> Inferred:
     """Answers of the `kind` of system to the readings X (N, inputs), in the inputs' units.
 
     `unit` is named in notes. Raises ValueError, naming input and row, for a reading that is not
     finite, as `options.out_of_range` says, and where rules fire without giving a finite answer.
     """
-    options = options or Options()
+    options = options or InferenceOptions()
     check_kind(system, kind)
     X = require_readings(system, X)
     X, notes = in_range(system, X, options.out_of_range, unit)
@@ -92,7 +96,7 @@ def infer(
     return Inferred(output.value, output.interval, (*notes, *silent), method(system, kind, options))
 
 
-def check_kind(system: System, kind: str) -> None:
+def check_kind(system: FuzzySystem, kind: str) -> None:
     """ValueError if the kind is unknown or cannot be had from the system."""
     if kind not in SYSTEMS:
         raise ValueError(f"system {kind!r}: use one of {', '.join(SYSTEMS)}")
@@ -103,7 +107,7 @@ def check_kind(system: System, kind: str) -> None:
         )
 
 
-def require_readings(system: System, X: Array) -> Array:
+def require_readings(system: FuzzySystem, X: Array) -> Array:
     """X as floats (N, inputs). ValueError for a wrong width or a number that is not finite."""
     X = np.asarray(X, dtype=np.float64)
     if X.ndim != 2 or X.shape[1] != len(system.inputs):
@@ -119,7 +123,7 @@ def require_readings(system: System, X: Array) -> Array:
 
 
 def in_range(
-    system: System, X: Array, policy: OutOfRange, unit: str
+    system: FuzzySystem, X: Array, policy: OutOfRange, unit: str
 ) -> tuple[Array, tuple[str, ...]]:
     """The readings as evaluated under a policy, and what was done to them.
 
@@ -155,7 +159,7 @@ def _outside(
     )
 
 
-def _evaluate(system: System, X: Array, kind: str, options: Options) -> Output:
+def _evaluate(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -> Output:
     if options.sampling != "exact" and len(X) >= COMPILED_FROM_ROWS:
         from fuzzy.systems.compiled import compiled  # numba, which few rows do not repay
 
@@ -169,7 +173,7 @@ def _evaluate(system: System, X: Array, kind: str, options: Options) -> Output:
     return Output(np.concatenate(values), interval, np.concatenate(strengths))
 
 
-def _block(system: System, X: Array, kind: str, options: Options) -> Output:
+def _block(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -> Output:
     sampling, samples = options.sampling, options.samples
     if kind == "mamdani":
         return mamdani.evaluate(system, X, sampling, samples)
@@ -179,7 +183,7 @@ def _block(system: System, X: Array, kind: str, options: Options) -> Output:
 
 
 def _answered(
-    system: System, X: Array, output: Output, options: Options
+    system: FuzzySystem, X: Array, output: Output, options: InferenceOptions
 ) -> tuple[Output, tuple[str, ...]]:
     """The output with an answer in every row: the middle of the universe where MATLAB has it."""
     fires = output.strength >= LEAST_STRENGTH
@@ -198,7 +202,9 @@ def _answered(
     return _with_middle(system, output, known), _on_silence(system, X, known, fires)
 
 
-def _no_number(system: System, X: Array, rows: NDArray[np.bool_], options: Options) -> str:
+def _no_number(
+    system: FuzzySystem, X: Array, rows: NDArray[np.bool_], options: InferenceOptions
+) -> str:
     """Why rows have no finite answer although rules fire, and what to do."""
     output, readings = system.output, _readings(system, X, rows)
     universe = f"{output.low:g}-{output.high:g}"
@@ -214,7 +220,7 @@ def _no_number(system: System, X: Array, rows: NDArray[np.bool_], options: Optio
     return f"{output.name}: no finite answer for {readings}; {why}"
 
 
-def _readings(system: System, X: Array, rows: NDArray[np.bool_]) -> str:
+def _readings(system: FuzzySystem, X: Array, rows: NDArray[np.bool_]) -> str:
     """The readings of the first of these rows, its number, and how many more there are."""
     first, others = int(rows.argmax()), int(rows.sum()) - 1
     pairs = zip(system.inputs, X[first], strict=True)
@@ -223,7 +229,7 @@ def _readings(system: System, X: Array, rows: NDArray[np.bool_]) -> str:
     return f"{readings} (row {first + 1} of {len(X)}{more})"
 
 
-def _with_middle(system: System, output: Output, known: NDArray[np.bool_]) -> Output:
+def _with_middle(system: FuzzySystem, output: Output, known: NDArray[np.bool_]) -> Output:
     """The output with the middle of the universe in all rows but the known ones."""
     low, high = system.output.low, system.output.high
     value = np.where(known, output.value, 0.5 * (low + high))
@@ -234,7 +240,7 @@ def _with_middle(system: System, output: Output, known: NDArray[np.bool_]) -> Ou
 
 
 def _on_silence(
-    system: System, X: Array, known: NDArray[np.bool_], fires: NDArray[np.bool_]
+    system: FuzzySystem, X: Array, known: NDArray[np.bool_], fires: NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """What was done in rows without a rule that fires by LEAST_STRENGTH."""
     cases = (
@@ -252,7 +258,7 @@ def _on_silence(
     )
 
 
-def method(system: System, kind: str, options: Options) -> str:
+def method(system: FuzzySystem, kind: str, options: InferenceOptions) -> str:
     """One sentence on how answers are computed."""
     operators = system.operators
     joins = (
@@ -280,6 +286,6 @@ def method(system: System, kind: str, options: Options) -> str:
     return f"Interval type-2: {joins}, {reduced}, {points}"
 
 
-def _averaged(options: Options) -> str:
+def _averaged(options: InferenceOptions) -> str:
     each = "rule" if options.sugeno_aggregation == "sum" else "output set, by its strongest rule"
     return f"weighted average over every {each}"

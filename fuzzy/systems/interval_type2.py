@@ -14,7 +14,7 @@ import numpy as np
 from fuzzy.systems import exact
 from fuzzy.systems.quadrature import Output, Quadrature, Sampling, centroid, sampled
 from fuzzy.systems.sets import Array, lower_membership, upper_membership
-from fuzzy.systems.system import System, firing_strengths, memberships, merged, union
+from fuzzy.systems.system import FuzzySystem, firing_strengths, memberships, merged, union
 
 Reducer = Literal["karnik-mendel", "eiasc", "nie-tan"]
 
@@ -22,7 +22,7 @@ Reducer = Literal["karnik-mendel", "eiasc", "nie-tan"]
 LEAST_AREA = 1e-290
 
 
-def bounds_of_firing(system: System, X: Array) -> tuple[Array, Array]:
+def bounds_of_firing(system: FuzzySystem, X: Array) -> tuple[Array, Array]:
     """Lower and upper heights of the output sets, each shape (sets, N)."""
     lower = firing_strengths(system, X, lower_membership, upper_membership)
     upper = firing_strengths(system, X, upper_membership, lower_membership)
@@ -30,7 +30,7 @@ def bounds_of_firing(system: System, X: Array) -> tuple[Array, Array]:
 
 
 def evaluate(
-    system: System, X: Array, sampling: Sampling, samples: int, reducer: Reducer
+    system: FuzzySystem, X: Array, sampling: Sampling, samples: int, reducer: Reducer
 ) -> Output:
     """Answer (N,) and interval (N, 2) of the centroid for the readings X (N, inputs)."""
     low_fired, high_fired = bounds_of_firing(system, X)

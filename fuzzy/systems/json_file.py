@@ -38,7 +38,7 @@ from pathlib import Path
 from typing import Any, NoReturn, cast
 
 from fuzzy.systems.sets import Footprint, FuzzySet, Kind
-from fuzzy.systems.system import Connective, Operators, Rule, System, Term, Variable
+from fuzzy.systems.system import Connective, FuzzySystem, Operators, Rule, Term, Variable
 
 FORMAT = "fuzzy-system"
 VERSION = 1
@@ -112,7 +112,7 @@ class Node:
         return names.index(name)
 
 
-def read_json(path: Path) -> System:
+def read_json(path: Path) -> FuzzySystem:
     """The system of a JSON file. JsonError naming file, place and remedy."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -147,7 +147,7 @@ def _refused(constant: str) -> NoReturn:
     raise JsonError(f"{constant} is no finite number; correct it")
 
 
-def _system(root: Node) -> System:
+def _system(root: Node) -> FuzzySystem:
     _check_format(root)
     keys = root.keys(
         "format", "version", "inputs", "output", "rules", optional=("name", "operators")
@@ -158,7 +158,7 @@ def _system(root: Node) -> System:
     operators = _operators(keys["operators"]) if "operators" in keys else Operators()
     name = keys["name"].text() if "name" in keys else "system"
     with root.blamed():
-        return System(inputs, output, rules, operators, name)
+        return FuzzySystem(inputs, output, rules, operators, name)
 
 
 def _check_format(root: Node) -> None:
@@ -240,7 +240,7 @@ def _closest(name: str, known: Collection[str]) -> str:
     return f"; did you mean {closest[0]!r}?" if closest else ""
 
 
-def write_json(system: System, path: Path) -> None:
+def write_json(system: FuzzySystem, path: Path) -> None:
     """Write any system, of type 1 or 2."""
     try:
         path.write_text(json_text(system), encoding="utf-8", newline="\n")
@@ -248,7 +248,7 @@ def write_json(system: System, path: Path) -> None:
         raise JsonError(f"{path}: cannot be written ({error.strerror})") from None
 
 
-def json_text(system: System) -> str:
+def json_text(system: FuzzySystem) -> str:
     """The document of a system: a line for each set and rule, as far as it fits."""
     document = {
         "format": FORMAT,
@@ -278,7 +278,7 @@ def _set_entry(one: FuzzySet) -> dict[str, Any]:
     return {**entry, "footprint": footprint} if footprint else entry
 
 
-def _rule_entry(rule: Rule, system: System) -> dict[str, Any]:
+def _rule_entry(rule: Rule, system: FuzzySystem) -> dict[str, Any]:
     terms = [
         {
             "input": system.inputs[term.input].name,

@@ -5,10 +5,10 @@ import numpy as np
 from fuzzy.systems import exact
 from fuzzy.systems.quadrature import Output, Sampling, centroid, sampled
 from fuzzy.systems.sets import Array, membership
-from fuzzy.systems.system import System, firing_strengths, memberships, merged, union
+from fuzzy.systems.system import FuzzySystem, firing_strengths, memberships, merged, union
 
 
-def evaluate(system: System, X: Array, sampling: Sampling, samples: int) -> Output:
+def evaluate(system: FuzzySystem, X: Array, sampling: Sampling, samples: int) -> Output:
     """Centroid (N,) for the readings X (N, inputs), in the output's unit."""
     fired = merged(system, firing_strengths(system, X, membership))
     if sampling == "exact":

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from fuzzy.systems.system import Operators, Rule, System, Term
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term
 
 
 class Pair(NamedTuple):
@@ -19,7 +19,7 @@ class Pair(NamedTuple):
     other: int
 
 
-class Form(NamedTuple):
+class AntecedentForm(NamedTuple):
     """An antecedent without what does not matter: order, and repetition under min and max.
 
     A term that counts n times is there as (term, 1) to (term, n), so that an antecedent is part of
@@ -30,28 +30,28 @@ class Form(NamedTuple):
     terms: frozenset[tuple[Term, int]]
 
 
-def form(rule: Rule, operators: Operators) -> Form:
+def form(rule: Rule, operators: Operators) -> AntecedentForm:
     """Form of the rule's antecedent; a single term is an AND."""
     repeats = operators.conjunction == "prod"
     if rule.connective == "or":
         repeats = operators.disjunction == "probor"
     times = Counter(rule.antecedents if repeats else set(rule.antecedents))
     terms = frozenset((term, k) for term, n in times.items() for k in range(1, n + 1))
-    return Form(rule.connective == "or" and len(terms) > 1, terms)
+    return AntecedentForm(rule.connective == "or" and len(terms) > 1, terms)
 
 
-def repeated(system: System) -> tuple[Pair, ...]:
+def repeated(system: FuzzySystem) -> tuple[Pair, ...]:
     """Rules with the antecedent and the consequent of an earlier one."""
     return tuple(_met_before(system, same_consequent=True))
 
 
-def contradictory(system: System) -> tuple[Pair, ...]:
+def contradictory(system: FuzzySystem) -> tuple[Pair, ...]:
     """Rules with the antecedent of an earlier one and another consequent."""
     return tuple(_met_before(system, same_consequent=False))
 
 
-def _met_before(system: System, *, same_consequent: bool) -> Iterator[Pair]:
-    met: dict[Form, dict[int, int]] = {}
+def _met_before(system: FuzzySystem, *, same_consequent: bool) -> Iterator[Pair]:
+    met: dict[AntecedentForm, dict[int, int]] = {}
     for i, rule in enumerate(system.rules):
         first = met.setdefault(form(rule, system.operators), {})
         earlier = [j for k, j in first.items() if (k == rule.consequent) == same_consequent]
@@ -60,7 +60,7 @@ def _met_before(system: System, *, same_consequent: bool) -> Iterator[Pair]:
         first.setdefault(rule.consequent, i)
 
 
-def dominated(system: System) -> tuple[Pair, ...]:
+def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
     """Every dominated rule, with the shortest rule that it gives way to.
 
     Rules of weight 0 are left out. Of rules that are equal, the first one stays.
@@ -86,7 +86,7 @@ def dominated(system: System) -> tuple[Pair, ...]:
     )
 
 
-def _never_stronger(one: Form, other: Form) -> bool:
+def _never_stronger(one: AntecedentForm, other: AntecedentForm) -> bool:
     """Whether `one` exceeds `other` at no reading: AND shrinks and OR grows with every term."""
     if one.any_of:
         return other.any_of and one.terms <= other.terms

@@ -14,7 +14,7 @@ import numpy as np
 from skfuzzy import control
 
 from fuzzy.systems.sets import Array, membership
-from fuzzy.systems.system import Rule, System, Variable, memberships
+from fuzzy.systems.system import FuzzySystem, Rule, Variable, memberships
 
 
 class ListedRules(control.ControlSystem):  # type: ignore[misc]  # scikit-fuzzy has no types
@@ -34,7 +34,7 @@ class ListedRules(control.ControlSystem):  # type: ignore[misc]  # scikit-fuzzy 
         return self._rules
 
 
-def control_system(system: System, points: int = 1001) -> control.ControlSystemSimulation:
+def control_system(system: FuzzySystem, points: int = 1001) -> control.ControlSystemSimulation:
     """Simulation of the system's rules on principal membership functions.
 
     Set `simulation.input[name]`, call `compute()`, read `simulation.output[name]`. scikit-fuzzy
@@ -52,7 +52,7 @@ def control_system(system: System, points: int = 1001) -> control.ControlSystemS
     return control.ControlSystemSimulation(ListedRules([*antecedents, consequent], rules))
 
 
-def _check(system: System) -> None:
+def _check(system: FuzzySystem) -> None:
     if system.is_sugeno:
         raise ValueError(
             f"{system.name}: scikit-fuzzy has no Sugeno inference; give the output membership "
@@ -76,7 +76,7 @@ def _sampled(kind: Any, variable: Variable, points: int) -> Any:
 
 
 def _rule(
-    system: System, rule: Rule, label: str, antecedents: Sequence[Any], consequent: Any
+    system: FuzzySystem, rule: Rule, label: str, antecedents: Sequence[Any], consequent: Any
 ) -> Any:
     operators = system.operators
     named = [

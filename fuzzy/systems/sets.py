@@ -174,7 +174,7 @@ def _rising(p: Parameters) -> bool:
     return p[0] < p[-1] and list(p) == sorted(p)
 
 
-class Form(NamedTuple):
+class MembershipForm(NamedTuple):
     """One kind: names of its parameters, when they are valid, the function, ends of its core."""
 
     parameters: str
@@ -183,68 +183,68 @@ class Form(NamedTuple):
     core: Callable[[Parameters], tuple[float, float]] | None
 
 
-FORMS: dict[str, Form] = {
-    "gaussmf": Form(
+FORMS: dict[str, MembershipForm] = {
+    "gaussmf": MembershipForm(
         "sd centre",
         lambda p: p[0] > 0,
         lambda x, p: gaussian(x, *p),
         lambda p: (p[1], p[1]),
     ),
-    "gauss2mf": Form(
+    "gauss2mf": MembershipForm(
         "sd_left centre_left sd_right centre_right",
         lambda p: p[0] > 0 and p[2] > 0 and p[1] <= p[3],
         _two_sided,
         lambda p: (p[1], p[3]),
     ),
-    "trimf": Form(
+    "trimf": MembershipForm(
         "foot_left peak foot_right",
         _rising,
         lambda x, p: _trapezoid(x, p[0], p[1], p[1], p[2]),
         lambda p: (p[1], p[1]),
     ),
-    "trapmf": Form(
+    "trapmf": MembershipForm(
         "foot_left top_left top_right foot_right",
         _rising,
         lambda x, p: _trapezoid(x, *p),
         lambda p: (p[1], p[2]),
     ),
-    "gbellmf": Form(
+    "gbellmf": MembershipForm(
         "half_width slope centre",
         lambda p: p[0] > 0 and p[1] > 0,
         lambda x, p: _bell(x, *p),
         lambda p: (p[2], p[2]),
     ),
-    "sigmf": Form(
+    "sigmf": MembershipForm(
         "slope centre",
         lambda p: p[0] != 0,
         lambda x, p: _sigmoid(x, *p),
         lambda p: (np.inf, np.inf) if p[0] > 0 else (-np.inf, -np.inf),
     ),
-    "dsigmf": Form(
+    "dsigmf": MembershipForm(
         "slope_1 centre_1 slope_2 centre_2",
         lambda p: p[0] != 0 and p[2] != 0,
         lambda x, p: np.abs(_sigmoid(x, p[0], p[1]) - _sigmoid(x, p[2], p[3])),
         None,
     ),
-    "psigmf": Form(
+    "psigmf": MembershipForm(
         "slope_1 centre_1 slope_2 centre_2",
         lambda p: p[0] != 0 and p[2] != 0,
         lambda x, p: _sigmoid(x, p[0], p[1]) * _sigmoid(x, p[2], p[3]),
         None,
     ),
-    "zmf": Form(
+    "zmf": MembershipForm(
         "top foot",
         lambda p: p[0] < p[1],
         lambda x, p: _spline(x, p[1], p[0]),
         lambda p: (-np.inf, p[0]),
     ),
-    "smf": Form(
+    "smf": MembershipForm(
         "foot top",
         lambda p: p[0] < p[1],
         lambda x, p: _spline(x, p[0], p[1]),
         lambda p: (p[1], np.inf),
     ),
-    "pimf": Form(
+    "pimf": MembershipForm(
         "foot_left top_left top_right foot_right",
         _rising,
         lambda x, p: _pi(x, *p),

@@ -9,10 +9,10 @@ import numpy as np
 from fuzzy.systems import exact
 from fuzzy.systems.quadrature import Output, Sampling, centroid, sampled
 from fuzzy.systems.sets import Array, membership
-from fuzzy.systems.system import Merge, System, firing_strengths, memberships, merged
+from fuzzy.systems.system import FuzzySystem, Merge, firing_strengths, memberships, merged
 
 
-def consequents(system: System, sampling: Sampling, samples: int) -> Array:
+def consequents(system: FuzzySystem, sampling: Sampling, samples: int) -> Array:
     """Coefficients (sets, inputs + 1) of each consequent, one per input and then the constant.
 
     A set cut by an end of the universe has its centroid off its centre.
@@ -26,7 +26,7 @@ def consequents(system: System, sampling: Sampling, samples: int) -> Array:
     return table
 
 
-def constants(system: System, sampling: Sampling, samples: int) -> Array:
+def constants(system: FuzzySystem, sampling: Sampling, samples: int) -> Array:
     """Centroid of each whole output set on the output's universe, shape (sets,).
 
     NaN for a set without mass on it.
@@ -38,7 +38,9 @@ def constants(system: System, sampling: Sampling, samples: int) -> Array:
     return centroid(quadrature, memberships(system.output, quadrature.y, membership))
 
 
-def evaluate(system: System, X: Array, sampling: Sampling, samples: int, merge: Merge) -> Output:
+def evaluate(
+    system: FuzzySystem, X: Array, sampling: Sampling, samples: int, merge: Merge
+) -> Output:
     """Weighted average (N,) of the consequents for the readings X (N, inputs).
 
     merge="sum" weighs every rule, as MATLAB does, so that a repeated rule counts twice; "max"

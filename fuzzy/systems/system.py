@@ -1,8 +1,8 @@
 """A fuzzy system: variables with their sets, rules from inputs to one output, and the operators.
 
-One `System` serves the three kinds of inference; they share the firing of the rules. Rules with the
-same consequent meet only through their strengths, max_r min(w_r, mu(y)) = min(max_r w_r, mu(y)), so
-they are merged to one height per output set before the output is sampled.
+One `FuzzySystem` serves the three kinds of inference; they share the firing of the rules. Rules
+with the same consequent meet only through their strengths, since max_r min(w_r, mu(y)) =
+min(max_r w_r, mu(y)), so they are merged to one height per output set before the output is sampled.
 """
 
 from collections.abc import Callable, Sequence
@@ -81,7 +81,7 @@ class Operators:
 
 
 @dataclass(frozen=True)
-class System:
+class FuzzySystem:
     """Inputs, output, rules and operators; every index of every rule is checked.
 
     With `constant` or `linear` output sets it is a Sugeno system as it stands; with membership
@@ -113,7 +113,7 @@ class System:
         return self.output.sets[0].kind in FUNCTION_KINDS
 
 
-def _fits(rule: Rule, system: System) -> bool:
+def _fits(rule: Rule, system: FuzzySystem) -> bool:
     known = all(
         0 <= term.input < len(system.inputs) and 0 <= term.set < len(system.inputs[term.input].sets)
         for term in rule.antecedents
@@ -121,7 +121,7 @@ def _fits(rule: Rule, system: System) -> bool:
     return bool(rule.antecedents) and known and 0 <= rule.consequent < len(system.output.sets)
 
 
-def _check_kinds(system: System) -> None:
+def _check_kinds(system: FuzzySystem) -> None:
     for variable in system.inputs:
         for one in variable.sets:
             if one.kind in FUNCTION_KINDS:
@@ -150,7 +150,7 @@ def memberships(variable: Variable, x: Array, membership: Membership) -> Array:
 
 
 def firing_strengths(
-    system: System, X: Array, membership: Membership, opposite: Membership | None = None
+    system: FuzzySystem, X: Array, membership: Membership, opposite: Membership | None = None
 ) -> Array:
     """Strength of every rule at the readings X (N, inputs), shape (rules, N).
 
@@ -162,7 +162,7 @@ def firing_strengths(
     return np.array([_strength(rule, degrees, others, system.operators) for rule in system.rules])
 
 
-def _degrees(system: System, X: Array, membership: Membership) -> list[Array]:
+def _degrees(system: FuzzySystem, X: Array, membership: Membership) -> list[Array]:
     return [memberships(variable, X[:, i], membership) for i, variable in enumerate(system.inputs)]
 
 
@@ -184,7 +184,7 @@ def _joined(terms: Sequence[Array], connective: Connective, operators: Operators
     return np.asarray(reduce(lambda a, b: a + b * (1.0 - a), terms))
 
 
-def merged(system: System, strengths: Array, merge: Merge = "max") -> Array:
+def merged(system: FuzzySystem, strengths: Array, merge: Merge = "max") -> Array:
     """Strength of every output set from those of the rules (rules, N), shape (sets, N)."""
     consequents = np.array([rule.consequent for rule in system.rules])
     join = np.maximum if merge == "max" else np.add

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzy.systems.inference import Inferred, Options, check_kind, infer
+from fuzzy.systems.inference import InferenceOptions, Inferred, check_kind, infer
 from fuzzy.systems.sets import Array
-from fuzzy.systems.system import System
+from fuzzy.systems.system import FuzzySystem
 
 VALUE = "estimate"
 BOUNDS = ("lower", "upper")
@@ -40,11 +40,11 @@ class Table(NamedTuple):
 
 
 def evaluate_table(
-    system: System,
+    system: FuzzySystem,
     csv_in: Path,
     csv_out: Path,
     kind: str,
-    options: Options | None = None,
+    options: InferenceOptions | None = None,
     unit: str = "",
     plausible: tuple[float, float] = (-math.inf, math.inf),
 ) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ def evaluate_table(
 
 
 def _check_plausible(
-    X: Array, table: Table, system: System, plausible: tuple[float, float], unit: str
+    X: Array, table: Table, system: FuzzySystem, plausible: tuple[float, float], unit: str
 ) -> None:
     low, high = plausible
     beyond = np.argwhere((low > X) | (high < X))
@@ -86,7 +86,7 @@ def _check_plausible(
         )
 
 
-def read_readings(path: Path, system: System) -> Array:
+def read_readings(path: Path, system: FuzzySystem) -> Array:
     """The readings of a table, shape (rows, inputs), in the order of the system's inputs."""
     return _readings(read_table(path), system)
 
@@ -138,7 +138,7 @@ def _check_header(table: Table, added: Sequence[str]) -> None:
             )
 
 
-def _readings(table: Table, system: System) -> Array:
+def _readings(table: Table, system: FuzzySystem) -> Array:
     """The columns of the inputs as numbers, shape (rows, inputs)."""
     names = [name.strip() for name in table.header]
     inputs = [variable.name for variable in system.inputs]
@@ -177,7 +177,7 @@ def _reading(cell: str, table: Table, line: int, name: str) -> float:
     return value
 
 
-def _with_lines(message: str, table: Table, system: System) -> str:
+def _with_lines(message: str, table: Table, system: FuzzySystem) -> str:
     """The message with the line of the file where it names a row."""
     # Names are matched too, and left alone, for one may itself look like the number of a row.
     names = [re.escape(variable.name) for variable in (*system.inputs, system.output)]

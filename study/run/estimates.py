@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from fuzzy.liver import stiffness
 from fuzzy.liver.sensitivity import sensitivity
-from fuzzy.liver.stiffness import Estimate, Options, Settings
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.system import records_in_use
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.inference import InferenceOptions
 from study.results.folder import Row
 from study.scene import Scene
 
@@ -22,13 +24,15 @@ SURFACE_POINTS = 41
 CURVE_POINTS = 401
 
 
-def settings(scene: Scene) -> Settings:
+def settings(scene: Scene) -> LiverSettings:
     """Settings of the fuzzy systems from the scene. ValueError naming the key that does not fit."""
     asked = asdict(scene.fuzzy)
-    options = Options(**{field.name: asked[field.name] for field in fields(Options)})
-    named = {f.name: asked[f.name] for f in fields(Settings) if f.name != "options"}
+    options = InferenceOptions(
+        **{field.name: asked[field.name] for field in fields(InferenceOptions)}
+    )
+    named = {f.name: asked[f.name] for f in fields(LiverSettings) if f.name != "options"}
     try:
-        return Settings(**named, options=options)
+        return LiverSettings(**named, options=options)
     except ValueError as error:
         raise ValueError(f"fuzzy.{error}") from error
 
@@ -38,7 +42,7 @@ def readings(scene: Scene) -> dict[str, float]:
     return {name: value for name, value in asdict(scene.patient).items() if value is not None}
 
 
-def estimates(scene: Scene) -> dict[str, Estimate]:
+def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
     """Estimate of each fuzzy system that the scene names."""
     return {
         name: stiffness.estimate(readings(scene), name, settings(scene))
@@ -50,7 +54,7 @@ def estimates(scene: Scene) -> dict[str, Estimate]:
 class FuzzySide:
     """What the fuzzy systems found: estimates by system, and their part of the results."""
 
-    estimates: dict[str, Estimate]
+    estimates: dict[str, StiffnessEstimate]
     numbers: dict[str, Any]
     sensitivity: list[Row]
     arrays: dict[str, NDArray[Any]]
@@ -77,7 +81,7 @@ def run_fuzzy(scene: Scene) -> FuzzySide:
 
 
 def _sensitivity(
-    scene: Scene, chosen: Settings, given: Mapping[str, float]
+    scene: Scene, chosen: LiverSettings, given: Mapping[str, float]
 ) -> tuple[list[Row], list[str]]:
     if not scene.fuzzy.sensitivity_readings:
         return [], []
@@ -87,7 +91,7 @@ def _sensitivity(
     return [tuple(getattr(row, name) for name in columns) for row in found.rows], notes
 
 
-def _numbers(estimate: Estimate, youngs_modulus: float) -> dict[str, Any]:
+def _numbers(estimate: StiffnessEstimate, youngs_modulus: float) -> dict[str, Any]:
     numbers: dict[str, Any] = {
         "estimate_pa": estimate.estimate,
         "relative_to_reference": estimate.estimate / youngs_modulus,
@@ -101,7 +105,7 @@ def _numbers(estimate: Estimate, youngs_modulus: float) -> dict[str, Any]:
 
 
 def drawings(
-    settings: Settings,
+    settings: LiverSettings,
     systems: Sequence[str],
     given: Mapping[str, float],
     over: tuple[str, str],

@@ -27,7 +27,7 @@ from study.run.outcome import Outcome, model_record
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.liver.stiffness import Estimate
+    from fuzzy.liver.stiffness import StiffnessEstimate
 
 MASS_LIMIT = 0.05
 
@@ -42,7 +42,7 @@ class Contender:
 
 
 def contenders(
-    scene: Scene, lattice: Lattice, estimates: dict[str, Estimate]
+    scene: Scene, lattice: Lattice, estimates: dict[str, StiffnessEstimate]
 ) -> Iterator[Contender]:
     """The lattice models that the scene names."""
     if "basafa" in scene.models:
@@ -138,7 +138,7 @@ def run_lattices(
     scene: Scene,
     posed: Problem,
     assembly: Assembly,
-    estimates: dict[str, Estimate],
+    estimates: dict[str, StiffnessEstimate],
     outcome: Outcome,
     progress: Progress,
     keeping: Keeping | None = None,

@@ -13,7 +13,7 @@ from study.run.outcome import Outcome
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.liver.stiffness import Estimate
+    from fuzzy.liver.stiffness import StiffnessEstimate
     from study.run.keeping import Keeping
 
 GRAVITY = 9.81
@@ -22,7 +22,7 @@ GRAVITY = 9.81
 def run_organ(
     scene: Scene,
     posed: Problem,
-    estimates: dict[str, Estimate],
+    estimates: dict[str, StiffnessEstimate],
     progress: Progress,
     keeping: Keeping | None = None,
 ) -> Outcome:

@@ -18,7 +18,7 @@ from study.run.outcome import Outcome, model_record
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.liver.stiffness import Estimate
+    from fuzzy.liver.stiffness import StiffnessEstimate
 
 
 def benchmark_law(scene: Scene) -> Basafa:
@@ -28,7 +28,7 @@ def benchmark_law(scene: Scene) -> Basafa:
 
 
 def run_point(
-    scene: Scene, point: PointProblem, estimates: dict[str, Estimate], progress: Progress
+    scene: Scene, point: PointProblem, estimates: dict[str, StiffnessEstimate], progress: Progress
 ) -> Outcome:
     """Run the benchmark and one oscillator per estimate."""
     outcome = Outcome()

@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from fuzzy.liver.settings import Settings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.systems import interval_type2, mamdani, sugeno
 from fuzzy.systems.compiled import compiled
-from fuzzy.systems.inference import Options
+from fuzzy.systems.inference import InferenceOptions
 from fuzzy.systems.scikit_fuzzy import control_system
 from fuzzy.systems.sets import Footprint, FuzzySet, core
 
@@ -51,7 +51,7 @@ def plain(variable):
     return replace(variable, sets=tuple(gaussian(one) for one in variable.sets))
 
 
-LIVER = liver_system(Settings())
+LIVER = liver_system(LiverSettings())
 SYSTEM = replace(
     LIVER, inputs=tuple(plain(variable) for variable in LIVER.inputs), output=plain(LIVER.output)
 )
@@ -66,7 +66,7 @@ def names(system, rule):
 
 
 def ours(kind, pruned=True):
-    return compiled(SYSTEM, kind, Options(samples=SAMPLES), pruned=pruned)
+    return compiled(SYSTEM, kind, InferenceOptions(samples=SAMPLES), pruned=pruned)
 
 
 def scikit_fuzzy_columns(X):
