@@ -22,7 +22,8 @@ from fuzzy.liver.stiffness import (
     patient_system,
 )
 from fuzzy.liver.system import liver_system
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
@@ -214,7 +215,7 @@ def _draw(
     from reports.rule_view import draw_rules
     from study.run.estimates import drawings
 
-    systems, over = request.systems or SYSTEMS, request.surface or ("hcv", "hbv")
+    systems, over = request.systems or tuple(SYSTEMS), request.surface or ("hcv", "hbv")
     arrays = drawings(settings, systems, readings, over)
     found = {name: estimate(readings, name, settings).estimate for name in systems}
     pictures = {"sets": draw_sets(arrays, found), "surfaces": draw_surfaces(arrays, over)}

@@ -13,7 +13,8 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.systems.conversion import type_1_of
 from fuzzy.systems.files import read_rule_base, write_rule_base
-from fuzzy.systems.inference import InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 

@@ -10,7 +10,9 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.systems.audit import audit, audit_lines
 from fuzzy.systems.coverage import Gap, spread_readings
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.redundancy import Pair, dominated
 from fuzzy.systems.rule_text import rule_text
 from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership

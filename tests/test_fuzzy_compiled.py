@@ -9,26 +9,25 @@ import pytest
 
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
-from fuzzy.systems import interval_type2, kernel, mamdani, sugeno
+from fuzzy.systems import interval_type2, kernel, mamdani
 from fuzzy.systems.compiled import KERNEL_FORMS, compiled
-from fuzzy.systems.inference import LEAST_STRENGTH, SYSTEMS, InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH
 from fuzzy.systems.redundancy import dominated
 from fuzzy.systems.scikit_fuzzy import control_system
 from fuzzy.systems.sets import FORMS, TYPE_1, Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
 LIVER = liver_system(LiverSettings())
+EXACT = InferenceOptions(sampling="exact")
 INSIDE = np.random.default_rng(20240917).uniform(2.0, 75.0, (300, 5))
 
 
 def defined(system, X, kind, options):
     """Output of the numpy module that defines the answer."""
-    where = options.sampling, options.samples
-    if kind == "mamdani":
-        return mamdani.evaluate(system, X, *where)
-    if kind == "sugeno":
-        return sugeno.evaluate(system, X, *where, options.sugeno_aggregation)
-    return interval_type2.evaluate(system, X, *where, options.reducer)
+    return SYSTEMS[kind].evaluate(system, X, options)
 
 
 def assert_same(got, wanted, allowed):
@@ -512,13 +511,13 @@ def simulated(system, X, points):
 def test_scikit_fuzzy_approaches_the_exact_answer_as_its_grid_is_refined(operators):
     system = replace(tipper(), operators=operators)
     X = np.random.default_rng(1).uniform(0, 10, (25, 2))
-    exact = mamdani.evaluate(system, X, "exact", 0).value
+    exact = mamdani.evaluate(system, X, EXACT).value
     assert_second_order(*(np.abs(simulated(system, X, n) - exact).max() for n in (1001, 5001)))
 
 
 def test_scikit_fuzzy_agrees_on_the_liver():
     X = INSIDE[:25]
-    exact = mamdani.evaluate(LIVER, X, "exact", 0).value
+    exact = mamdani.evaluate(LIVER, X, EXACT).value
     assert_second_order(*(np.abs(simulated(LIVER, X, n) - exact).max() for n in (1001, 5001)))
 
 

@@ -8,7 +8,8 @@ from scipy.integrate import quad
 from scipy.special import expit
 
 from fuzzy.systems import exact
-from fuzzy.systems.inference import InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import (
     FORMS,
     TYPE_1,

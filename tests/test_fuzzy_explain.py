@@ -13,7 +13,9 @@ from fuzzy.liver.stiffness import liver_row, patient_system
 from fuzzy.systems.explain import Explanation, explain, shown_rules
 from fuzzy.systems.explanation_arrays import drawing_arrays
 from fuzzy.systems.explanation_text import explanation_lines
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.quadrature import sampled
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from fuzzy.systems.conversion import sugeno_of, type_1_of
 from fuzzy.systems.files import read_rule_base, write_rule_base
 from fuzzy.systems.fis_file import FisError, fis_text, read_fis, write_fis
-from fuzzy.systems.inference import InferenceOptions, infer
+from fuzzy.systems.inference import infer
 from fuzzy.systems.json_file import JsonError, json_text, read_json, write_json
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import FORMS, Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 from fuzzy.systems.table import TableError, evaluate_table

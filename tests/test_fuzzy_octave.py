@@ -10,7 +10,8 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.systems.conversion import sugeno_of, type_1_of
 from fuzzy.systems.fis_file import read_fis
-from fuzzy.systems.inference import InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import Operators
 
 FOLDER = Path(__file__).parent / "data" / "octave"

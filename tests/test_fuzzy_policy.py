@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from fuzzy.systems.compiled import compiled
-from fuzzy.systems.inference import (
-    COMPILED_FROM_ROWS,
-    LEAST_STRENGTH,
-    SYSTEMS,
-    InferenceOptions,
-    infer,
-)
+from fuzzy.systems.inference import COMPILED_FROM_ROWS, infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH
 from fuzzy.systems.sets import FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 from fuzzy.systems.table import evaluate_table

@@ -11,16 +11,16 @@ from fuzzy.liver.readings import (
     MISSING_TRIPLE,
     READINGS,
     UNSUPPORTED,
-    Reading,
+    TableReading,
     disease_sets,
     reading_named,
     rule_count,
 )
-from fuzzy.liver.rules import governing
+from fuzzy.liver.rules import CONSEQUENTS
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES, cells, is_odd
-from fuzzy.systems.inference import InferenceOptions
+from fuzzy.systems.options import InferenceOptions
 
 # Most sets that the data describe: F1 to F4 of HCV and HBV, F2 to F4 of the others.
 MOST_SETS = (4, 4, 3, 3, 3)
@@ -73,7 +73,7 @@ def reaching_247(readings, counts):
 
 def every_reading(sizes):
     return [
-        Reading((2, 2, 2, 2, 2), size, diagonal, odd, duplicates)
+        TableReading((2, 2, 2, 2, 2), size, diagonal, odd, duplicates)
         for size in sizes
         for diagonal in ("single", "square")
         for odd in ("missing-triple", "literal", "pair", "drop")
@@ -92,7 +92,8 @@ def test_22_readings_within_the_data_reach_247_so_the_count_singles_out_none():
 def test_r1_is_the_only_fit_of_its_kind_but_the_literal_one_has_two():
     def fits(odd):
         return {
-            counts for _, counts in reaching_247([Reading((2,) * 5, odd_cell=odd)], WITHIN_DATA)
+            counts
+            for _, counts in reaching_247([TableReading((2,) * 5, odd_cell=odd)], WITHIN_DATA)
         }
 
     assert fits("missing-triple") == {(2, 3, 2, 2, 2)}
@@ -163,8 +164,8 @@ def test_severest_term_governs_every_rule(reading):
     [([0], 0, 0), ([0, 2], 2, 1), ([0, 0, 1], 1, 1), ([0, 0, 0, 2], 2, 1), ([2, 2, 1], 2, 2)],
 )
 def test_governing_severity(severities, severest, mean):
-    assert governing(severities, "max") == severest
-    assert governing(severities, "mean") == mean
+    assert CONSEQUENTS["max"].governing(severities) == severest
+    assert CONSEQUENTS["mean"].governing(severities) == mean
 
 
 # --- aetiologies without a reading -----------------------------------------------------------

@@ -22,7 +22,8 @@ from fuzzy.liver.sensitivity import (
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import NORMAL_LIVER, estimate, evaluate
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 
 READINGS = {"hcv": 9.5e3, "nafld": 12e3}
 TYPE_2 = "interval-type-2"

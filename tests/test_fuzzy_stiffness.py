@@ -23,7 +23,9 @@ from fuzzy.liver.stiffness import (
 )
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 
 HCV = {"hcv": 9.5e3}
 

@@ -11,11 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzy.systems import exact, sugeno
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
-from fuzzy.systems.interval_type2 import eiasc, karnik_mendel
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.quadrature import Quadrature, centroid, sampled
 from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, membership, upper_membership
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable, memberships
+from fuzzy.systems.type_reduction import eiasc, karnik_mendel
 
 GRID = np.linspace(0, 10, 101)
 SUMS = Quadrature(GRID, np.ones(101))

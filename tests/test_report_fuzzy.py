@@ -15,7 +15,7 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import liver_row, patient_system
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
-from fuzzy.systems.inference import SYSTEMS
+from fuzzy.systems.kinds import SYSTEMS
 from reports import canvas
 from reports.fuzzy_figures import (
     draw_sets,

@@ -3,12 +3,20 @@
 from collections.abc import Iterable
 from math import prod
 
-from fuzzy.liver.knowledge import OUTPUT, SetRecord, elastography, output_records, parameters
+from fuzzy.liver.knowledge import (
+    OUTPUT,
+    PLACEMENTS,
+    SetRecord,
+    elastography,
+    output_records,
+    parameters,
+)
 from fuzzy.liver.readings import READINGS, TableReading, disease_sets, reading_named, rule_count
-from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.rules import CONSEQUENTS
+from fuzzy.liver.settings import ABSENT, FOOTPRINTS, LiverSettings
 from fuzzy.liver.system import liver_system, records_in_use, relative_half_width
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import SYSTEMS, method
+from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.redundancy import dominated
 
 PAPER_RULES = 247
@@ -25,21 +33,6 @@ ODD_CELL = {
     "literal": "is read literally, with two NAFLD terms beside one of HCV in an antecedent",
     "pair": "is read as the pair HCV, NAFLD, which then enters twice",
     "drop": "is left out",
-}
-CONSEQUENT = {
-    "max": "the severest antecedent governs the consequent",
-    "mean": "the consequent is the mean severity of the antecedents, rounded up",
-}
-FOOTPRINT = {
-    "uncertain-mean": "every centre, input and output, is uncertain by",
-    "uncertain-spread": "the width of every set's flanks, input and output, is uncertain by the "
-    "share that the sources give for centres (a transfer of this study),",
-    "scaled": "every lower membership, input and output, is lower than the upper one by the share "
-    "that the sources give for centres (a transfer of this study),",
-}
-ABSENT = {
-    "normal": "is given the normal liver's {normal:g} kPa (fung2013)",
-    "silent": "takes every rule that names it out of the rule base",
 }
 OUT_OF_RANGE = {
     "clamp": "are taken at its nearer end, with a note",
@@ -62,7 +55,7 @@ def _rules(settings: LiverSettings) -> tuple[str, ...]:
         DIAGONAL[reading.diagonal],
         f"Cell N-C x NAFLD of Table I, which names NAFLD twice, {ODD_CELL[reading.odd_cell]}.",
         f"The triple HBV, CLD, NAFLD, which the table marks twice, {_duplicates(reading)}.",
-        f"Consequents are not in the paper: {CONSEQUENT[settings.consequent]} "
+        f"Consequents are not in the paper: {CONSEQUENTS[settings.consequent].words} "
         "(mild < moderate < severe), a modelling choice without clinical evidence.",
         _dominance(settings),
         "CLD is read as cholestatic liver disease, because chronic liver disease would contain the "
@@ -125,18 +118,16 @@ def _data(settings: LiverSettings) -> tuple[str, ...]:
         f"No set describes a healthy liver: {normal:g} kPa counts as mild, whose output centre is "
         f"{output_records()[0].centre:.1f} kPa, and wide severe sets still fire there, so the "
         "estimate for a healthy liver is far too stiff.",
-        f"An aetiology without a reading {ABSENT[settings.absent].format(normal=normal)}.",
+        f"An aetiology without a reading {ABSENT[settings.absent].words.format(normal=normal)}.",
     )
 
 
 def _centres(settings: LiverSettings, inputs: list[SetRecord]) -> tuple[str, ...]:
     cut_offs = [record for record in inputs if record.placement == "cut-off"]
     centres = f"Centres of {_names(cut_offs)} are cut-offs between stages, used as centres"
-    if settings.placement == "stage-mean":
-        centres += " for want of means; the others are means of patients at the stage (sporea2010)"
     ratios = [record for record in inputs if record.sd_kind == "ratio"]
     return (
-        f"{centres}.",
+        f"{centres}{PLACEMENTS[settings.placement]}.",
         f"Widths of {_names(ratios)} are derived: the mean ratio SD/mean of the same stage in HBV "
         "and HCV (sporea2010) times the centre, since no SD is published.",
     )
@@ -167,7 +158,8 @@ def _footprints(settings: LiverSettings) -> tuple[str, ...]:
     )
     times = "" if settings.footprint_factor == 1 else f"{settings.footprint_factor:g} times "
     return (
-        f"Interval type-2: {FOOTPRINT[settings.footprint]} {shares}, {times}the published spread.",
+        f"Interval type-2: {FOOTPRINTS[settings.footprint].words} {shares}, {times}the published "
+        "spread.",
         "The published spread joins, as independent, that between studies and that between "
         f"operators. Between studies it is the SD {_between_studies(by_stage)} of the centre at "
         "F2, F3, F4, from the ranges of HBV's cut-offs over 18 studies (chon2012) by the expected "
@@ -193,7 +185,7 @@ def _inference(settings: LiverSettings) -> tuple[str, ...]:
         f"Inputs live on {p['input_low']:g}-{p['input_high']:g} kPa, the instrument's scale from a "
         f"weak source; readings beyond {OUT_OF_RANGE[settings.options.out_of_range]}. The output "
         f"lives on {p['output_low']:g}-{p['output_high']:g} kPa.",
-        *(f"{method(system, kind, settings.options)}." for kind in SYSTEMS),
+        *(f"{kind.method(system, settings.options)}." for kind in SYSTEMS.values()),
     )
 
 

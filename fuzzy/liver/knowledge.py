@@ -6,12 +6,17 @@ from functools import cache
 from importlib.resources import files
 from typing import Literal, cast
 
-Placement = Literal["stage-mean", "cut-off"]
 Severity = Literal["mild", "moderate", "severe"]
 
 OUTPUT = "stiffness"
 SEVERITIES: tuple[Severity, ...] = ("mild", "moderate", "severe")
 """Names of the output sets, in rising order."""
+
+PLACEMENTS: dict[str, str] = {
+    "stage-mean": " for want of means; the others are means of patients at the stage (sporea2010)",
+    "cut-off": "",
+}
+"""Placements of the data's centres; and what is to be said of cut-offs where one is chosen."""
 
 STAGES = {2: ("F2", "F4"), 3: ("F2", "F3", "F4"), 4: ("F1", "F2", "F3", "F4")}
 """METAVIR stages that an input's sets stand for, by their number."""
@@ -37,7 +42,7 @@ class SetRecord:
     aetiology: str
     stage: str
     severity: Severity
-    placement: Placement
+    placement: str
     centre: float
     centre_source: str
     within_stage_sd: float
@@ -71,7 +76,7 @@ def _record(row: dict[str, str]) -> SetRecord:
         aetiology=row["aetiology"],
         stage=row["stage"],
         severity=cast("Severity", row["severity"]),
-        placement=cast("Placement", row["placement"]),
+        placement=row["placement"],
         centre=float(row["centre_kpa"]),
         centre_source=row["centre_source"],
         within_stage_sd=float(row["within_stage_sd_kpa"]),
@@ -89,7 +94,7 @@ def _record(row: dict[str, str]) -> SetRecord:
     )
 
 
-def input_records(aetiology: str, count: int, placement: Placement) -> tuple[SetRecord, ...]:
+def input_records(aetiology: str, count: int, placement: str) -> tuple[SetRecord, ...]:
     """Records of an aetiology with `count` sets, mildest first.
 
     An aetiology without any stage mean (ALD, CLD, NAFLD) takes its cut-offs for both placements.

@@ -4,18 +4,33 @@ The paper prints no consequents; that the severest antecedent governs is a choic
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import Literal
+from typing import NamedTuple
 
 from fuzzy.liver.table1 import AETIOLOGIES, Cell
 from fuzzy.systems.system import Rule, Term
 
-Consequent = Literal["max", "mean"]
+
+class Consequent(NamedTuple):
+    """What a combination concludes: the severity that governs its members', and that in words."""
+
+    governing: Callable[[Sequence[int]], int]
+    words: str
+
+
+def _mean(severities: Sequence[int]) -> int:
+    return math.ceil(sum(severities) / len(severities))
+
+
+CONSEQUENTS: dict[str, Consequent] = {
+    "max": Consequent(max, "the severest antecedent governs the consequent"),
+    "mean": Consequent(_mean, "the consequent is the mean severity of the antecedents, rounded up"),
+}
 
 
 def rule_base(
-    antecedents: Sequence[Cell], severities: Mapping[str, Sequence[int]], consequent: Consequent
+    antecedents: Sequence[Cell], severities: Mapping[str, Sequence[int]], consequent: str
 ) -> tuple[Rule, ...]:
     """One AND rule for every combination of the fuzzy sets of every cell's diseases.
 
@@ -34,14 +49,7 @@ def _terms(disease: str, sets: int) -> list[Term]:
 
 
 def _rule(
-    terms: tuple[Term, ...], severities: Mapping[str, Sequence[int]], consequent: Consequent
+    terms: tuple[Term, ...], severities: Mapping[str, Sequence[int]], consequent: str
 ) -> Rule:
     named = [severities[AETIOLOGIES[term.input]][term.set] for term in terms]
-    return Rule(terms, governing(named, consequent))
-
-
-def governing(severities: Sequence[int], consequent: Consequent) -> int:
-    """Severity of a combination: that of its severest member, or the mean rounded up."""
-    if consequent == "max":
-        return max(severities)
-    return math.ceil(sum(severities) / len(severities))
+    return Rule(terms, CONSEQUENTS[consequent].governing(named))

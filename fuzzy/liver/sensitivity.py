@@ -16,8 +16,9 @@ from fuzzy.liver.readings import READINGS
 from fuzzy.liver.settings import CHOICES, LiverSettings
 from fuzzy.liver.stiffness import PA_PER_KPA, evaluate, liver_row
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import CHOICES as OPTIONS
-from fuzzy.systems.inference import SYSTEMS, SystemName
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import CHOICES as OPTIONS
+from fuzzy.systems.quadrature import is_exact
 from fuzzy.systems.sets import Array
 from fuzzy.systems.spread import spread
 
@@ -31,8 +32,8 @@ LARGEST_READING = 40.0 * PA_PER_KPA
 """Two within-stage SDs above the highest centre in use, cirrhosis in ALD at 22.6 +- 8.9 kPa."""
 
 SYSTEM = "system"
-TYPE_2: tuple[SystemName, ...] = ("interval-type-2",)
-SUGENO: tuple[SystemName, ...] = ("sugeno",)
+TYPE_2: tuple[str, ...] = ("interval-type-2",)
+SUGENO: tuple[str, ...] = ("sugeno",)
 
 
 class Axis(NamedTuple):
@@ -40,19 +41,19 @@ class Axis(NamedTuple):
 
     key: str
     values: tuple[Any, ...]
-    systems: tuple[SystemName, ...] = SYSTEMS
+    systems: tuple[str, ...] = tuple(SYSTEMS)
 
 
 AXES = (
     Axis("reading", tuple(READINGS)),
-    Axis("consequent", CHOICES["consequent"]),
-    Axis("placement", CHOICES["placement"]),
-    Axis("absent", CHOICES["absent"]),
-    Axis("footprint", CHOICES["footprint"], TYPE_2),
+    Axis("consequent", tuple(CHOICES["consequent"])),
+    Axis("placement", tuple(CHOICES["placement"])),
+    Axis("absent", tuple(CHOICES["absent"])),
+    Axis("footprint", tuple(CHOICES["footprint"]), TYPE_2),
     Axis("footprint_factor", (0.0, 0.5, 1.0, 2.0), TYPE_2),
-    Axis("reducer", OPTIONS["reducer"], TYPE_2),
-    Axis("sugeno_aggregation", OPTIONS["sugeno_aggregation"], SUGENO),
-    Axis("sampling", OPTIONS["sampling"]),
+    Axis("reducer", tuple(OPTIONS["reducer"]), TYPE_2),
+    Axis("sugeno_aggregation", tuple(OPTIONS["sugeno_aggregation"]), SUGENO),
+    Axis("sampling", tuple(OPTIONS["sampling"])),
     Axis("samples", (51, 101, 1001)),
 )
 
@@ -137,7 +138,7 @@ def _value(settings: LiverSettings, key: str) -> Any:
 
 def _is_idle(key: str, base: LiverSettings) -> bool:
     """Whether a choice has no part in the answer: exact sampling takes no samples."""
-    return key == "samples" and base.options.sampling == "exact"
+    return key == "samples" and is_exact(base.options.sampling)
 
 
 def _changed(base: LiverSettings, key: str, value: Any) -> LiverSettings:
@@ -182,13 +183,13 @@ def _require_absent(present: Collection[str]) -> None:
 
 
 def _sampled(settings: LiverSettings) -> LiverSettings:
-    if settings.options.sampling != "exact":
+    if not is_exact(settings.options.sampling):
         return settings
     return replace(settings, options=replace(settings.options, **STAND_IN))
 
 
 def _rows(base: LiverSettings, other: LiverSettings, rows: int) -> int:
-    exact = "exact" in (base.options.sampling, other.options.sampling)
+    exact = any(is_exact(one.options.sampling) for one in (base, other))
     return min(rows, EXACT_ROWS) if exact else rows
 
 

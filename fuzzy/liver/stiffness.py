@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.settings import ABSENT, LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems import exact
 from fuzzy.systems.inference import Inferred, infer
+from fuzzy.systems.quadrature import is_exact
 from fuzzy.systems.sets import Array, lower_membership, membership, upper_membership
 from fuzzy.systems.system import FuzzySystem, memberships
 
@@ -108,7 +109,7 @@ def patient_system(readings: Mapping[str, float], settings: LiverSettings) -> Fu
 
 
 def _present(names: Collection[str], settings: LiverSettings) -> tuple[str, ...]:
-    if settings.absent == "normal":
+    if not ABSENT[settings.absent].silences:
         return AETIOLOGIES
     return tuple(name for name in AETIOLOGIES if name in names)
 
@@ -174,7 +175,7 @@ def _interval(found: Inferred) -> tuple[float, float] | None:
 def _quadrature_error(
     liver: FuzzySystem, row: Array, system: str, settings: LiverSettings, found: Inferred
 ) -> float:
-    if settings.options.sampling == "exact":
+    if is_exact(settings.options.sampling):
         return exact.TOLERANCE * (liver.output.high - liver.output.low) * PA_PER_KPA
     continuous = infer(liver, row, system, replace(settings.options, sampling="exact"), UNIT)
     return abs(float(found.value[0] - continuous.value[0])) * PA_PER_KPA
@@ -213,8 +214,5 @@ def _refusal(name: str, reading: float) -> str:
 
 
 def _missing_notes(readings: Mapping[str, float], settings: LiverSettings) -> list[str]:
-    done = {
-        "normal": f"the normal liver's {NORMAL_LIVER / PA_PER_KPA:g} kPa taken",
-        "silent": "the rules that name it left out",
-    }[settings.absent]
+    done = ABSENT[settings.absent].note.format(normal=NORMAL_LIVER / PA_PER_KPA)
     return [f"{name}: no reading; {done}" for name in AETIOLOGIES if name not in readings]

@@ -13,7 +13,7 @@ from fuzzy.liver.knowledge import (
 )
 from fuzzy.liver.readings import disease_sets, reading_named
 from fuzzy.liver.rules import rule_base
-from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Variable
@@ -117,12 +117,7 @@ def footprint(record: SetRecord, settings: LiverSettings) -> Footprint:
     study: the sources only tell how far centres lie apart.
     """
     relative = relative_half_width(record, settings)
-    match settings.footprint:
-        case "uncertain-mean":
-            return Footprint(mean=relative * record.centre)
-        case "uncertain-spread":
-            return Footprint(spread=relative)
-    return Footprint(scale=1.0 - relative)
+    return FOOTPRINTS[settings.footprint].footprint(relative, record.centre)
 
 
 def relative_half_width(record: SetRecord, settings: LiverSettings) -> float:

@@ -14,15 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fuzzy.systems import kernel
-from fuzzy.systems.inference import (
-    LEAST_STRENGTH,
-    InferenceOptions,
-    check_kind,
-    infer,
-    require_readings,
-)
-from fuzzy.systems.interval_type2 import LEAST_AREA
-from fuzzy.systems.quadrature import Output, sampled
+from fuzzy.systems.kinds import SYSTEMS, check_kind
+from fuzzy.systems.options import OUT_OF_RANGE, InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH, answered, require_readings
+from fuzzy.systems.quadrature import Output, is_exact, sampled
 from fuzzy.systems.redundancy import dominated
 from fuzzy.systems.sets import (
     TYPE_1,
@@ -35,7 +30,8 @@ from fuzzy.systems.sets import (
     upper_membership,
 )
 from fuzzy.systems.sugeno import consequents
-from fuzzy.systems.system import FuzzySystem, Membership, Operators, Rule, memberships
+from fuzzy.systems.system import MERGES, FuzzySystem, Membership, Operators, Rule, memberships
+from fuzzy.systems.type_reduction import LEAST_AREA, REDUCERS
 
 KERNEL_FORMS: dict[str, tuple[int, Callable[[Parameters], tuple[float, ...]]]] = {
     "gaussmf": (kernel.GAUSSIAN, lambda p: (*p, *p)),
@@ -103,7 +99,7 @@ class Compiled:
     @cached_property
     def _one(self) -> tuple[Callable[..., kernel.Single], kernel.Integers, Array]:
         """The kernel of one row, and the arguments as it takes them."""
-        clamps = self.options.out_of_range == "clamp"
+        clamps = OUT_OF_RANGE[self.options.out_of_range].clamps
         return ONE_ROW[self.kind], *kernel.pack(self.universes, clamps, *self.arguments)
 
     def one(self, x: Sequence[float] | Array) -> CompiledAnswer:
@@ -119,17 +115,20 @@ class Compiled:
             )
         run, integers, floats = self._one
         value, lower, upper, strength, outside = run(readings, integers, floats)
-        policy = self.options.out_of_range
-        allowed = outside == 0 or (outside > 0 and policy != "raise")
+        policy = OUT_OF_RANGE[self.options.out_of_range]
+        allowed = outside == 0 or (outside > 0 and not policy.refuses)
         if allowed and strength >= LEAST_STRENGTH and math.isfinite(upper - lower):
-            return CompiledAnswer(value, lower, upper, outside > 0 and policy == "clamp", False)
+            return CompiledAnswer(value, lower, upper, outside > 0 and policy.clamps, False)
         return self._exceptional(x)
 
     def _exceptional(self, x: Sequence[float] | Array) -> CompiledAnswer:
         """What `infer` makes of readings refused or without an answer: an error, or the middle."""
-        found = infer(self.system, np.array([x]), self.kind, self.options)
+        found, _ = answered(self.system, np.array([x]), self._by_definition, self.options)
         ends = found.value if found.interval is None else found.interval[0]
         return CompiledAnswer(found.value.item(), ends[0].item(), ends[-1].item(), False, True)
+
+    def _by_definition(self, X: Array) -> Output:
+        return SYSTEMS[self.kind].evaluate(self.system, X, self.options)
 
 
 def compiled(
@@ -141,7 +140,7 @@ def compiled(
     ValueError for a kind the system cannot be, and for exact sampling.
     """
     check_kind(system, kind)
-    if options.sampling == "exact":
+    if is_exact(options.sampling):
         raise ValueError(
             "sampling = 'exact' is not compiled: evaluate it with infer, or choose matlab or "
             "octave sampling with more samples"
@@ -151,7 +150,7 @@ def compiled(
 
 @lru_cache(maxsize=32)
 def _compiled(system: FuzzySystem, kind: str, options: InferenceOptions, pruned: bool) -> Compiled:
-    summed = kind == "sugeno" and options.sugeno_aggregation == "sum"
+    summed = kind == "sugeno" and MERGES[options.sugeno_aggregation].adds
     idle = {pair.rule for pair in dominated(system)} if pruned and not summed else set()
     rules = [rule for number, rule in enumerate(system.rules) if number not in idle]
     used = sorted({(term.input, term.set) for rule in rules for term in rule.antecedents})
@@ -170,7 +169,7 @@ def _output(system: FuzzySystem, kind: str, options: InferenceOptions) -> tuple[
     if kind == "mamdani":
         return (_packed_grid(system, options, (membership, membership)),)
     grid = _packed_grid(system, options, (lower_membership, upper_membership))
-    return grid, options.reducer == "nie-tan", LEAST_AREA
+    return grid, REDUCERS[options.reducer].nie_tan, LEAST_AREA
 
 
 def _packed_sets(

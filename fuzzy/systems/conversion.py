@@ -2,15 +2,12 @@
 
 from dataclasses import replace
 
-from fuzzy.systems.quadrature import Sampling
 from fuzzy.systems.sets import TYPE_1, FuzzySet
 from fuzzy.systems.sugeno import constants
 from fuzzy.systems.system import FuzzySystem, Variable
 
 
-def sugeno_of(
-    system: FuzzySystem, sampling: Sampling = "matlab", samples: int = 101
-) -> FuzzySystem:
+def sugeno_of(system: FuzzySystem, sampling: str = "matlab", samples: int = 101) -> FuzzySystem:
     """The system with every output set replaced by the constant at its centroid.
 
     Evaluated as sugeno it answers as the system it was made from; a Sugeno one is left as it is.

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.systems import sugeno
-from fuzzy.systems.inference import LEAST_STRENGTH, InferenceOptions, in_range, infer
-from fuzzy.systems.quadrature import sampled
-from fuzzy.systems.sets import Array, lower_membership, membership, upper_membership
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH, in_range
+from fuzzy.systems.quadrature import is_exact, sampled
+from fuzzy.systems.sets import Array
 from fuzzy.systems.system import (
+    MERGES,
     FuzzySystem,
-    Membership,
     Rule,
     firing_strengths,
     memberships,
@@ -158,15 +161,8 @@ def explain(
     )
 
 
-def bounds_of(kind: str) -> tuple[Membership, Membership]:
-    """Lower and upper membership function for a kind of system; the same for type-1."""
-    if kind == "interval-type-2":
-        return lower_membership, upper_membership
-    return membership, membership
-
-
 def _degrees(system: FuzzySystem, x: Array, kind: str) -> tuple[Degree, ...]:
-    lower, upper = bounds_of(kind)
+    lower, upper = SYSTEMS[kind].bounds
     return tuple(
         Degree(variable.name, one.name, float(lower(one, reading)), float(upper(one, reading)))
         for variable, reading in zip(system.inputs, x, strict=True)
@@ -175,9 +171,9 @@ def _degrees(system: FuzzySystem, x: Array, kind: str) -> tuple[Degree, ...]:
 
 
 def _fire(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -> _Fired:
-    low, high = bounds_of(kind)
+    low, high = SYSTEMS[kind].bounds
     lower, upper = firing_strengths(system, X, low, high), firing_strengths(system, X, high, low)
-    adds = kind == "sugeno" and options.sugeno_aggregation == "sum"
+    adds = kind == "sugeno" and MERGES[options.sugeno_aggregation].adds
     consequents = np.array([rule.consequent for rule in system.rules])
     heights = [merged(system, strengths, "sum" if adds else "max") for strengths in (lower, upper)]
     sets = [
@@ -197,7 +193,7 @@ def _constants(system: FuzzySystem, X: Array, options: InferenceOptions) -> Arra
 def _shares(fired: _Fired, options: InferenceOptions) -> Array:
     """Part of a Sugeno system's total weight that each rule has, shape (rules,)."""
     weights = fired.upper
-    if options.sugeno_aggregation == "max":
+    if not MERGES[options.sugeno_aggregation].adds:
         level = np.bincount(fired.consequents, fired.sets_upper)[fired.consequents]
         weights = np.where(fired.sets_upper, fired.upper / np.maximum(level, 1), 0.0)
     total = weights.sum()
@@ -257,7 +253,7 @@ def _curve(system: FuzzySystem, fired: _Fired, kind: str, samples: int) -> Outpu
     heights = (fired.lower_heights, fired.upper_heights)
     lower, upper = (
         union(level[:, np.newaxis], memberships(system.output, y, bound), system.operators)[0]
-        for level, bound in zip(heights, bounds_of(kind), strict=True)
+        for level, bound in zip(heights, SYSTEMS[kind].bounds, strict=True)
     )
     return OutputCurve(y, lower, upper)
 
@@ -272,7 +268,7 @@ def _switches(
     """An end is the centroid of a set that switches between its bounds at that very end."""
     if curve is None or interval is None or not curve.upper.max() > 0:
         return None
-    if options.sampling == "exact":
+    if is_exact(options.sampling):
         left, right = (SwitchPoint(None, end, end) for end in interval)
         return left, right
     # A sample on the end itself belongs to the upper bound, which may be all there is.

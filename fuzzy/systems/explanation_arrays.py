@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.systems.explain import Explanation, Firing, bounds_of, shown_rules
+from fuzzy.systems.explain import Explanation, Firing, shown_rules
+from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.rule_text import rule_text
 from fuzzy.systems.sets import Array
 from fuzzy.systems.system import Variable, memberships
@@ -58,7 +59,7 @@ def _drawn_rules(explanation: Explanation, shown: Sequence[Firing]) -> dict[str,
 
 
 def _drawn_terms(explanation: Explanation, shown: Sequence[Firing]) -> dict[str, Any]:
-    system, (low, high) = explanation.system, bounds_of(explanation.kind)
+    system, (low, high) = explanation.system, SYSTEMS[explanation.kind].bounds
     x = np.array([_line(variable) for variable in system.inputs])
     terms = [(i, term) for i, firing in enumerate(shown) for term in firing.rule.antecedents]
     sets = [system.inputs[term.input].sets[term.set] for _, term in terms]
@@ -90,7 +91,7 @@ def _line(variable: Variable) -> Array:
 def _drawn_outputs(explanation: Explanation) -> dict[str, Any]:
     system, outputs, curve = explanation.system, explanation.outputs, explanation.curve
     y = _line(system.output) if curve is None else curve.y
-    bounds = () if system.is_sugeno else bounds_of(explanation.kind)
+    bounds = () if system.is_sugeno else SYSTEMS[explanation.kind].bounds
     sets = [memberships(system.output, y, bound) for bound in bounds]
     return {
         "y": y,

@@ -1,16 +1,42 @@
 """Points and weights on the output's universe, by which areas and centroids are summed."""
 
-from typing import Literal, NamedTuple, get_args
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from fuzzy.systems.sets import Array
 from fuzzy.systems.system import Variable
 
-Sampling = Literal["matlab", "octave", "exact"]
-"""`matlab` sums samples alike, `octave` by the trapezoidal rule, `exact` integrates the curve."""
 
-SAMPLINGS: tuple[Sampling, ...] = get_args(Sampling)
+class Sampling(NamedTuple):
+    """How areas under the output curve are found.
+
+    `weights` gives those of so many equidistant samples, shape (M,), and is None where the curve
+    itself is integrated. `words` name it; {samples} in them is the number of samples.
+    """
+
+    weights: Callable[[int], Array] | None
+    words: str
+
+
+def _trapezoidal(samples: int) -> Array:
+    weights = np.ones(samples)
+    weights[[0, -1]] = 0.5
+    return weights
+
+
+SAMPLINGS: dict[str, Sampling] = {
+    "matlab": Sampling(np.ones, "sums over {samples} points"),
+    "octave": Sampling(_trapezoidal, "the trapezoidal rule over {samples} points"),
+    "exact": Sampling(None, "integration between the kinks of the curve"),
+}
+"""By name: MATLAB's `evalfis` weighs all samples alike, Octave's toolkit halves both ends."""
+
+
+def is_exact(sampling: str) -> bool:
+    """Whether a sampling, by name, takes no samples."""
+    return SAMPLINGS[sampling].weights is None
 
 
 class Quadrature(NamedTuple):
@@ -32,16 +58,12 @@ class Output(NamedTuple):
     strength: Array
 
 
-def sampled(variable: Variable, samples: int, sampling: Sampling) -> Quadrature:
-    """`samples` equidistant points, both ends included.
-
-    MATLAB's `evalfis` weighs all alike; Octave's toolkit halves the weight of both ends.
-    """
-    y = np.linspace(variable.low, variable.high, samples)
-    weights = np.ones(samples)
-    if sampling == "octave":
-        weights[[0, -1]] = 0.5
-    return Quadrature(y, weights)
+def sampled(variable: Variable, samples: int, sampling: str) -> Quadrature:
+    """`samples` equidistant points, both ends included. ValueError for a sampling without any."""
+    weights = SAMPLINGS[sampling].weights
+    if weights is None:
+        raise ValueError(f"sampling = {sampling!r} takes no samples: use matlab or octave")
+    return Quadrature(np.linspace(variable.low, variable.high, samples), weights(samples))
 
 
 def centroid(quadrature: Quadrature, mu: Array) -> Array:

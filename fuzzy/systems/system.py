@@ -15,8 +15,25 @@ import numpy as np
 from fuzzy.systems.sets import FUNCTION_KINDS, Array, FuzzySet
 
 Membership = Callable[[FuzzySet, Array], Array]
-Merge = Literal["max", "sum"]
 Connective = Literal["and", "or"]
+
+
+class Merge(NamedTuple):
+    """How rules with one consequent join their strengths; `weighed` says what an average counts."""
+
+    join: np.ufunc
+    weighed: str
+
+    @property
+    def adds(self) -> bool:
+        """Whether every rule counts, not the strongest alone."""
+        return self.join is np.add
+
+
+MERGES: dict[str, Merge] = {
+    "max": Merge(np.maximum, "output set, by its strongest rule"),
+    "sum": Merge(np.add, "rule"),
+}
 
 
 class Term(NamedTuple):
@@ -144,6 +161,14 @@ def _check_kinds(system: FuzzySystem) -> None:
             )
 
 
+def joins(operators: Operators) -> str:
+    """Words for the operators."""
+    return (
+        f"AND {operators.conjunction}, OR {operators.disjunction}, "
+        f"implication {operators.implication}, aggregation max"
+    )
+
+
 def memberships(variable: Variable, x: Array, membership: Membership) -> Array:
     """Membership of x (M,) in every set of the variable, shape (sets, M)."""
     return np.array([membership(fuzzy_set, x) for fuzzy_set in variable.sets])
@@ -184,10 +209,10 @@ def _joined(terms: Sequence[Array], connective: Connective, operators: Operators
     return np.asarray(reduce(lambda a, b: a + b * (1.0 - a), terms))
 
 
-def merged(system: FuzzySystem, strengths: Array, merge: Merge = "max") -> Array:
+def merged(system: FuzzySystem, strengths: Array, merge: str = "max") -> Array:
     """Strength of every output set from those of the rules (rules, N), shape (sets, N)."""
     consequents = np.array([rule.consequent for rule in system.rules])
-    join = np.maximum if merge == "max" else np.add
+    join = MERGES[merge].join
     return np.array(
         [
             join.reduce(strengths[consequents == k], axis=0, initial=0.0)

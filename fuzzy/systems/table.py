@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzy.systems.inference import InferenceOptions, Inferred, check_kind, infer
+from fuzzy.systems.inference import Inferred, infer
+from fuzzy.systems.kinds import check_kind
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Array
 from fuzzy.systems.system import FuzzySystem
 

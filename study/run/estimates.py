@@ -16,7 +16,7 @@ from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.system import records_in_use
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
-from fuzzy.systems.inference import InferenceOptions
+from fuzzy.systems.options import InferenceOptions
 from study.results.folder import Row
 from study.scene import Scene
 

@@ -20,9 +20,10 @@ import pytest
 
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
-from fuzzy.systems import interval_type2, mamdani, sugeno
+from fuzzy.systems import sugeno
 from fuzzy.systems.compiled import compiled
-from fuzzy.systems.inference import InferenceOptions
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.scikit_fuzzy import control_system
 from fuzzy.systems.sets import Footprint, FuzzySet, core
 
@@ -165,11 +166,8 @@ def pyit2fls():
 
 
 def numpy_engine(kind):
-    if kind == "mamdani":
-        return lambda X: mamdani.evaluate(SYSTEM, X, "matlab", SAMPLES).value
-    if kind == "sugeno":
-        return lambda X: sugeno.evaluate(SYSTEM, X, "matlab", SAMPLES, "sum").value
-    return lambda X: interval_type2.evaluate(SYSTEM, X, "matlab", SAMPLES, "karnik-mendel").value
+    options = InferenceOptions(samples=SAMPLES)
+    return lambda X: SYSTEMS[kind].evaluate(SYSTEM, X, options).value
 
 
 def engines(kind):

@@ -18,8 +18,10 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import estimate
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.inference import SYSTEMS, InferenceOptions, infer
+from fuzzy.systems.inference import infer
 from fuzzy.systems.interval_type2 import bounds_of_firing
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.quadrature import sampled
 from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable, memberships, union
@@ -216,7 +218,7 @@ def alone(kind: str) -> Finding:
 
 def without_footprint(footprint: str) -> Finding:
     """Interval type-2 without a footprint is Mamdani's, and its interval a point."""
-    settings = LiverSettings(footprint=footprint, footprint_factor=0.0)  # type: ignore[arg-type] # a name from the table
+    settings = LiverSettings(footprint=footprint, footprint_factor=0.0)
     found = estimate(READINGS, "interval-type-2", settings)
     one = estimate(READINGS, "mamdani", settings).estimate
     return beside(np.full(3, one), np.array([found.estimate, *(found.interval or ())]))
@@ -224,7 +226,7 @@ def without_footprint(footprint: str) -> Finding:
 
 def with_largest(footprint: str) -> Finding:
     """The liver's interval at the largest footprint, by a search."""
-    settings = LiverSettings(footprint=footprint, footprint_factor=3.0)  # type: ignore[arg-type] # likewise
+    settings = LiverSettings(footprint=footprint, footprint_factor=3.0)
     row = np.array([[READINGS[name] / KPA for name in AETIOLOGIES]])
     return _searched(liver_system(settings), row)
 
