@@ -11,19 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.inference import SYSTEMS, Options
-from fuzzy.knowledge import parameters
-from fuzzy.liver import liver_system
-from fuzzy.settings import Settings
-from fuzzy.stiffness import (
+from fuzzy.liver.knowledge import parameters
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import (
     PA_PER_KPA,
     UNIT,
-    Estimate,
+    StiffnessEstimate,
     estimate,
     liver_row,
     patient_system,
 )
-from fuzzy.system import System
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.system import FuzzySystem
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
@@ -34,7 +35,7 @@ class Request:
     """What was asked on the command line.
 
     `readings` [kPa] by aetiology; `systems` empty for all three; `settings` the given fields of
-    Settings and Options by name; `row` of the table to explain, from 1.
+    LiverSettings and InferenceOptions by name; `row` of the table to explain, from 1.
     """
 
     readings: Mapping[str, float] = field(default_factory=dict)
@@ -58,12 +59,12 @@ class Answer:
     notes: tuple[str, ...] = ()
 
 
-def settings_of(given: Mapping[str, Any]) -> Settings:
+def settings_of(given: Mapping[str, Any]) -> LiverSettings:
     """Settings with the given fields in place of the defaults. ValueError naming a wrong one."""
-    names = {one.name for one in fields(Options)}
-    options = Options(**{key: value for key, value in given.items() if key in names})
+    names = {one.name for one in fields(InferenceOptions)}
+    options = InferenceOptions(**{key: value for key, value in given.items() if key in names})
     liver = {key: value for key, value in given.items() if key not in names}
-    return Settings(**liver, options=options)
+    return LiverSettings(**liver, options=options)
 
 
 def answer(request: Request) -> Answer:
@@ -111,17 +112,17 @@ def _check_plausible(kpa: float, where: str) -> None:
         raise ValueError(f"{where}: no liver has that; give kPa, {low:g} to {high:g}")
 
 
-def _line(found: Estimate) -> str:
+def _line(found: StiffnessEstimate) -> str:
     bounds = [f"{bound / PA_PER_KPA:.2f}" for bound in found.interval or ()]
     interval = f"   [{', '.join(bounds)}]" if bounds else ""
     return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval}"
 
 
-def _as_json(found: Sequence[Estimate]) -> str:
+def _as_json(found: Sequence[StiffnessEstimate]) -> str:
     return json.dumps({one.system: _numbers(one) for one in found}, indent=1)
 
 
-def _numbers(found: Estimate) -> dict[str, object]:
+def _numbers(found: StiffnessEstimate) -> dict[str, object]:
     numbers: dict[str, object] = {
         "estimate_pa": found.estimate,
         "quadrature_error_pa": found.quadrature_error,
@@ -131,9 +132,9 @@ def _numbers(found: Estimate) -> dict[str, object]:
     return numbers | ({"interval_pa": list(found.interval)} if found.interval else {})
 
 
-def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iterator[str]:
-    from fuzzy.explain import explain
-    from fuzzy.explanation_text import explanation_lines
+def _explained(request: Request, system: FuzzySystem, x: NDArray[np.float64]) -> Iterator[str]:
+    from fuzzy.systems.explain import explain
+    from fuzzy.systems.explanation_text import explanation_lines
 
     unit = UNIT if request.rule_base is None else ""
     options = settings_of(request.settings).options
@@ -146,7 +147,7 @@ def _explained(request: Request, system: System, x: NDArray[np.float64]) -> Iter
 
 
 def _table(request: Request, inputs: Path) -> Answer:
-    from fuzzy.table import evaluate_table
+    from fuzzy.systems.table import evaluate_table
 
     _check_table(request)
     system, unit = _rule_base(request.rule_base, request.settings)
@@ -177,13 +178,13 @@ def _check_table(request: Request) -> None:
         raise ValueError("--row: only with --explain; leave it out")
 
 
-def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str]:
+def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[FuzzySystem, str]:
     """The system of a file, or the liver's; and the unit of its readings where it is known."""
     if path is None:
         return liver_system(settings_of(given)), UNIT
-    from fuzzy.rule_base import read_rule_base
+    from fuzzy.systems.files import read_rule_base
 
-    options = {one.name for one in fields(Options)}
+    options = {one.name for one in fields(InferenceOptions)}
     for key in given:
         if key not in options:
             flag = "--" + key.replace("_", "-")
@@ -193,8 +194,8 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[System, str
     return read_rule_base(path), ""
 
 
-def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.float64]:
-    from fuzzy.table import read_readings
+def _table_row(inputs: Path, row: int | None, system: FuzzySystem) -> NDArray[np.float64]:
+    from fuzzy.systems.table import read_readings
 
     X = read_readings(inputs, system)
     number = 1 if row is None else row
@@ -207,14 +208,14 @@ def _table_row(inputs: Path, row: int | None, system: System) -> NDArray[np.floa
 
 
 def _draw(
-    folder: Path, request: Request, readings: Mapping[str, float], settings: Settings
+    folder: Path, request: Request, readings: Mapping[str, float], settings: LiverSettings
 ) -> Iterator[str]:
     """Write the figures into the folder; their paths."""
     from reports.fuzzy_figures import draw_sets, draw_surfaces
     from reports.rule_view import draw_rules
     from study.models.estimates import drawings
 
-    systems, over = request.systems or SYSTEMS, request.surface or ("hcv", "hbv")
+    systems, over = request.systems or tuple(SYSTEMS), request.surface or ("hcv", "hbv")
     arrays = drawings(settings, systems, readings, over)
     found = {name: estimate(readings, name, settings).estimate for name in systems}
     pictures = {"sets": draw_sets(arrays, found), "surfaces": draw_surfaces(arrays, over)}
@@ -230,9 +231,9 @@ def rule_base_lines(
     path: Path | None, given: Mapping[str, Any], out: Path | None, *, sugeno: bool
 ) -> Sequence[str]:
     """Audit a rule base, the liver's if there is no `path`, or write it to `out`."""
-    from fuzzy.audit import audit, audit_lines
-    from fuzzy.conversion import sugeno_of, type_1_of
-    from fuzzy.rule_base import write_rule_base
+    from fuzzy.systems.audit import audit, audit_lines
+    from fuzzy.systems.conversion import sugeno_of, type_1_of
+    from fuzzy.systems.files import write_rule_base
 
     system, _ = _rule_base(path, given)
     if out is None:

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.conversion import type_1_of
-from fuzzy.inference import Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.rule_base import read_rule_base, write_rule_base
-from fuzzy.sets import Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.system import Rule, System, Term, Variable
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.conversion import type_1_of
+from fuzzy.systems.files import read_rule_base, write_rule_base
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -66,7 +67,7 @@ def tipper(footprint=0.0):
         Rule((Term(0, 1),), 1),
         Rule((Term(0, 2), Term(1, 1)), 2, "or"),
     )
-    return System((service, food), tip, rules, name="tipper")
+    return FuzzySystem((service, food), tip, rules, name="tipper")
 
 
 TABLE = "guest,food,service\nann,1,2\nbob,5,4\ncem,8,7\n"
@@ -116,7 +117,7 @@ def test_a_table_is_evaluated_as_the_flags_say(folder, flags, kind, options):
     )
     assert done.returncode == 0, done.stderr
     X = np.array([[2.0, 1.0], [4.0, 5.0], [7.0, 8.0]])
-    expected = infer(tipper(0.5), X, kind, Options(**options))
+    expected = infer(tipper(0.5), X, kind, InferenceOptions(**options))
     found = rows(folder / "out.csv")
     assert [float(row["estimate"]) for row in found] == expected.value.tolist()
     if kind == "interval-type-2":
@@ -205,7 +206,7 @@ def test_a_missing_column_is_not_looked_for_under_another_disease(tmp_path):
 def test_the_liver_is_written_and_read_back(tmp_path, suffix):
     done = study("rules", "--out", f"liver.{suffix}", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    liver, back = liver_system(Settings()), read_rule_base(tmp_path / f"liver.{suffix}")
+    liver, back = liver_system(LiverSettings()), read_rule_base(tmp_path / f"liver.{suffix}")
     if suffix == "json":
         assert back == liver
     else:

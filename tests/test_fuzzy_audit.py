@@ -6,15 +6,17 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fuzzy.audit import audit, audit_lines
-from fuzzy.coverage import Gap, spread_readings
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.redundancy import Pair, dominated
-from fuzzy.rule_text import rule_text
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.system import Operators, Rule, System, Term, Variable, firing_strengths
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.audit import audit, audit_lines
+from fuzzy.systems.coverage import Gap, spread_readings
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.redundancy import Pair, dominated
+from fuzzy.systems.rule_text import rule_text
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable, firing_strengths
 
 LOW, HIGH = 0, 1
 COLD, WARM = Term(0, LOW), Term(0, HIGH)
@@ -31,7 +33,7 @@ def variable(name):
 def system(*rules, operators=None):
     names = ("heat", "rain")
     inputs = tuple(variable(name) for name in names)
-    return System(inputs, variable("growth"), rules, operators or Operators())
+    return FuzzySystem(inputs, variable("growth"), rules, operators or Operators())
 
 
 SOUND = system(Rule((COLD,), LOW), Rule((WARM, DRY), LOW), Rule((WARM, WET), HIGH))
@@ -179,13 +181,13 @@ def test_no_dominated_rule_is_missed_under_min_and_max():
 
 
 def test_eleven_of_the_livers_247_rules_decide_mamdani_and_type_2():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     dead = {pair.rule for pair in dominated(liver)}
     alive = tuple(rule for i, rule in enumerate(liver.rules) if i not in dead)
     assert len(dead) == 236
     assert all(len(rule.antecedents) == 1 for rule in alive)
     X = spread_readings(liver, 64)
-    few, by_max = replace(liver, rules=alive), Options(sugeno_aggregation="max")
+    few, by_max = replace(liver, rules=alive), InferenceOptions(sugeno_aggregation="max")
     for kind in SYSTEMS:
         # Not one bit: the same heights reach the output.
         assert np.array_equal(
@@ -194,7 +196,7 @@ def test_eleven_of_the_livers_247_rules_decide_mamdani_and_type_2():
 
 
 def test_sugenos_sum_needs_the_dominated_rules():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     dead = {pair.rule for pair in dominated(liver)}
     few = replace(liver, rules=tuple(r for i, r in enumerate(liver.rules) if i not in dead))
     X = spread_readings(liver, 64)
@@ -203,7 +205,7 @@ def test_sugenos_sum_needs_the_dominated_rules():
 
 
 def test_each_of_the_eleven_rules_matters():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     dead = {pair.rule for pair in dominated(liver)}
     alive = tuple(rule for i, rule in enumerate(liver.rules) if i not in dead)
     scale = np.arange(2.0, 76.0)
@@ -222,7 +224,7 @@ def test_each_of_the_eleven_rules_matters():
 
 
 def test_the_liver_has_twelve_duplicates_and_no_gap():
-    found = audit(liver_system(Settings()))
+    found = audit(liver_system(LiverSettings()))
     assert len(found.duplicates) == 12
     assert not found.contradictions
     assert not found.gaps
@@ -241,7 +243,7 @@ def three(name):
 
 
 def apart(*rules):
-    return System((three("heat"), three("rain")), variable("growth"), rules)
+    return FuzzySystem((three("heat"), three("rain")), variable("growth"), rules)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +276,7 @@ def test_a_footprint_can_bring_a_set_within_reach():
 
 def test_a_narrow_set_between_the_grid_points_is_reachable():
     needle = FuzzySet("needle", "trimf", (5.0031, 5.0032, 5.0033))
-    narrow = System(
+    narrow = FuzzySystem(
         (Variable("x", 0.0, 10.0, (needle,)),), variable("y"), (Rule((Term(0, 0),), LOW),)
     )
     assert audit(narrow, samples=8).unreachable == ()
@@ -315,7 +317,7 @@ def test_share_of_uncovered_readings_is_that_of_their_area():
 
 
 def test_spread_readings_fill_the_universe_more_evenly_than_random_ones():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     low, high = 2.0, 75.0
 
     def unevenness(X):
@@ -357,7 +359,7 @@ def test_a_rule_in_words(rule, text):
 
 
 def test_the_audit_of_the_liver_in_words():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     lines = audit_lines(audit(liver), liver, examples=1)
     assert lines[0].startswith("liver-R1: 247 rules on the sets 2 of hcv, 3 of hbv")
     text = "\n".join(lines)

@@ -7,28 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy import interval_type2, kernel, mamdani, sugeno
-from fuzzy.compiled import KERNEL_FORMS, compiled
-from fuzzy.control_system import control_system
-from fuzzy.inference import LEAST_STRENGTH, SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.redundancy import dominated
-from fuzzy.sets import FORMS, TYPE_1, Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.system import Operators, Rule, System, Term, Variable
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems import interval_type2, kernel, mamdani
+from fuzzy.systems.compiled import KERNEL_FORMS, compiled
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH
+from fuzzy.systems.redundancy import dominated
+from fuzzy.systems.scikit_fuzzy import control_system
+from fuzzy.systems.sets import FORMS, TYPE_1, Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
-LIVER = liver_system(Settings())
+LIVER = liver_system(LiverSettings())
+EXACT = InferenceOptions(sampling="exact")
 INSIDE = np.random.default_rng(20240917).uniform(2.0, 75.0, (300, 5))
 
 
 def defined(system, X, kind, options):
     """Output of the numpy module that defines the answer."""
-    where = options.sampling, options.samples
-    if kind == "mamdani":
-        return mamdani.evaluate(system, X, *where)
-    if kind == "sugeno":
-        return sugeno.evaluate(system, X, *where, options.sugeno_aggregation)
-    return interval_type2.evaluate(system, X, *where, options.reducer)
+    return SYSTEMS[kind].evaluate(system, X, options)
 
 
 def assert_same(got, wanted, allowed):
@@ -133,17 +132,17 @@ def random_system(seed, exactly=False):
     )
     negation = 0.0 if exactly else 0.3
     rules = [random_rule(inputs, len(output.sets), rng, negation) for _ in range(12)]
-    return System(inputs, output, tuple(rules), operators)
+    return FuzzySystem(inputs, output, tuple(rules), operators)
 
 
 OPTIONS = [
-    ("mamdani", Options()),
-    ("mamdani", Options(sampling="octave", samples=57)),
-    ("sugeno", Options()),
-    ("sugeno", Options(sugeno_aggregation="max")),
-    ("interval-type-2", Options()),
-    ("interval-type-2", Options(sampling="octave", samples=57)),
-    ("interval-type-2", Options(reducer="nie-tan")),
+    ("mamdani", InferenceOptions()),
+    ("mamdani", InferenceOptions(sampling="octave", samples=57)),
+    ("sugeno", InferenceOptions()),
+    ("sugeno", InferenceOptions(sugeno_aggregation="max")),
+    ("interval-type-2", InferenceOptions()),
+    ("interval-type-2", InferenceOptions(sampling="octave", samples=57)),
+    ("interval-type-2", InferenceOptions(reducer="nie-tan")),
 ]
 
 
@@ -179,9 +178,9 @@ def test_an_error_in_the_ninth_digit_would_be_seen():
     moved = replace(first, parameters=(first.parameters[0], first.parameters[1] * (1 + 1e-9)))
     wrong = replace(system, output=replace(system.output, sets=(moved, *system.output.sets[1:])))
     for kind in SYSTEMS:
-        got = compiled(wrong, kind, Options()).evaluate(X)
+        got = compiled(wrong, kind, InferenceOptions()).evaluate(X)
         with pytest.raises(AssertionError):
-            assert_same(got, defined(system, X, kind, Options()), SUMS * 75.0)
+            assert_same(got, defined(system, X, kind, InferenceOptions()), SUMS * 75.0)
 
 
 def test_every_kind_has_a_form_in_the_kernel():
@@ -190,7 +189,10 @@ def test_every_kind_has_a_form_in_the_kernel():
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_the_liver_is_the_same_compiled(kind):
-    for options in (Options(), Options(sugeno_aggregation="max", reducer="nie-tan", samples=1001)):
+    for options in (
+        InferenceOptions(),
+        InferenceOptions(sugeno_aggregation="max", reducer="nie-tan", samples=1001),
+    ):
         wanted = defined(LIVER, INSIDE, kind, options)
         assert_same(compiled(LIVER, kind, options).evaluate(INSIDE), wanted, SUMS * 75.0)
 
@@ -204,7 +206,7 @@ def test_functions_as_consequents(consequent, merge):
         FuzzySet(f"f{i}", consequent, tuple(row)) for i, row in enumerate(numbers.tolist())
     )
     system = replace(system, output=replace(system.output, sets=functions))
-    X, options = readings(3), Options(sugeno_aggregation=merge)
+    X, options = readings(3), InferenceOptions(sugeno_aggregation=merge)
     wanted = defined(system, X, "sugeno", options)
     allowed = 100.0 * (SUMS + rounding(system, X, "sugeno", wanted.strength))
     assert_same(compiled(system, "sugeno", options).evaluate(X), wanted, allowed)
@@ -219,7 +221,7 @@ def stepped(kind):
     sets = tuple(FuzzySet(f"s{i}", kind, p, Footprint(mean=0.7)) for i, p in enumerate(corners))
     out = tuple(FuzzySet(f"o{k}", "gaussmf", (0.5, 2.0 + 3 * k)) for k in range(len(sets)))
     rules = tuple(Rule((Term(0, k),), k) for k in range(len(sets)))
-    return System((Variable("x", 0, 10, sets),), Variable("y", 0, 10, out), rules)
+    return FuzzySystem((Variable("x", 0, 10, sets),), Variable("y", 0, 10, out), rules)
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -227,8 +229,8 @@ def stepped(kind):
 def test_vertical_flanks_are_the_same_compiled(kind, form):
     system, X = stepped(form), np.random.default_rng(1).uniform(0, 10, (5000, 1))
     wanted, got = (
-        defined(system, X, kind, Options()),
-        compiled(system, kind, Options()).evaluate(X),
+        defined(system, X, kind, InferenceOptions()),
+        compiled(system, kind, InferenceOptions()).evaluate(X),
     )
     assert_same(got, wanted, SUMS * 10.0)
     # Beyond the feet nothing fires, and within reach of the cores something fires fully.
@@ -249,7 +251,7 @@ def falling(footprint=TYPE_1):
         FuzzySet(f"c{c}", "gaussmf", (1.5, c), Footprint(spread=0.3)) for c in (2.0, 5.0, 9.0)
     )
     rules = tuple(Rule((Term(0, 0),), k, weight=weight) for k, weight in enumerate((1.0, 0.5, 0.1)))
-    return System((inputs,), Variable("y", 0.0, 10.0, sets), rules)
+    return FuzzySystem((inputs,), Variable("y", 0.0, 10.0, sets), rules)
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -258,8 +260,8 @@ def test_down_to_the_least_strength_a_float_can_be(kind, footprint):
     # exp(-745) is the least of all; the lower bound is long 0 by then.
     X = np.linspace(0.0, 80.0, 4001)[:, None]
     system = falling(footprint)
-    wanted = defined(system, X, kind, Options())
-    got = compiled(system, kind, Options()).evaluate(X)
+    wanted = defined(system, X, kind, InferenceOptions())
+    got = compiled(system, kind, InferenceOptions()).evaluate(X)
     silent = wanted.strength == 0
     assert silent[-1]
     assert not silent[0]
@@ -287,8 +289,8 @@ def test_exponentials_to_two_units_in_the_last_place():
 @pytest.mark.parametrize("kind", ["mamdani", "interval-type-2"])
 def test_dominated_rules_change_no_bit_of_the_liver(kind):
     # By min, a longer AND is not greater by a single bit.
-    pruned = compiled(LIVER, kind, Options())
-    whole = compiled(LIVER, kind, Options(), pruned=False)
+    pruned = compiled(LIVER, kind, InferenceOptions())
+    whole = compiled(LIVER, kind, InferenceOptions(), pruned=False)
     kept = len(LIVER.rules) - len(dominated(LIVER))
     assert pruned.arguments[1].weight.size == kept < whole.arguments[1].weight.size == 247
     for one, other in zip(pruned.evaluate(INSIDE), whole.evaluate(INSIDE), strict=True):
@@ -296,7 +298,7 @@ def test_dominated_rules_change_no_bit_of_the_liver(kind):
 
 
 def test_no_rule_is_left_out_of_a_sum():
-    options = Options(sugeno_aggregation="sum")
+    options = InferenceOptions(sugeno_aggregation="sum")
     assert compiled(LIVER, "sugeno", options).arguments[1].weight.size == 247
 
 
@@ -312,8 +314,8 @@ def test_dominated_rules_change_no_answer_of_any_system(seed):
     system = replace(system, rules=extra + system.rules)
     assert len(dominated(system)) >= len(extra)
     for kind in ("mamdani", "interval-type-2"):
-        pruned = compiled(system, kind, Options()).evaluate(X)
-        whole = compiled(system, kind, Options(), pruned=False).evaluate(X)
+        pruned = compiled(system, kind, InferenceOptions()).evaluate(X)
+        whole = compiled(system, kind, InferenceOptions(), pruned=False).evaluate(X)
         # A product of the same terms in another order differs by an ulp.
         assert_same(pruned, whole, 1e-14)
 
@@ -322,9 +324,9 @@ def test_a_rule_wrongly_left_out_would_be_seen():
     idle = {pair.rule for pair in dominated(LIVER)}
     needed = next(number for number in range(247) if number not in idle)
     lost = replace(LIVER, rules=LIVER.rules[:needed] + LIVER.rules[needed + 1 :])
-    got = compiled(lost, "mamdani", Options()).evaluate(INSIDE)
+    got = compiled(lost, "mamdani", InferenceOptions()).evaluate(INSIDE)
     with pytest.raises(AssertionError):
-        assert_same(got, defined(LIVER, INSIDE, "mamdani", Options()), 1e-6)
+        assert_same(got, defined(LIVER, INSIDE, "mamdani", InferenceOptions()), 1e-6)
 
 
 # Rows and blocks
@@ -332,7 +334,7 @@ def test_a_rule_wrongly_left_out_would_be_seen():
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_an_answer_does_not_depend_on_the_rows_beside_it(kind):
-    model = compiled(LIVER, kind, Options())
+    model = compiled(LIVER, kind, InferenceOptions())
     X = np.random.default_rng(1).uniform(2, 75, (2 * kernel.BLOCK + 1, 5))
     together = model.evaluate(X)
     for rows in (slice(0, 1), slice(7, 7 + kernel.BLOCK), slice(kernel.BLOCK - 3, None)):
@@ -361,7 +363,7 @@ def test_one_gives_every_bit_of_evaluate(kind, options, seed):
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_what_is_packed_for_one_row_comes_back(kind):
     system = random_system(4)
-    model = compiled(system, kind, Options())
+    model = compiled(system, kind, InferenceOptions())
     sets, rules, output = model.arguments[:3]
     integers, floats = kernel.pack(model.universes, True, *model.arguments)
     universes, *parts, rest = kernel.unpacked(integers, floats)
@@ -378,7 +380,7 @@ def test_what_is_packed_for_one_row_comes_back(kind):
 
 
 def test_columns_may_lie_in_any_order_in_memory():
-    model = compiled(LIVER, "mamdani", Options())
+    model = compiled(LIVER, "mamdani", InferenceOptions())
     wanted = model.evaluate(INSIDE).value
     np.testing.assert_array_equal(model.evaluate(np.asfortranarray(INSIDE)).value, wanted)
     np.testing.assert_array_equal(model.evaluate(INSIDE[::2]).value, wanted[::2])
@@ -386,7 +388,7 @@ def test_columns_may_lie_in_any_order_in_memory():
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_no_rows_have_no_answers(kind):
-    output = compiled(LIVER, kind, Options()).evaluate(np.empty((0, 5)))
+    output = compiled(LIVER, kind, InferenceOptions()).evaluate(np.empty((0, 5)))
     assert output.value.shape == (0,)
 
 
@@ -405,23 +407,23 @@ def test_many_rows_are_inferred_as_few_are(kind):
 
 def test_exact_sampling_is_not_compiled():
     with pytest.raises(ValueError, match="exact"):
-        compiled(LIVER, "mamdani", Options(sampling="exact"))
+        compiled(LIVER, "mamdani", InferenceOptions(sampling="exact"))
 
 
 def test_a_kind_the_system_cannot_be_is_refused():
     with pytest.raises(ValueError, match="mamdany"):
-        compiled(LIVER, "mamdany", Options())
+        compiled(LIVER, "mamdany", InferenceOptions())
 
 
 @pytest.mark.parametrize("bad", [np.full((3, 4), 10.0), np.array([[10.0, np.nan, 9, 9, 9]])])
 def test_readings_that_make_no_sense_are_refused(bad):
     with pytest.raises(ValueError, match=r"shape \(3, 4\)|hbv = nan"):
-        compiled(LIVER, "mamdani", Options()).evaluate(bad)
+        compiled(LIVER, "mamdani", InferenceOptions()).evaluate(bad)
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_one_answers_as_infer_does(kind):
-    for options in (Options(), Options(reducer="nie-tan", sampling="octave")):
+    for options in (InferenceOptions(), InferenceOptions(reducer="nie-tan", sampling="octave")):
         model = compiled(LIVER, kind, options)
         inferred = infer(LIVER, INSIDE[:40], kind, options)
         ends = inferred.interval
@@ -436,7 +438,7 @@ def test_one_answers_as_infer_does(kind):
 
 
 def test_one_clamps_and_says_so():
-    model = compiled(LIVER, "mamdani", Options())
+    model = compiled(LIVER, "mamdani", InferenceOptions())
     outside, edge = (90.0, 10.0, 10.0, 10.0, 10.0), (75.0, 10.0, 10.0, 10.0, 10.0)
     assert model.one(outside) == model.one(edge)._replace(clamped=True)
     assert outside[0] == 90.0
@@ -445,8 +447,8 @@ def test_one_clamps_and_says_so():
 def test_one_refuses_or_takes_readings_outside_as_told():
     outside = np.array([90.0, 10.0, 10.0, 10.0, 10.0])
     with pytest.raises(ValueError, match="hcv: reading 90"):
-        compiled(LIVER, "mamdani", Options(out_of_range="raise")).one(outside)
-    answer = compiled(LIVER, "mamdani", Options(out_of_range="matlab")).one(outside)
+        compiled(LIVER, "mamdani", InferenceOptions(out_of_range="raise")).one(outside)
+    answer = compiled(LIVER, "mamdani", InferenceOptions(out_of_range="matlab")).one(outside)
     assert not answer.clamped
     assert not answer.silent
 
@@ -455,7 +457,7 @@ def test_one_refuses_or_takes_readings_outside_as_told():
 def test_one_refuses_what_is_no_reading(bad):
     for policy in ("clamp", "raise", "matlab"):
         with pytest.raises(ValueError, match="give"):
-            compiled(LIVER, "mamdani", Options(out_of_range=policy)).one(bad)
+            compiled(LIVER, "mamdani", InferenceOptions(out_of_range=policy)).one(bad)
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -463,11 +465,11 @@ def test_one_says_that_no_rule_fires(kind):
     system = falling()
     wide = replace(system, inputs=(replace(system.inputs[0], high=100.0),))
     with pytest.raises(ValueError, match="no rule fires"):
-        compiled(wide, kind, Options()).one((60.0,))
-    answer = compiled(wide, kind, Options(out_of_range="matlab")).one((60.0,))
+        compiled(wide, kind, InferenceOptions()).one((60.0,))
+    answer = compiled(wide, kind, InferenceOptions(out_of_range="matlab")).one((60.0,))
     assert answer.silent
     assert answer.value == 5.0
-    assert compiled(wide, kind, Options()).one((0.5,)).silent is False
+    assert compiled(wide, kind, InferenceOptions()).one((0.5,)).silent is False
 
 
 # scikit-fuzzy
@@ -480,7 +482,7 @@ def tipper():
         FuzzySet("delicious", "trapmf", (7.0, 9.0, 10.0, 12.0)),
     )
     tip = tuple(FuzzySet(f"t{a}", "trimf", (a, a + 5.0, a + 10.0)) for a in (0.0, 10.0, 20.0))
-    return System(
+    return FuzzySystem(
         (Variable("service", 0, 10, service), Variable("food", 0, 10, food)),
         Variable("tip", 0, 30, tip),
         (
@@ -509,13 +511,13 @@ def simulated(system, X, points):
 def test_scikit_fuzzy_approaches_the_exact_answer_as_its_grid_is_refined(operators):
     system = replace(tipper(), operators=operators)
     X = np.random.default_rng(1).uniform(0, 10, (25, 2))
-    exact = mamdani.evaluate(system, X, "exact", 0).value
+    exact = mamdani.evaluate(system, X, EXACT).value
     assert_second_order(*(np.abs(simulated(system, X, n) - exact).max() for n in (1001, 5001)))
 
 
 def test_scikit_fuzzy_agrees_on_the_liver():
     X = INSIDE[:25]
-    exact = mamdani.evaluate(LIVER, X, "exact", 0).value
+    exact = mamdani.evaluate(LIVER, X, EXACT).value
     assert_second_order(*(np.abs(simulated(LIVER, X, n) - exact).max() for n in (1001, 5001)))
 
 

@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import expit
 
-from fuzzy import exact
-from fuzzy.inference import Options, infer
-from fuzzy.sets import (
+from fuzzy.systems import exact
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.sets import (
     FORMS,
     TYPE_1,
     Footprint,
@@ -19,7 +20,7 @@ from fuzzy.sets import (
     membership,
     upper_membership,
 )
-from fuzzy.system import Operators, Rule, System, Term, Variable, memberships, union
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable, memberships, union
 
 
 def system_of(*sets, low=0.0, high=1.0, implication="min"):
@@ -27,7 +28,7 @@ def system_of(*sets, low=0.0, high=1.0, implication="min"):
     named = tuple(FuzzySet(f"set {k}", *one) for k, one in enumerate(sets))
     full = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
     rules = tuple(Rule((Term(0, 0),), k) for k in range(len(named)))
-    return System(
+    return FuzzySystem(
         (full,), Variable("y", low, high, named), rules, Operators("min", "max", implication)
     )
 
@@ -204,9 +205,9 @@ def test_a_set_that_does_not_fire_adds_nothing_to_the_support():
 def test_a_reading_that_the_lower_input_set_misses_answers_as_samples_do():
     uncertain = FuzzySet("a", "trimf", (0.2, 0.5, 0.8), Footprint(mean=0.1))
     output = Variable("y", 0, 100, (FuzzySet("o", "gaussmf", (3.0, 90.0)),))
-    system = System((Variable("x", 0, 1, (uncertain,)),), output, (Rule((Term(0, 0),), 0),))
+    system = FuzzySystem((Variable("x", 0, 1, (uncertain,)),), output, (Rule((Term(0, 0),), 0),))
     for sampling in ("matlab", "octave", "exact"):
-        found = infer(system, np.array([[0.28]]), "interval-type-2", Options(sampling))
+        found = infer(system, np.array([[0.28]]), "interval-type-2", InferenceOptions(sampling))
         assert found.interval[0] == pytest.approx([0, 100], rel=0, abs=1e-12)
 
 

@@ -8,23 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy.explain import Explanation, explain, shown_rules
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.explanation_text import explanation_lines
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.quadrature import sampled
-from fuzzy.sets import Footprint, FuzzySet
-from fuzzy.settings import Settings
-from fuzzy.stiffness import liver_row, patient_system
-from fuzzy.system import Rule, System, Term, Variable
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import liver_row, patient_system
+from fuzzy.systems.explain import Explanation, explain, shown_rules
+from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.explanation_text import explanation_lines
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import sampled
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 
 # Both sides are sums of some hundred products of numbers of order 10.
 ROUNDING = 1e-12
 OPTIONS = (
-    Options(),
-    Options(sampling="octave", samples=57),
-    Options(sampling="exact"),
-    Options(sugeno_aggregation="max", reducer="nie-tan"),
+    InferenceOptions(),
+    InferenceOptions(sampling="octave", samples=57),
+    InferenceOptions(sampling="exact"),
+    InferenceOptions(sugeno_aggregation="max", reducer="nie-tan"),
 )
 
 
@@ -45,17 +47,17 @@ RULES = (
     Rule((Term(0, 1, negated=True),), 0, weight=0.6),
     Rule((Term(1, 1),), 1),
 )
-SMALL = System((HOT, WET), OUT, RULES, name="small")
+SMALL = FuzzySystem((HOT, WET), OUT, RULES, name="small")
 POINTS = np.array([[3.0, 5.0], [8.0, 1.0], [5.0, 9.0], [0.0, 0.0]])
 
 
-def liver(**readings: float) -> tuple[System, np.ndarray]:
+def liver(**readings: float) -> tuple[FuzzySystem, np.ndarray]:
     pascal = {name: 1e3 * value for name, value in readings.items()}
-    return patient_system(pascal, Settings()), liver_row(pascal)[0]
+    return patient_system(pascal, LiverSettings()), liver_row(pascal)[0]
 
 
 @pytest.fixture(scope="module")
-def cases() -> list[tuple[Explanation, Options]]:
+def cases() -> list[tuple[Explanation, InferenceOptions]]:
     system, row = liver(hcv=9.5, nafld=12.0)
     pairs = [(SMALL, x) for x in POINTS] + [(system, row)]
     return [
@@ -84,7 +86,7 @@ def test_the_centroid_of_the_curve_is_mamdanis_answer(cases):
             np.testing.assert_array_equal(found.curve.lower, found.curve.upper)
 
 
-def switched(found: Explanation, options: Options, shift: int = 0) -> list[float]:
+def switched(found: Explanation, options: InferenceOptions, shift: int = 0) -> list[float]:
     """Centroids of the sets that switch where the explanation says, or `shift` samples later."""
     _, weights = sampled(found.system.output, options.samples, options.sampling)
     y, lower, upper = found.curve
@@ -111,13 +113,13 @@ def test_sets_that_switch_where_it_is_said_have_the_ends_as_centroids(cases):
 
 def test_a_switch_two_samples_off_has_another_centroid():
     found = explain(SMALL, POINTS[0], "interval-type-2")
-    wrong = switched(found, Options(), shift=2)
+    wrong = switched(found, InferenceOptions(), shift=2)
     assert wrong[0] > found.interval[0] + 1e-6
     assert wrong[1] < found.interval[1] - 1e-6
 
 
 def test_without_samples_the_bounds_switch_at_the_ends_themselves():
-    found = explain(SMALL, POINTS[0], "interval-type-2", Options(sampling="exact"))
+    found = explain(SMALL, POINTS[0], "interval-type-2", InferenceOptions(sampling="exact"))
     assert [s.before for s in found.switches] == list(found.interval)
     assert [s.samples for s in found.switches] == [None, None]
 
@@ -133,7 +135,7 @@ def test_constants_and_shares_add_up_to_sugenos_answer(cases):
         assert by_rules == pytest.approx(found.answer, rel=ROUNDING)
 
 
-def without(system: System, numbers: set[int]) -> System:
+def without(system: FuzzySystem, numbers: set[int]) -> FuzzySystem:
     kept = [rule for n, rule in enumerate(system.rules, start=1) if n not in numbers]
     return replace(system, rules=tuple(kept))
 
@@ -162,7 +164,7 @@ def test_equally_strong_rules_set_a_height_together_the_shortest_first():
 def test_a_repeated_rule_shares_the_weight_under_max_and_adds_to_it_under_sum():
     twice = replace(SMALL, rules=(*RULES, RULES[3]))
     x = POINTS[2]
-    merged = Options(sugeno_aggregation="max")
+    merged = InferenceOptions(sugeno_aggregation="max")
     assert explain(twice, x, "sugeno", merged).answer == pytest.approx(
         explain(SMALL, x, "sugeno", merged).answer, rel=ROUNDING
     )
@@ -199,19 +201,19 @@ def test_a_reading_outside_is_explained_where_inference_puts_it():
     clamped = explain(SMALL, x, "mamdani", unit="K")
     assert clamped.readings[0] == 10.0
     assert "12 K is outside 0-10 K; clamped" in clamped.notes[0]
-    as_it_is = explain(SMALL, x, "mamdani", Options(out_of_range="matlab"))
+    as_it_is = explain(SMALL, x, "mamdani", InferenceOptions(out_of_range="matlab"))
     assert as_it_is.readings[0] == 12.0
     for found in (clamped, as_it_is):
         mass = found.curve.upper
         assert mass @ found.curve.y / mass.sum() == pytest.approx(found.answer, rel=ROUNDING)
     with pytest.raises(ValueError, match="heat: reading 12 is outside"):
-        explain(SMALL, x, "mamdani", Options(out_of_range="raise"))
+        explain(SMALL, x, "mamdani", InferenceOptions(out_of_range="raise"))
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_silence_is_explained_as_no_rule_at_all(kind):
     silent = replace(SMALL, rules=(Rule((Term(1, 1),), 1),))
-    found = explain(silent, np.array([5.0, 0.0]), kind, Options(out_of_range="matlab"))
+    found = explain(silent, np.array([5.0, 0.0]), kind, InferenceOptions(out_of_range="matlab"))
     assert found.answer == 15.0
     assert found.rules == ()
     assert found.switches is None

@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy.conversion import sugeno_of, type_1_of
-from fuzzy.fis_file import FisError, fis_text, read_fis, write_fis
-from fuzzy.inference import Options, infer
-from fuzzy.json_file import JsonError, json_text, read_json, write_json
-from fuzzy.rule_base import read_rule_base, write_rule_base
-from fuzzy.sets import FORMS, Footprint, FuzzySet
-from fuzzy.system import Operators, Rule, System, Term, Variable
-from fuzzy.table import TableError, evaluate_table
+from fuzzy.systems.conversion import sugeno_of, type_1_of
+from fuzzy.systems.files import read_rule_base, write_rule_base
+from fuzzy.systems.fis_file import FisError, fis_text, read_fis, write_fis
+from fuzzy.systems.inference import infer
+from fuzzy.systems.json_file import JsonError, json_text, read_json, write_json
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.sets import FORMS, Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
+from fuzzy.systems.table import TableError, evaluate_table
 
 TIPPER = """\
 [System]
@@ -145,7 +146,7 @@ def systems(draw, footprint=False, repeated_inputs=False):
         st.sampled_from(("min", "prod")),
     )
     rules = tuple(draw(st.lists(rule, min_size=1, max_size=6)))
-    return System(inputs, output, rules, draw(operators), draw(NAMES))
+    return FuzzySystem(inputs, output, rules, draw(operators), draw(NAMES))
 
 
 @given(systems())
@@ -290,7 +291,12 @@ REFUSALS = {
     "a missing range": ("Range=[0 30]\n", "", 29, "no Range; add it"),
     "a section twice": ("[Input2]", "[Input1]", 22, r"a second \[Input1\]"),
     "an unknown section": ("[Input2]", "[Inputs]", 22, r"\[Inputs\] is no section"),
-    "text before all sections": ("[System]", "x\n[System]", 1, r"start the file with \[System\]"),
+    "text before all sections": (
+        "[System]",
+        "x\n[System]",
+        1,
+        r"start the file with \[System\]",
+    ),
     "a quote too few": ("'tipper'", "'tipper", 2, "between one pair of single quotes"),
     "a range of one number": ("Range=[0 30]", "Range=[0]", 31, r"give two numbers, \[low high\]"),
     "a range without brackets": ("Range=[0 30]", "Range=0 30", 31, r"one pair of \[ \]"),
@@ -426,9 +432,9 @@ def test_defaults_may_be_written_or_left_out(read_document, document, tipper):
 
 
 def test_the_example_of_the_documentation_is_a_system(read_document):
-    import fuzzy.json_file
+    import fuzzy.systems.json_file
 
-    example = re.search(r"\n    \{\n.*?\n    \}\n", fuzzy.json_file.__doc__, re.DOTALL)[0]
+    example = re.search(r"\n    \{\n.*?\n    \}\n", fuzzy.systems.json_file.__doc__, re.DOTALL)[0]
     example = re.sub(r" +#.*", "", example)
     low, high = ({"name": n, "kind": "trimf", "parameters": [0, 0, 1]} for n in ("low", "high"))
     example = example.replace("[...]", json.dumps([low, high]))
@@ -641,7 +647,7 @@ def test_notes_and_refusals_of_inference_name_lines(table, tipper):
     notes, _ = table(tipper, text)
     assert notes == ("service: reading 12 (line 5 and 1 more) is outside 0-10; clamped to it",)
     with pytest.raises(TableError, match=r"in\.csv: service: reading 12 \(line 5 and 1 more\)"):
-        table(tipper, text, options=Options(out_of_range="raise"))
+        table(tipper, text, options=InferenceOptions(out_of_range="raise"))
     silent = replace(tipper, rules=tipper.rules[1:2])
     far = replace(
         tipper.inputs[0], sets=(tipper.inputs[0].sets[0], FuzzySet("good", "trimf", (4, 5, 6)))

@@ -6,15 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.conversion import sugeno_of, type_1_of
-from fuzzy.fis_file import read_fis
-from fuzzy.inference import Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.settings import Settings
-from fuzzy.system import Operators
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.conversion import sugeno_of, type_1_of
+from fuzzy.systems.fis_file import read_fis
+from fuzzy.systems.inference import infer
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.system import Operators
 
 FOLDER = Path(__file__).parent / "data" / "octave"
-OCTAVE = Options(sampling="octave")
+OCTAVE = InferenceOptions(sampling="octave")
 
 # Relative to the output's universe: both sides do the same sums in another order.
 TOLERANCE = 1e-13
@@ -57,12 +58,12 @@ def test_a_mamdani_system_evaluated_as_sugeno_answers_as_octave_does_to_its_cons
     liver = read_fis(FOLDER / "liver.fis")
     X, octave = golden("liver_sugeno", liver)
     # The file's constants are MATLAB's, sums of 101 samples.
-    assert difference(liver, X, "sugeno", Options(), octave["sum"]) < TOLERANCE
+    assert difference(liver, X, "sugeno", InferenceOptions(), octave["sum"]) < TOLERANCE
 
 
 # Each of these is a slip that the comparison must not let pass.
 SLIPS = {
-    "sums instead of trapezoids": lambda s: (s, Options(sampling="matlab")),
+    "sums instead of trapezoids": lambda s: (s, InferenceOptions(sampling="matlab")),
     "one sample more": lambda s: (s, replace(OCTAVE, samples=102)),
     "min instead of product": lambda s: (operated(s, conjunction="min"), OCTAVE),
     "max instead of probabilistic or": lambda s: (operated(s, disjunction="max"), OCTAVE),
@@ -128,6 +129,6 @@ REGENERATE = (
 
 
 def test_the_committed_files_are_the_liver_system_of_today():
-    liver = type_1_of(liver_system(Settings()))
+    liver = type_1_of(liver_system(LiverSettings()))
     assert read_fis(FOLDER / "liver.fis") == liver, REGENERATE
     assert read_fis(FOLDER / "liver_sugeno.fis") == sugeno_of(liver), REGENERATE

@@ -5,11 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fuzzy.compiled import compiled
-from fuzzy.inference import COMPILED_FROM_ROWS, LEAST_STRENGTH, SYSTEMS, Options, infer
-from fuzzy.sets import FuzzySet
-from fuzzy.system import Rule, System, Term, Variable
-from fuzzy.table import evaluate_table
+from fuzzy.systems.compiled import compiled
+from fuzzy.systems.inference import COMPILED_FROM_ROWS, infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.policy import LEAST_STRENGTH
+from fuzzy.systems.sets import FuzzySet
+from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
+from fuzzy.systems.table import evaluate_table
 
 MIDDLE = 15.0
 
@@ -18,7 +21,7 @@ def narrow():
     """One set about 5 on a universe to 100, so that most of it is silent."""
     x = Variable("hcv", 0, 100, (FuzzySet("mild", "gaussmf", (1.0, 5.0)),))
     y = Variable("tip", 0, 30, (FuzzySet("low", "trimf", (0.0, 5.0, 10.0)),))
-    return System((x,), y, (Rule((Term(0, 0),), 0),))
+    return FuzzySystem((x,), y, (Rule((Term(0, 0),), 0),))
 
 
 def ramp():
@@ -27,11 +30,15 @@ def ramp():
         "hcv", 0, 10, (FuzzySet("a", "gaussmf", (4.0, 0.0)), FuzzySet("b", "gaussmf", (4.0, 10.0)))
     )
     sets = FuzzySet("low", "trimf", (0.0, 5.0, 10.0)), FuzzySet("high", "trimf", (10.0, 15.0, 30.0))
-    return System((x,), Variable("tip", 0, 30, sets), tuple(Rule((Term(0, k),), k) for k in (0, 1)))
+    return FuzzySystem(
+        (x,), Variable("tip", 0, 30, sets), tuple(Rule((Term(0, k),), k) for k in (0, 1))
+    )
 
 
 def answer(system, x, kind, **options):
-    return infer(system, np.array([[float(v)] for v in x]), kind, Options(**options), "kPa")
+    return infer(
+        system, np.array([[float(v)] for v in x]), kind, InferenceOptions(**options), "kPa"
+    )
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -108,13 +115,13 @@ class TestPolicies:
 )
 def test_an_option_that_is_none_is_refused_by_name(key, value):
     with pytest.raises(ValueError, match=f"^{key} = "):
-        Options(**{key: value})
+        InferenceOptions(**{key: value})
 
 
 def test_a_sugeno_system_cannot_be_evaluated_as_mamdani():
     x = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
     y = Variable("y", 0, 1, (FuzzySet("one", "constant", (1.0,)),))
-    system = System((x,), y, (Rule((Term(0, 0),), 0),))
+    system = FuzzySystem((x,), y, (Rule((Term(0, 0),), 0),))
     for kind in ("mamdani", "interval-type-2"):
         with pytest.raises(ValueError, match="only be evaluated as sugeno"):
             infer(system, [[0.5]], kind)
@@ -137,7 +144,7 @@ def beside(*outputs):
         for i, (low, high) in enumerate(pairwise(ends))
     )
     rules = tuple(Rule((Term(0, k),), k) for k in range(len(outputs)))
-    return System((Variable("x", 0, 1, inputs),), Variable("y", 0, 1, outputs), rules)
+    return FuzzySystem((Variable("x", 0, 1, inputs),), Variable("y", 0, 1, outputs), rules)
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -154,7 +161,7 @@ class TestWithoutMass:
             answer(beside(WIDE, thin), x, kind, out_of_range=policy)
 
     def test_so_is_that_of_a_single_row_compiled(self, kind, policy, thin):
-        model = compiled(beside(WIDE, thin), kind, Options(out_of_range=policy))
+        model = compiled(beside(WIDE, thin), kind, InferenceOptions(out_of_range=policy))
         with pytest.raises(ValueError, match=self.WHAT):
             model.one([0.75])
         assert model.one([0.25]).value == pytest.approx(0.5, abs=1e-12)
@@ -177,12 +184,12 @@ def planes(*coefficients):
     sets = (FuzzySet(f"p{k}", "linear", (factor, 1.0)) for k, factor in enumerate(coefficients))
     x = FuzzySet("rising", "sigmf", (10.0, 0.5)), FuzzySet("falling", "sigmf", (-10.0, 0.5))
     rules = tuple(Rule((Term(0, k),), k) for k in range(len(coefficients)))
-    return System((Variable("x", 0, 1, x),), Variable("y", 0, 1, tuple(sets)), rules)
+    return FuzzySystem((Variable("x", 0, 1, x),), Variable("y", 0, 1, tuple(sets)), rules)
 
 
 @pytest.mark.parametrize("count", [1, COMPILED_FROM_ROWS])
 def test_an_answer_that_overflows_is_refused(count):
-    options = Options(out_of_range="matlab")
+    options = InferenceOptions(out_of_range="matlab")
     for coefficients in ((10.0,), (10.0, 1.0), (-10.0,)):
         with pytest.raises(ValueError, match=r"no finite answer for x = 1e\+308 .* overflow"):
             infer(planes(*coefficients), np.full((count, 1), 1e308), "sugeno", options)
@@ -219,7 +226,7 @@ def test_an_answer_by_rules_that_hardly_fire_is_said_to_be_that(kind, fillers):
     assert found.value[[-3, -1]].tolist() == [MIDDLE, MIDDLE]
     # Clipped at next to nothing, the triangle on [0, 10] is a box, whose centroid is still 5.
     assert found.value[[0, -2]] == pytest.approx(5.0, abs=1e-9)
-    model = compiled(narrow(), kind, Options(out_of_range="matlab", samples=151))
+    model = compiled(narrow(), kind, InferenceOptions(out_of_range="matlab", samples=151))
     for row in (0, -1):
         single = model.one([x[row]])
         assert single.silent
@@ -235,10 +242,14 @@ def test_the_refusal_of_silence_counts_the_silent_rows(kind):
 @pytest.mark.parametrize("name", ["x (row 9)", "x (row 9 of 9)", "(row 1", "row", ""])
 def test_a_table_takes_no_name_for_the_number_of_a_row(tmp_path, name):
     system = narrow()
-    system = System((Variable(name, 0, 100, system.inputs[0].sets),), system.output, system.rules)
+    system = FuzzySystem(
+        (Variable(name, 0, 100, system.inputs[0].sets),), system.output, system.rules
+    )
     table, out = tmp_path / "in.csv", tmp_path / "out.csv"
     table.write_text(f"{name},other\n5,1\n700,2\n")
-    outside, silent = evaluate_table(system, table, out, "mamdani", Options(out_of_range="matlab"))
+    outside, silent = evaluate_table(
+        system, table, out, "mamdani", InferenceOptions(out_of_range="matlab")
+    )
     assert outside.startswith(f"{name}: reading 700 (")
     assert silent.startswith(f"no rule fires for {name} = 700 (")
     if name != "(row 1":  # which is found in the number of the row, too
@@ -292,13 +303,13 @@ def test_exact_sampling_does_not_claim_an_iteration_it_does_not_run():
 def test_a_rule_out_of_the_system_is_refused(rule):
     system = narrow()
     with pytest.raises(ValueError, match=r"rule 2: .*does not have"):
-        System(system.inputs, system.output, (system.rules[0], rule))
+        FuzzySystem(system.inputs, system.output, (system.rules[0], rule))
 
 
 def test_incomplete_systems_are_refused():
     system = narrow()
     with pytest.raises(ValueError, match="no rules"):
-        System(system.inputs, system.output, ())
+        FuzzySystem(system.inputs, system.output, ())
     with pytest.raises(ValueError, match="no set"):
         Variable("x", 0, 1, ())
     with pytest.raises(ValueError, match="must be below"):
@@ -306,17 +317,17 @@ def test_incomplete_systems_are_refused():
     with pytest.raises(ValueError, match="share a name"):
         Variable("x", 0, 1, system.output.sets * 2)
     with pytest.raises(ValueError, match="name of its own"):
-        System(system.inputs * 2, system.output, system.rules)
+        FuzzySystem(system.inputs * 2, system.output, system.rules)
 
 
 def test_constants_belong_to_outputs_only_and_all_of_them():
     one = FuzzySet("one", "constant", (1.0,))
     system = narrow()
     with pytest.raises(ValueError, match=r"input 'x': set 'one' is constant"):
-        System((Variable("x", 0, 1, (one,)),), system.output, system.rules)
+        FuzzySystem((Variable("x", 0, 1, (one,)),), system.output, system.rules)
     mixed = Variable("y", 0, 1, (one, *system.output.sets))
     with pytest.raises(ValueError, match="mixes membership functions with constants"):
-        System(system.inputs, mixed, system.rules)
+        FuzzySystem(system.inputs, mixed, system.rules)
     plane = Variable("y", 0, 1, (FuzzySet("p", "linear", (1.0, 2.0, 3.0)),))
     with pytest.raises(ValueError, match="linear takes 2 parameters"):
-        System(system.inputs, plane, system.rules)
+        FuzzySystem(system.inputs, plane, system.rules)

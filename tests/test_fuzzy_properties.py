@@ -7,15 +7,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.liver import liver_system
-from fuzzy.quadrature import centroid, sampled
-from fuzzy.sets import FORMS, Footprint, FuzzySet, lower_membership, membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.system import (
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import centroid, sampled
+from fuzzy.systems.sets import (
+    FORMS,
+    Footprint,
+    FuzzySet,
+    lower_membership,
+    membership,
+    upper_membership,
+)
+from fuzzy.systems.system import (
+    FuzzySystem,
     Operators,
     Rule,
-    System,
     Term,
     Variable,
     firing_strengths,
@@ -26,8 +35,8 @@ from fuzzy.system import (
 READING = st.floats(2, 75)
 ROW = st.lists(READING, min_size=5, max_size=5).map(lambda row: np.array([row]))
 quick = settings(max_examples=50, deadline=None, derandomize=True)
-LIVER = liver_system(Settings())
-TYPE_1 = liver_system(Settings(footprint_factor=0.0))
+LIVER = liver_system(LiverSettings())
+TYPE_1 = liver_system(LiverSettings(footprint_factor=0.0))
 
 
 def interval(system, row):
@@ -38,7 +47,7 @@ def interval(system, row):
 @given(ROW, st.integers(0, 20), st.integers(1, 20))
 def test_interval_grows_with_the_footprint(row, tenths, more):
     narrow, wide = (
-        interval(liver_system(Settings(footprint_factor=n / 20)), row)
+        interval(liver_system(LiverSettings(footprint_factor=n / 20)), row)
         for n in (tenths, tenths + more)
     )
     assert wide[0] <= narrow[0] + 1e-10
@@ -55,7 +64,7 @@ def test_zero_footprint_is_mamdani_on_the_liver(row):
 
 def every_answer(system, row):
     one_by_one = [infer(system, row, kind).value[0] for kind in SYSTEMS]
-    merged = infer(system, row, "sugeno", Options(sugeno_aggregation="max")).value[0]
+    merged = infer(system, row, "sugeno", InferenceOptions(sugeno_aggregation="max")).value[0]
     return [*one_by_one, merged, *interval(system, row)]
 
 
@@ -70,16 +79,16 @@ def test_rule_order_changes_nothing(row, order):
 @quick
 @given(ROW)
 def test_repeated_rules_change_the_sugeno_sum_only(row):
-    dropped = liver_system(Settings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
     kept, once = every_answer(LIVER, row), every_answer(dropped, row)
-    at_sum = SYSTEMS.index("sugeno")
+    at_sum = list(SYSTEMS).index("sugeno")
     assert kept[:at_sum] == once[:at_sum]
     assert kept[at_sum + 1 :] == once[at_sum + 1 :]
 
 
 def test_a_repeated_rule_does_change_the_sugeno_sum():
     row = np.array([[9.5, 4.1, 4.1, 4.1, 4.1]])
-    dropped = liver_system(Settings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
     kept, once = (infer(system, row, "sugeno").value[0] for system in (LIVER, dropped))
     assert abs(kept - once) > 1e-3
 
@@ -164,6 +173,6 @@ def test_a_mirrored_system_gives_the_middle(kind):
     y = FuzzySet("low", "gaussmf", (5.0, 20.0)), FuzzySet("high", "gaussmf", (5.0, 55.0))
     x = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
     rules = tuple(Rule((Term(0, 0),), k) for k in (0, 1))
-    mirrored = System((x,), Variable("y", 0, 75, y), rules)
+    mirrored = FuzzySystem((x,), Variable("y", 0, 75, y), rules)
     # The sets are cut 4 sd from the ends of the universe, alike on both sides.
     assert infer(mirrored, [[0.5]], kind).value[0] == pytest.approx(37.5, abs=1e-12)

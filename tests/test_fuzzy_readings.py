@@ -5,22 +5,22 @@ from math import prod
 
 import pytest
 
-from fuzzy.assumptions import assumptions
-from fuzzy.inference import Options
-from fuzzy.knowledge import SEVERITIES
-from fuzzy.liver import liver_system
-from fuzzy.readings import (
+from fuzzy.liver.assumptions import assumptions
+from fuzzy.liver.knowledge import SEVERITIES
+from fuzzy.liver.readings import (
     MISSING_TRIPLE,
     READINGS,
     UNSUPPORTED,
-    Reading,
+    TableReading,
     disease_sets,
     reading_named,
     rule_count,
 )
-from fuzzy.rules import governing
-from fuzzy.settings import Settings
-from fuzzy.table1 import AETIOLOGIES, cells, is_odd
+from fuzzy.liver.rules import CONSEQUENTS
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES, cells, is_odd
+from fuzzy.systems.options import InferenceOptions
 
 # Most sets that the data describe: F1 to F4 of HCV and HBV, F2 to F4 of the others.
 MOST_SETS = (4, 4, 3, 3, 3)
@@ -51,12 +51,12 @@ def test_one_triple_stands_twice_and_one_is_missing():
 @pytest.mark.parametrize("name", READINGS)
 def test_reading_gives_247_rules(name):
     expected = 235 if name == "R1-no-duplicates" else 247
-    assert len(liver_system(Settings(reading=name)).rules) == expected
+    assert len(liver_system(LiverSettings(reading=name)).rules) == expected
     assert rule_count(READINGS[name]) == expected
 
 
 def test_r1_by_number_of_terms():
-    sizes = [len(rule.antecedents) for rule in liver_system(Settings()).rules]
+    sizes = [len(rule.antecedents) for rule in liver_system(LiverSettings()).rules]
     assert [sizes.count(size) for size in (1, 2, 3, 4)] == [11, 48, 116, 72]
 
 
@@ -73,7 +73,7 @@ def reaching_247(readings, counts):
 
 def every_reading(sizes):
     return [
-        Reading((2, 2, 2, 2, 2), size, diagonal, odd, duplicates)
+        TableReading((2, 2, 2, 2, 2), size, diagonal, odd, duplicates)
         for size in sizes
         for diagonal in ("single", "square")
         for odd in ("missing-triple", "literal", "pair", "drop")
@@ -92,7 +92,8 @@ def test_22_readings_within_the_data_reach_247_so_the_count_singles_out_none():
 def test_r1_is_the_only_fit_of_its_kind_but_the_literal_one_has_two():
     def fits(odd):
         return {
-            counts for _, counts in reaching_247([Reading((2,) * 5, odd_cell=odd)], WITHIN_DATA)
+            counts
+            for _, counts in reaching_247([TableReading((2,) * 5, odd_cell=odd)], WITHIN_DATA)
         }
 
     assert fits("missing-triple") == {(2, 3, 2, 2, 2)}
@@ -125,7 +126,7 @@ def test_unsupported_reading_is_refused_with_its_reason(name):
 
 
 def terms_of_nafld(reading):
-    rules = liver_system(Settings(reading=reading)).rules
+    rules = liver_system(LiverSettings(reading=reading)).rules
     nafld = AETIOLOGIES.index("nafld")
     return [sum(term.input == nafld for term in rule.antecedents) for rule in rules]
 
@@ -136,21 +137,21 @@ def test_literal_cell_asks_for_two_nafld_terms():
 
 
 def test_squared_diagonal_has_no_single_terms():
-    sizes = [len(rule.antecedents) for rule in liver_system(Settings(reading="R2")).rules]
+    sizes = [len(rule.antecedents) for rule in liver_system(LiverSettings(reading="R2")).rules]
     assert 1 not in sizes
-    assert 1 in [len(rule.antecedents) for rule in liver_system(Settings()).rules]
+    assert 1 in [len(rule.antecedents) for rule in liver_system(LiverSettings()).rules]
 
 
 def test_dropping_duplicates_drops_one_copy_of_the_repeated_rules():
-    once = liver_system(Settings(reading="R1-no-duplicates")).rules
-    twice = liver_system(Settings()).rules
+    once = liver_system(LiverSettings(reading="R1-no-duplicates")).rules
+    twice = liver_system(LiverSettings()).rules
     assert len(set(once)) == len(once) == 235
     assert set(once) == set(twice)
 
 
 @pytest.mark.parametrize("reading", ["R1", "R2", "R5-hcv4"])
 def test_severest_term_governs_every_rule(reading):
-    system = liver_system(Settings(reading=reading))
+    system = liver_system(LiverSettings(reading=reading))
     severity = {"F1": 0, "F2": 0, "F3": 1, "F4": 2}
     for rule in system.rules:
         stages = [system.inputs[i].sets[s].name for i, s, _ in rule.antecedents]
@@ -163,16 +164,16 @@ def test_severest_term_governs_every_rule(reading):
     [([0], 0, 0), ([0, 2], 2, 1), ([0, 0, 1], 1, 1), ([0, 0, 0, 2], 2, 1), ([2, 2, 1], 2, 2)],
 )
 def test_governing_severity(severities, severest, mean):
-    assert governing(severities, "max") == severest
-    assert governing(severities, "mean") == mean
+    assert CONSEQUENTS["max"].governing(severities) == severest
+    assert CONSEQUENTS["mean"].governing(severities) == mean
 
 
 # --- aetiologies without a reading -----------------------------------------------------------
 
 
 def test_rules_that_name_an_absent_aetiology_are_left_out():
-    full = liver_system(Settings())
-    part = liver_system(Settings(), ("hcv", "ald"))
+    full = liver_system(LiverSettings())
+    part = liver_system(LiverSettings(), ("hcv", "ald"))
     present = {AETIOLOGIES.index("hcv"), AETIOLOGIES.index("ald")}
     kept = [r for r in full.rules if {term.input for term in r.antecedents} <= present]
     assert list(part.rules) == kept
@@ -190,7 +191,7 @@ def test_rules_that_name_an_absent_aetiology_are_left_out():
 )
 def test_nothing_left_or_unknown_is_refused(reading, present, message):
     with pytest.raises(ValueError, match=message):
-        liver_system(Settings(reading=reading), present)
+        liver_system(LiverSettings(reading=reading), present)
 
 
 # --- settings --------------------------------------------------------------------------------
@@ -210,20 +211,20 @@ def test_nothing_left_or_unknown_is_refused(reading, present, message):
 )
 def test_settings_name_key_value_and_remedy(key, value, message):
     with pytest.raises(ValueError, match=message):
-        Settings(**{key: value})
+        LiverSettings(**{key: value})
 
 
 @pytest.mark.parametrize("name", ["R5-hbv4", "R5-hcv4", "R5-pair"])
 def test_four_sets_need_stage_means(name):
     with pytest.raises(ValueError, match=rf"reading = '{name}': h.v with 4 sets: no cut-off"):
-        Settings(reading=name, placement="cut-off")
+        LiverSettings(reading=name, placement="cut-off")
 
 
 # --- what is said of them --------------------------------------------------------------------
 
 
 def said(**settings):
-    return " ".join(assumptions(Settings(**settings)))
+    return " ".join(assumptions(LiverSettings(**settings)))
 
 
 @pytest.mark.parametrize(
@@ -242,9 +243,9 @@ def said(**settings):
         ({"footprint": "uncertain-spread"}, "the width of every set's flanks"),
         ({"footprint": "scaled"}, "every lower membership"),
         ({"absent": "silent"}, "takes every rule that names it out"),
-        ({"options": Options(out_of_range="raise")}, "readings beyond are refused"),
-        ({"options": Options(samples=501)}, "centroid by sums over 501 points"),
-        ({"options": Options(reducer="nie-tan")}, "Nie-Tan centroid"),
+        ({"options": InferenceOptions(out_of_range="raise")}, "readings beyond are refused"),
+        ({"options": InferenceOptions(samples=501)}, "centroid by sums over 501 points"),
+        ({"options": InferenceOptions(reducer="nie-tan")}, "Nie-Tan centroid"),
     ],
 )
 def test_assumptions_follow_the_settings(settings, sentence):
@@ -261,7 +262,7 @@ def test_assumptions_of_the_default_settings():
 
 @pytest.mark.parametrize("reading", READINGS)
 def test_every_assumption_is_a_sentence(reading):
-    for sentence in assumptions(Settings(reading=reading)):
+    for sentence in assumptions(LiverSettings(reading=reading)):
         assert sentence[0].isupper()
         assert sentence.endswith(".")
         assert "  " not in sentence

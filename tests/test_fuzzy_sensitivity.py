@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy.inference import SYSTEMS, Options
-from fuzzy.sensitivity import (
+from fuzzy.liver.sensitivity import (
     AXES,
     EXACT_ROWS,
     LARGEST_READING,
@@ -20,8 +19,11 @@ from fuzzy.sensitivity import (
     sensitivity,
     spread_readings,
 )
-from fuzzy.settings import Settings
-from fuzzy.stiffness import AETIOLOGIES, NORMAL_LIVER, estimate, evaluate
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import NORMAL_LIVER, estimate, evaluate
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 
 READINGS = {"hcv": 9.5e3, "nafld": 12e3}
 TYPE_2 = "interval-type-2"
@@ -32,7 +34,7 @@ INDEPENDENT_SD = 5.3
 @pytest.fixture(scope="module")
 def timed() -> tuple[Screening, float]:
     start = time.process_time()
-    return sensitivity(READINGS, Settings()), time.process_time() - start
+    return sensitivity(READINGS, LiverSettings()), time.process_time() - start
 
 
 @pytest.fixture(scope="module")
@@ -64,20 +66,22 @@ def test_it_takes_less_than_six_seconds(timed):
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_change_at_the_readings_is_that_of_two_estimates(found, system):
     for choice, other in (
-        ("reading", Settings(reading="R4-pair")),
-        ("consequent", Settings(consequent="mean")),
-        ("absent", Settings(absent="silent")),
-        ("samples", Settings(options=Options(samples=1001))),
+        ("reading", LiverSettings(reading="R4-pair")),
+        ("consequent", LiverSettings(consequent="mean")),
+        ("absent", LiverSettings(absent="silent")),
+        ("samples", LiverSettings(options=InferenceOptions(samples=1001))),
     ):
         value = getattr(other, choice, other.options.samples)
         row = pick(found, choice, str(value), system)
-        before, after = (estimate(READINGS, system, s).estimate for s in (Settings(), other))
+        before, after = (estimate(READINGS, system, s).estimate for s in (LiverSettings(), other))
         assert row.at_readings == pytest.approx(after - before, abs=1e-7)  # of 1e4 Pa
 
 
 def test_rms_and_largest_are_taken_over_the_spread_readings(found):
     X = spread_readings(256)
-    before, after = (evaluate(X, "sugeno", s)[0] for s in (Settings(), Settings(consequent="mean")))
+    before, after = (
+        evaluate(X, "sugeno", s)[0] for s in (LiverSettings(), LiverSettings(consequent="mean"))
+    )
     row = pick(found, "consequent", "mean", "sugeno")
     assert row.rows == 256
     assert row.rms == pytest.approx(np.linalg.norm(after - before) / 16.0)
@@ -115,14 +119,14 @@ def test_a_larger_footprint_widens_the_interval(found):
 def test_what_happens_to_absent_aetiologies_is_tried_on_such_patients(found):
     X = spread_readings(256, READINGS)
     assert (X[:, AETIOLOGIES.index("hbv")] == NORMAL_LIVER).all()
-    silent = evaluate(X, "mamdani", Settings(absent="silent"), tuple(READINGS))[0]
+    silent = evaluate(X, "mamdani", LiverSettings(absent="silent"), tuple(READINGS))[0]
     row = pick(found, "absent", "silent", "mamdani")
     assert row.largest == np.abs(silent - evaluate(X, "mamdani")[0]).max()
 
 
 @pytest.mark.parametrize("readings", [{}, dict.fromkeys(AETIOLOGIES, 9e3)])
 def test_alternatives_that_cannot_be_had_are_left_out_with_a_reason(readings):
-    screening = sensitivity(readings, Settings(placement="cut-off"), rows=8)
+    screening = sensitivity(readings, LiverSettings(placement="cut-off"), rows=8)
     kept = {row.alternative for row in screening.rows}
     assert "R5-hbv4" not in kept
     reason = next(text for text in screening.left_out if "R5-hbv4" in text)
@@ -131,7 +135,7 @@ def test_alternatives_that_cannot_be_had_are_left_out_with_a_reason(readings):
 
 
 def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
-    base = Settings(options=Options(sampling="exact"))
+    base = LiverSettings(options=InferenceOptions(sampling="exact"))
     found = sensitivity(READINGS, base, rows=32)
     assert "samples" not in {row.choice for row in found.rows}
     assert {row.rows for row in found.rows if row.choice == "sampling"} == {EXACT_ROWS}
@@ -141,7 +145,7 @@ def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
         before, after = (estimate(READINGS, system, s).estimate for s in (base, other))
         assert row.rows == 32
         assert row.at_readings == pytest.approx(after - before, abs=0.4)  # the stand-in, twice
-        coarse = estimate(READINGS, system, Settings()).estimate
+        coarse = estimate(READINGS, system, LiverSettings()).estimate
         assert abs(coarse - before) > 4.0  # as 101 points would not be
 
 
@@ -150,7 +154,7 @@ def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
 )
 def test_faulty_readings_are_refused_and_not_taken_for_faulty_alternatives(readings, message):
     with pytest.raises(ValueError, match=message):
-        sensitivity(readings, Settings(), rows=8)
+        sensitivity(readings, LiverSettings(), rows=8)
 
 
 def test_spread_readings_are_log_uniform_and_even():
@@ -174,7 +178,7 @@ def test_random_numbers_would_not_be_found_even(rng):
 
 
 def test_more_readings_give_nearly_the_same_rms():
-    base, other = Settings(), Settings(consequent="mean")
+    base, other = LiverSettings(), LiverSettings(consequent="mean")
     rms = []
     for X in (spread_readings(256), spread_readings(500)[256:]):
         change = evaluate(X, "sugeno", other)[0] - evaluate(X, "sugeno", base)[0]

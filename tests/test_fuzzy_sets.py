@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 import skfuzzy
 
-from fuzzy.sets import FORMS, Footprint, FuzzySet, lower_membership, membership, upper_membership
+from fuzzy.systems.sets import (
+    FORMS,
+    Footprint,
+    FuzzySet,
+    lower_membership,
+    membership,
+    upper_membership,
+)
 
 OCTAVE = Path(__file__).parent / "data" / "octave" / "functions.csv"
 

@@ -10,22 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy.assumptions import assumptions
-from fuzzy.inference import infer
-from fuzzy.knowledge import rows
-from fuzzy.liver import liver_system
-from fuzzy.stiffness import (
-    AETIOLOGIES,
+from fuzzy.liver.assumptions import assumptions
+from fuzzy.liver.knowledge import rows
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import (
     NORMAL_LIVER,
-    SYSTEMS,
-    Options,
-    Settings,
     estimate,
     evaluate,
     membership_curves,
     rule_count,
     surface,
 )
+from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
 
 HCV = {"hcv": 9.5e3}
 
@@ -178,7 +178,7 @@ def test_rows_are_estimated_one_by_one(system):
 
 
 def with_options(**options):
-    return Settings(options=Options(**options))
+    return LiverSettings(options=InferenceOptions(**options))
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
@@ -207,7 +207,7 @@ def test_severest_readings_are_remembered_at_the_end_of_the_scale(system):
 
 
 def test_plain_gaussians_would_forget_the_answer():
-    liver = liver_system(Settings())
+    liver = liver_system(LiverSettings())
     inputs = tuple(replace(v, sets=tuple(map(plain_gaussian, v.sets))) for v in liver.inputs)
     forgetful = replace(liver, inputs=inputs)
     at_75 = infer(forgetful, np.full((1, 5), 75.0), "mamdani").value[0]
@@ -237,7 +237,7 @@ def test_a_severe_reading_gives_a_stiffer_liver_than_a_mild_one(system):
 
 
 def test_zero_footprint_makes_type2_mamdani():
-    flat = estimate(HCV, "interval-type-2", Settings(footprint_factor=0.0))
+    flat = estimate(HCV, "interval-type-2", LiverSettings(footprint_factor=0.0))
     expected = estimate(HCV, "mamdani").estimate
     assert [flat.estimate, *flat.interval] == pytest.approx([expected] * 3, rel=1e-12)
 
@@ -284,7 +284,7 @@ def test_reading_off_the_scale_is_clamped_and_noted(reading, clamped):
 
 
 def test_silent_aetiologies_leave_their_rules_out():
-    silent = Settings(absent="silent")
+    silent = LiverSettings(absent="silent")
     found = estimate({"hcv": 20e3}, "mamdani", silent)
     assert found.notes[0] == "hbv: no reading; the rules that name it left out"
     # HCV's F4 fires in full beside a vestige of F2, so the answer is the severe set's own centroid.
@@ -356,7 +356,7 @@ def test_stated_limit_a_healthy_liver_is_estimated_far_too_stiff(system):
 
 def test_import_is_light():
     code = (
-        "import sys, fuzzy.stiffness as s; s.estimate({'hcv': 9.5e3}, 'interval-type-2');"
+        "import sys, fuzzy.liver.stiffness as s; s.estimate({'hcv': 9.5e3}, 'interval-type-2');"
         "print(sorted({'scipy', 'skfuzzy', 'numba', 'pandas', 'matplotlib'} & set(sys.modules)))"
     )
     root = Path(__file__).parents[1]

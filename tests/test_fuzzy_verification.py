@@ -10,12 +10,14 @@ import skfuzzy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy import exact, sugeno
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.interval_type2 import eiasc, karnik_mendel
-from fuzzy.quadrature import Quadrature, centroid, sampled
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, membership, upper_membership
-from fuzzy.system import Operators, Rule, System, Term, Variable, memberships
+from fuzzy.systems import exact, sugeno
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import Quadrature, centroid, sampled
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, membership, upper_membership
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable, memberships
+from fuzzy.systems.type_reduction import eiasc, karnik_mendel
 
 GRID = np.linspace(0, 10, 101)
 SUMS = Quadrature(GRID, np.ones(101))
@@ -46,21 +48,21 @@ def tipper(*, connective="or", sd=1.5):
         rule([(0, 1)], 1),
         rule([(0, 2), (1, 1)], 2, connective),
     )
-    return System((service, food), tip, rules)
+    return FuzzySystem((service, food), tip, rules)
 
 
 def always(*output_sets, low=0.0, high=75.0):
     """Every output set is reached in full, whatever the reading."""
     full = Variable("x", 0, 1, (FuzzySet("any", "smf", (-2.0, -1.0)),))
     rules = tuple(rule([(0, 0)], k) for k in range(len(output_sets)))
-    return System((full,), Variable("y", low, high, output_sets), rules)
+    return FuzzySystem((full,), Variable("y", low, high, output_sets), rules)
 
 
 ANY = np.array([[0.5]])
 
 
 def answer(system, X, kind, **options):
-    return infer(system, X, kind, Options(**options)).value
+    return infer(system, X, kind, InferenceOptions(**options)).value
 
 
 # --- Mamdani ---------------------------------------------------------------------------------
@@ -107,7 +109,7 @@ def by_hand(**operators):
         FuzzySet("high", "trimf", (2.0, 3.0, 4.0)),
     )
     rules = (rule([(0, 0)], 0), rule([(0, 1)], 1))
-    return System((x,), Variable("y", 0, 4, sets), rules, Operators(**operators))
+    return FuzzySystem((x,), Variable("y", 0, 4, sets), rules, Operators(**operators))
 
 
 @pytest.mark.parametrize("options", [{"samples": 1601}, {"sampling": "exact"}])
@@ -130,7 +132,7 @@ def two_inputs(operators, *terms, connective="and", weight=1.0):
         "y", 0, 1, (FuzzySet("one", "constant", (1.0,)), FuzzySet("nil", "constant", (0.0,)))
     )
     rules = (rule(terms, 0, connective, weight), rule([(2, 0)], 1))
-    return System(inputs, out, rules, Operators(**operators))
+    return FuzzySystem(inputs, out, rules, Operators(**operators))
 
 
 @pytest.mark.parametrize(
@@ -265,10 +267,10 @@ def test_exact_interval_spans_the_universe_where_nothing_fills_it_from_below():
     x = Variable("x", 0, 1, (FuzzySet("a", "trimf", (0.2, 0.5, 0.8), Footprint(mean=0.1)),))
     y = Variable("y", 0, 100, (FuzzySet("o", "gaussmf", (3.0, 90.0)),))
     found = infer(
-        System((x,), y, (rule([(0, 0)], 0),)),
+        FuzzySystem((x,), y, (rule([(0, 0)], 0),)),
         [[0.28]],  # within the footprint of the foot: the lower strength is 0
         "interval-type-2",
-        Options(sampling="exact"),
+        InferenceOptions(sampling="exact"),
     )
     assert found.interval[0] == pytest.approx([0.0, 100.0], abs=1e-9)
 
@@ -289,7 +291,7 @@ def test_exact_interval_is_that_of_two_million_samples(one):
         Quadrature(y, weights), lower_membership(one, y), upper_membership(one, y)
     )
     system = always(one, low=0, high=1)
-    found = infer(system, ANY, "interval-type-2", Options(sampling="exact")).interval[0]
+    found = infer(system, ANY, "interval-type-2", InferenceOptions(sampling="exact")).interval[0]
     # The samples' own error: a step of 5e-7 squared, times bends of up to 60.
     assert found == pytest.approx(sampled_ends, abs=1e-10)
 
@@ -375,7 +377,7 @@ def test_uncertain_sd_on_the_whole_line_reaches_the_analytic_root(spread, half_w
     system = always(
         FuzzySet("u", "gaussmf", (1.0, 5.0), Footprint(spread=spread)), low=-25, high=35
     )
-    found = infer(system, ANY, "interval-type-2", Options(sampling="exact")).interval[0]
+    found = infer(system, ANY, "interval-type-2", InferenceOptions(sampling="exact")).interval[0]
     assert found == pytest.approx([5 - half_width, 5 + half_width], abs=1e-11)
 
 
@@ -383,7 +385,7 @@ def test_uncertain_sd_on_the_whole_line_reaches_the_analytic_root(spread, half_w
 def test_centroid_of_a_constant_band(a):
     band = FuzzySet("band", "trapmf", (-1.0, -1.0, 2.0, 2.0), Footprint(scale=a))
     system = always(band, low=0, high=1)
-    found = infer(system, ANY, "interval-type-2", Options(sampling="exact")).interval[0]
+    found = infer(system, ANY, "interval-type-2", InferenceOptions(sampling="exact")).interval[0]
     root = sqrt(a)
     assert found == pytest.approx([root / (1 + root), 1 / (1 + root)], abs=1e-11)
 
@@ -401,7 +403,7 @@ def test_nie_tan_is_the_centroid_of_the_mean_of_both_bounds():
     system = always(skewed)
     y = np.linspace(0, 75, 101)
     both = lower_membership(skewed, y) + upper_membership(skewed, y)
-    found = infer(system, ANY, "interval-type-2", Options(reducer="nie-tan"))
+    found = infer(system, ANY, "interval-type-2", InferenceOptions(reducer="nie-tan"))
     assert found.value[0] == pytest.approx((y @ both) / both.sum(), rel=1e-13)
     assert found.value[0] != pytest.approx(found.interval[0].mean(), rel=1e-4)
 
@@ -471,8 +473,10 @@ def test_a_negated_term_uses_the_opposite_bound():
     uncertain = FuzzySet("u", "trimf", (0.0, 5.0, 10.0), Footprint(mean=1.0))
     x = Variable("x", 0, 10, (uncertain,))
     sets = (FuzzySet("a", "trimf", (0.0, 20.0, 40.0)), FuzzySet("b", "trimf", (35.0, 55.0, 75.0)))
-    system = System((x,), Variable("y", 0, 75, sets), (rule([(0, 0, True)], 0), rule([(0, 0)], 1)))
-    from fuzzy.interval_type2 import bounds_of_firing
+    system = FuzzySystem(
+        (x,), Variable("y", 0, 75, sets), (rule([(0, 0, True)], 0), rule([(0, 0)], 1))
+    )
+    from fuzzy.systems.interval_type2 import bounds_of_firing
 
     lower, upper = bounds_of_firing(system, np.array([[2.0]]))
     assert [lower[1, 0], upper[1, 0]] == pytest.approx([0.2, 0.6])

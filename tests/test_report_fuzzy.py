@@ -11,11 +11,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fuzzy.explain import explain
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.inference import SYSTEMS
-from fuzzy.settings import Settings
-from fuzzy.stiffness import liver_row, patient_system
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import liver_row, patient_system
+from fuzzy.systems.explain import explain
+from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.kinds import SYSTEMS
 from reports import canvas
 from reports.fuzzy_figures import (
     draw_sets,
@@ -70,7 +70,7 @@ SET = {
 @pytest.fixture(scope="module")
 def view_arrays() -> dict[str, np.ndarray]:
     readings = {"hcv": 9.5e3, "nafld": 12e3}
-    system, row = patient_system(readings, Settings()), liver_row(readings)[0]
+    system, row = patient_system(readings, LiverSettings()), liver_row(readings)[0]
     found = [drawing_arrays(explain(system, row, kind)) for kind in SYSTEMS]
     return found[0] | found[1] | found[2]
 

@@ -245,7 +245,7 @@ def test_a_library_of_another_version_makes_another_program(monkeypatch):
 
 def test_the_program_holds_imports_within_functions_and_leaves_out_the_command_line():
     found = set(reached("study.run.whole", (ROOT,)))
-    assert {"study", "study.run", "study.scene", "msm.forces", "fuzzy.kernel"} <= found
+    assert {"study", "study.run", "study.scene", "msm.forces", "fuzzy.systems.kernel"} <= found
     assert "fem_reference.elasticity" in found
     assert not found & {"study.commands", "study.sweep.runner"}
 

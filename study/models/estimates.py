@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy import stiffness
-from fuzzy.explain import explain
-from fuzzy.explanation_arrays import drawing_arrays
-from fuzzy.liver import records_in_use
-from fuzzy.sensitivity import sensitivity
-from fuzzy.stiffness import Estimate, Options, Settings
+from fuzzy.liver import stiffness
+from fuzzy.liver.sensitivity import sensitivity
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import StiffnessEstimate
+from fuzzy.liver.system import records_in_use
+from fuzzy.systems.explain import explain
+from fuzzy.systems.explanation_arrays import drawing_arrays
+from fuzzy.systems.options import InferenceOptions
 from study.results.records import FuzzyRecord, StiffnessSet, SystemEstimate
 from study.results.tables import SensitivityEntry
 from study.scene import Scene
@@ -23,13 +25,13 @@ SURFACE_POINTS = 41
 CURVE_POINTS = 401
 
 
-def settings(scene: Scene) -> Settings:
+def settings(scene: Scene) -> LiverSettings:
     """Settings of the fuzzy systems from the scene. ValueError naming the key that does not fit."""
     asked = asdict(scene.fuzzy)
-    options = Options(**{f.name: asked[f.name] for f in fields(Options)})
-    named = {f.name: asked[f.name] for f in fields(Settings) if f.name != "options"}
+    options = InferenceOptions(**{f.name: asked[f.name] for f in fields(InferenceOptions)})
+    named = {f.name: asked[f.name] for f in fields(LiverSettings) if f.name != "options"}
     try:
-        return Settings(**named, options=options)
+        return LiverSettings(**named, options=options)
     except ValueError as error:
         raise ValueError(f"fuzzy.{error}") from error
 
@@ -39,7 +41,7 @@ def readings(scene: Scene) -> dict[str, float]:
     return {name: value for name, value in asdict(scene.patient).items() if value is not None}
 
 
-def estimates(scene: Scene) -> dict[str, Estimate]:
+def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
     """Estimate of each fuzzy system that the scene names."""
     return {
         name: stiffness.estimate(readings(scene), name, settings(scene))
@@ -51,7 +53,7 @@ def estimates(scene: Scene) -> dict[str, Estimate]:
 class FuzzySide:
     """What the fuzzy systems found: estimates by system, and their part of the results."""
 
-    estimates: dict[str, Estimate] = field(default_factory=dict)
+    estimates: dict[str, StiffnessEstimate] = field(default_factory=dict)
     record: FuzzyRecord = field(default_factory=lambda: FuzzyRecord(systems={}))
     sensitivity: tuple[SensitivityEntry, ...] = ()
     arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -75,7 +77,7 @@ def run_fuzzy(scene: Scene) -> FuzzySide:
 
 
 def _sensitivity(
-    scene: Scene, chosen: Settings, given: Mapping[str, float]
+    scene: Scene, chosen: LiverSettings, given: Mapping[str, float]
 ) -> tuple[tuple[SensitivityEntry, ...], tuple[str, ...]]:
     if not scene.fuzzy.sensitivity_readings:
         return (), ()
@@ -97,7 +99,7 @@ def _sensitivity(
     return tuple(entries), notes
 
 
-def _record(found: Estimate, youngs_modulus: float) -> SystemEstimate:
+def _record(found: StiffnessEstimate, youngs_modulus: float) -> SystemEstimate:
     return SystemEstimate(
         estimate_pa=found.estimate,
         relative_to_reference=found.estimate / youngs_modulus,
@@ -109,7 +111,7 @@ def _record(found: Estimate, youngs_modulus: float) -> SystemEstimate:
 
 
 def drawings(
-    settings: Settings,
+    settings: LiverSettings,
     systems: Sequence[str],
     given: Mapping[str, float],
     over: tuple[str, str],

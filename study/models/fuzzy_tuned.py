@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fuzzy.assumptions import assumptions as fuzzy_assumptions
-from fuzzy.stiffness import Estimate
+from fuzzy.liver.assumptions import assumptions as fuzzy_assumptions
+from fuzzy.liver.stiffness import StiffnessEstimate
 from msm.calibration import reference_stiffness
 from msm.damping import eq_2
 from msm.laws import Hooke
@@ -50,7 +50,7 @@ def on_point(scene: Scene, estimates: Estimates) -> Iterator[PointSpring]:
         )
 
 
-def _moduli(found: Estimate) -> tuple[float, ...]:
+def _moduli(found: StiffnessEstimate) -> tuple[float, ...]:
     """The estimate [Pa], then the ends of its interval."""
     return (found.estimate, *(found.interval or ()))
 

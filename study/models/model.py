@@ -20,11 +20,11 @@ from study.results.records import Check, ModelRecord
 from study.scene import Scene
 
 if TYPE_CHECKING:
-    from fuzzy.stiffness import Estimate
+    from fuzzy.liver.stiffness import StiffnessEstimate
     from study.models.keeping import Keeping
 
 Floats = NDArray[np.float64]
-Estimates = Mapping[str, "Estimate"]
+Estimates = Mapping[str, "StiffnessEstimate"]
 """Of stiffness, by fuzzy system."""
 
 

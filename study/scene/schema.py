@@ -22,13 +22,13 @@ Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
 Component = Annotated[float, Quantity("", -1.0, 1.0)]
 
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
-SystemName = Literal["mamdani", "sugeno", "interval-type-2"]
+SystemName = Annotated[str, Choice("fuzzy.systems.kinds:SYSTEMS")]
 ModelName = Annotated[str, Choice("study.models.table:MODELS")]
 IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
 ElementName = Annotated[str, Choice("fem_reference.elements:CHOICES")]
 MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
 LargeStrain = Annotated[str, Choice("fem_reference.laws:LARGE_STRAIN")]
-Aetiology = Literal["hcv", "hbv", "ald", "cld", "nafld"]
+Aetiology = Annotated[str, Choice("fuzzy.liver.table1:AETIOLOGIES")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,16 +110,16 @@ class Fuzzy:
 
     systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
     reading: str = "R1"
-    consequent: Literal["max", "mean"] = "max"
-    placement: Literal["stage-mean", "cut-off"] = "stage-mean"
-    footprint: Literal["uncertain-mean", "uncertain-spread", "scaled"] = "uncertain-mean"
+    consequent: Annotated[str, Choice("fuzzy.liver.rules:CONSEQUENTS")] = "max"
+    placement: Annotated[str, Choice("fuzzy.liver.knowledge:PLACEMENTS")] = "stage-mean"
+    footprint: Annotated[str, Choice("fuzzy.liver.settings:FOOTPRINTS")] = "uncertain-mean"
     footprint_factor: Annotated[float, Quantity("", 0.0, 3.0)] = 1.0
-    absent: Literal["normal", "silent"] = "normal"
-    sampling: Literal["matlab", "octave", "exact"] = "matlab"
+    absent: Annotated[str, Choice("fuzzy.liver.settings:ABSENT")] = "normal"
+    sampling: Annotated[str, Choice("fuzzy.systems.quadrature:SAMPLINGS")] = "matlab"
     samples: Annotated[int, Quantity("", 11, 100_001)] = 101
-    sugeno_aggregation: Literal["sum", "max"] = "sum"
-    reducer: Literal["karnik-mendel", "eiasc", "nie-tan"] = "karnik-mendel"
-    out_of_range: Literal["clamp", "raise", "matlab"] = "clamp"
+    sugeno_aggregation: Annotated[str, Choice("fuzzy.systems.system:MERGES")] = "sum"
+    reducer: Annotated[str, Choice("fuzzy.systems.type_reduction:REDUCERS")] = "karnik-mendel"
+    out_of_range: Annotated[str, Choice("fuzzy.systems.options:OUT_OF_RANGE")] = "clamp"
     surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
     sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
 

@@ -18,13 +18,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from fuzzy import interval_type2, mamdani, sugeno
-from fuzzy.compiled import compiled
-from fuzzy.control_system import control_system
-from fuzzy.inference import Options
-from fuzzy.liver import liver_system
-from fuzzy.sets import Footprint, FuzzySet, core
-from fuzzy.settings import Settings
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.system import liver_system
+from fuzzy.systems import sugeno
+from fuzzy.systems.compiled import compiled
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.scikit_fuzzy import control_system
+from fuzzy.systems.sets import Footprint, FuzzySet, core
 
 ROWS = 100_000
 TURNS = 7
@@ -51,7 +52,7 @@ def plain(variable):
     return replace(variable, sets=tuple(gaussian(one) for one in variable.sets))
 
 
-LIVER = liver_system(Settings())
+LIVER = liver_system(LiverSettings())
 SYSTEM = replace(
     LIVER, inputs=tuple(plain(variable) for variable in LIVER.inputs), output=plain(LIVER.output)
 )
@@ -66,7 +67,7 @@ def names(system, rule):
 
 
 def ours(kind, pruned=True):
-    return compiled(SYSTEM, kind, Options(samples=SAMPLES), pruned=pruned)
+    return compiled(SYSTEM, kind, InferenceOptions(samples=SAMPLES), pruned=pruned)
 
 
 def scikit_fuzzy_columns(X):
@@ -165,11 +166,8 @@ def pyit2fls():
 
 
 def numpy_engine(kind):
-    if kind == "mamdani":
-        return lambda X: mamdani.evaluate(SYSTEM, X, "matlab", SAMPLES).value
-    if kind == "sugeno":
-        return lambda X: sugeno.evaluate(SYSTEM, X, "matlab", SAMPLES, "sum").value
-    return lambda X: interval_type2.evaluate(SYSTEM, X, "matlab", SAMPLES, "karnik-mendel").value
+    options = InferenceOptions(samples=SAMPLES)
+    return lambda X: SYSTEMS[kind].evaluate(SYSTEM, X, options).value
 
 
 def engines(kind):

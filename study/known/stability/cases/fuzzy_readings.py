@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.inference import SYSTEMS, Options, infer
-from fuzzy.interval_type2 import bounds_of_firing
-from fuzzy.liver import liver_system
-from fuzzy.quadrature import sampled
-from fuzzy.sets import Footprint, FuzzySet, lower_membership, upper_membership
-from fuzzy.settings import Settings
-from fuzzy.stiffness import AETIOLOGIES, estimate
-from fuzzy.system import Rule, System, Term, Variable, memberships, union
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import estimate
+from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.inference import infer
+from fuzzy.systems.interval_type2 import bounds_of_firing
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import sampled
+from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
+from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable, memberships, union
 from study.known.stability.case import Case
 from study.known.stability.finding import Finding, beside, value
 
@@ -199,7 +202,7 @@ def off_scale(kind: str, reading: float) -> Finding:
 
 def alone(kind: str) -> Finding:
     """With the others silent, a reading goes by the rules on its own disease."""
-    settings = Settings(absent="silent")
+    settings = LiverSettings(absent="silent")
     liver = liver_system(settings)
     one = AETIOLOGIES.index("hcv")
     rules = tuple(
@@ -215,7 +218,7 @@ def alone(kind: str) -> Finding:
 
 def without_footprint(footprint: str) -> Finding:
     """Interval type-2 without a footprint is Mamdani's, and its interval a point."""
-    settings = Settings(footprint=footprint, footprint_factor=0.0)  # type: ignore[arg-type] # a name from the table
+    settings = LiverSettings(footprint=footprint, footprint_factor=0.0)
     found = estimate(READINGS, "interval-type-2", settings)
     one = estimate(READINGS, "mamdani", settings).estimate
     return beside(np.full(3, one), np.array([found.estimate, *(found.interval or ())]))
@@ -223,7 +226,7 @@ def without_footprint(footprint: str) -> Finding:
 
 def with_largest(footprint: str) -> Finding:
     """The liver's interval at the largest footprint, by a search."""
-    settings = Settings(footprint=footprint, footprint_factor=3.0)  # type: ignore[arg-type] # likewise
+    settings = LiverSettings(footprint=footprint, footprint_factor=3.0)
     row = np.array([[READINGS[name] / KPA for name in AETIOLOGIES]])
     return _searched(liver_system(settings), row)
 
@@ -249,15 +252,15 @@ def set_of(sd: float) -> Finding:
 
 def factor(factor: float) -> Finding:
     """Settings with a footprint of so many times the published one."""
-    return value(0.0, Settings(footprint_factor=factor).footprint_factor)
+    return value(0.0, LiverSettings(footprint_factor=factor).footprint_factor)
 
 
 def few(samples: int) -> Finding:
     """Options with so many samples."""
-    return value(0.0, float(Options(samples=samples).samples))
+    return value(0.0, float(InferenceOptions(samples=samples).samples))
 
 
-def _searched(system: System, row: Floats) -> Finding:
+def _searched(system: FuzzySystem, row: Floats) -> Finding:
     """Ends of the interval beside the least and largest centroid over all switch points."""
     lower_fired, upper_fired = bounds_of_firing(system, row)
     y = sampled(system.output, 101, "matlab").y
@@ -273,14 +276,14 @@ def _searched(system: System, row: Floats) -> Finding:
     return beside(np.array([min(ends[0]), max(ends[1])]), found[0])
 
 
-def _infer(system: System, reading: float, kind: str, **options: Any) -> Any:
-    return infer(system, np.array([[reading]]), kind, Options(**options))
+def _infer(system: FuzzySystem, reading: float, kind: str, **options: Any) -> Any:
+    return infer(system, np.array([[reading]]), kind, InferenceOptions(**options))
 
 
-def _ramp(sd: float = 4.0) -> System:
+def _ramp(sd: float = 4.0) -> FuzzySystem:
     """Low at 0 and high at 10, with sets that go on beyond."""
     x = Variable(
         "x", 0.0, 10.0, (FuzzySet("a", "gaussmf", (sd, 0.0)), FuzzySet("b", "gaussmf", (sd, 10.0)))
     )
     rules = tuple(Rule((Term(0, k),), k) for k in (0, 1))
-    return System((x,), Variable("y", 0.0, TOP, (LOW, HIGH)), rules)
+    return FuzzySystem((x,), Variable("y", 0.0, TOP, (LOW, HIGH)), rules)

@@ -1,0 +1,1 @@
+"""The paper's fuzzy system: liver stiffness from elastography readings of five aetiologies."""

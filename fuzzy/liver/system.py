@@ -1,0 +1,125 @@
+"""The liver's fuzzy system: five aetiologies in, one stiffness out, everything in kPa."""
+
+from functools import cache
+from math import hypot
+
+from fuzzy.liver.knowledge import (
+    OUTPUT,
+    SEVERITIES,
+    SetRecord,
+    input_records,
+    output_records,
+    parameters,
+)
+from fuzzy.liver.readings import disease_sets, reading_named
+from fuzzy.liver.rules import rule_base
+from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Variable
+
+
+@cache
+def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES) -> FuzzySystem:
+    """Table I over the elastography sets.
+
+    Only antecedents whose diseases are all `present` make rules; the inputs stay all five.
+    ValueError for an unknown disease, or if no antecedent is left.
+    """
+    records = _input_records(settings)
+    severities = {
+        name: [SEVERITIES.index(record.severity) for record in found]
+        for name, found in records.items()
+    }
+    return FuzzySystem(
+        inputs=tuple(_input(name, found, settings) for name, found in records.items()),
+        output=_output(settings),
+        rules=rule_base(_antecedents(settings, present), severities, settings.consequent),
+        name=f"liver-{settings.reading}",
+    )
+
+
+def records_in_use(settings: LiverSettings) -> tuple[SetRecord, ...]:
+    """Record behind every set of the system: inputs in the order of AETIOLOGIES, then output."""
+    inputs = _input_records(settings).values()
+    return (*(record for found in inputs for record in found), *output_records())
+
+
+def unsourced(settings: LiverSettings) -> tuple[SetRecord, ...]:
+    """Records in use whose centre or within-stage spread is not published for that very stage."""
+    return tuple(record for record in records_in_use(settings) if record.sourced != "yes")
+
+
+def _input_records(settings: LiverSettings) -> dict[str, tuple[SetRecord, ...]]:
+    counts = reading_named(settings.reading).counts
+    return {
+        name: input_records(name, count, settings.placement)
+        for name, count in zip(AETIOLOGIES, counts, strict=True)
+    }
+
+
+def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
+    unknown = [name for name in present if name not in AETIOLOGIES]
+    if unknown:
+        raise ValueError(f"aetiology {unknown[0]!r}: use one of {', '.join(AETIOLOGIES)}")
+    cells = disease_sets(reading_named(settings.reading))
+    found = [cell for cell in cells if {*cell} <= {*present}]
+    if not found:
+        raise ValueError(
+            f"reading {settings.reading} has no rule on {' and '.join(present) or 'no aetiology'} "
+            "alone: give readings for more aetiologies, choose another reading, or set absent to "
+            "normal"
+        )
+    return found
+
+
+def _input(name: str, records: tuple[SetRecord, ...], settings: LiverSettings) -> Variable:
+    """An aetiology whose outer sets stay at 1 beyond their centres.
+
+    A reading beyond the last centre is then fully in that set, and the system cannot forget its
+    answer near the ends of the scale as it would with plain Gaussians.
+    """
+    first, *inner, last = records
+    # The flat sides end so far out that no footprint moves their ends into the universe.
+    far = parameters()["plausible_high"]
+    sets = (
+        FuzzySet(
+            first.stage,
+            "gauss2mf",
+            (first.within_stage_sd, -far, first.within_stage_sd, first.centre),
+            footprint(first, settings),
+        ),
+        *(_gaussian(record, record.stage, settings) for record in inner),
+        FuzzySet(
+            last.stage,
+            "gauss2mf",
+            (last.within_stage_sd, last.centre, last.within_stage_sd, far),
+            footprint(last, settings),
+        ),
+    )
+    return Variable(name, parameters()["input_low"], parameters()["input_high"], sets)
+
+
+def _output(settings: LiverSettings) -> Variable:
+    sets = tuple(_gaussian(record, record.severity, settings) for record in output_records())
+    return Variable(OUTPUT, parameters()["output_low"], parameters()["output_high"], sets)
+
+
+def _gaussian(record: SetRecord, name: str, settings: LiverSettings) -> FuzzySet:
+    shape = (record.within_stage_sd, record.centre)
+    return FuzzySet(name, "gaussmf", shape, footprint(record, settings))
+
+
+def footprint(record: SetRecord, settings: LiverSettings) -> Footprint:
+    """Footprint of a set.
+
+    That the width of the flanks, or the height, is as uncertain as the centre is a choice of this
+    study: the sources only tell how far centres lie apart.
+    """
+    relative = relative_half_width(record, settings)
+    return FOOTPRINTS[settings.footprint].footprint(relative, record.centre)
+
+
+def relative_half_width(record: SetRecord, settings: LiverSettings) -> float:
+    """Half-width of a footprint over the centre: between studies and operators, independent."""
+    return settings.footprint_factor * hypot(record.between_study, record.between_operator)

@@ -1,0 +1,127 @@
+"""Which rules some reading fires, and which readings no rule covers."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby, product
+from typing import NamedTuple
+
+import numpy as np
+
+from fuzzy.systems.sets import Array, corners, lower_membership, membership, upper_membership
+from fuzzy.systems.spread import spread
+from fuzzy.systems.system import FuzzySystem, Term, Variable, firing_strengths, memberships
+
+LEAST_STRENGTH = 1e-12
+"""A rule that stays below it at every reading is one that never fires."""
+
+POINTS = 1001
+MOST_INPUTS_WITH_CORNERS = 12
+
+
+class Gap(NamedTuple):
+    """An interval of one input in which none of its sets exceeds a threshold."""
+
+    input: str
+    low: float
+    high: float
+
+
+class Coverage(NamedTuple):
+    """Share of sampled readings that fire no rule above a threshold, and the least covered one."""
+
+    uncovered: float
+    least_covered: tuple[float, ...]
+    least_strength: float
+
+
+def unreachable(system: FuzzySystem) -> tuple[int, ...]:
+    """Rules that no reading in the universe fires, whatever their weight.
+
+    Each input is searched for the reading that suits the rule's terms on it best; inputs vary
+    freely, so these together are the rule's best reading.
+    """
+    best = _best_readings(system)
+    return tuple(
+        i
+        for i, rule in enumerate(system.rules)
+        if _strengths(replace(system, rules=(replace(rule, weight=1.0),)), best[i : i + 1])
+        < LEAST_STRENGTH
+    )
+
+
+def _best_readings(system: FuzzySystem) -> Array:
+    """Reading at which each rule is strongest, shape (rules, inputs)."""
+    best = np.tile(_ends(system)[0], (len(system.rules), 1))
+    for i, variable in enumerate(system.inputs):
+        parts = {r: terms for r in range(len(system.rules)) if (terms := _terms_on(system, r, i))}
+        if not parts:
+            continue
+        x = _points(variable)
+        X = np.tile(_ends(system)[0], (x.size, 1))
+        X[:, i] = x
+        rules = tuple(
+            replace(system.rules[r], antecedents=terms, weight=1.0) for r, terms in parts.items()
+        )
+        best[list(parts), i] = x[_strengths(replace(system, rules=rules), X).argmax(axis=1)]
+    return best
+
+
+def _terms_on(system: FuzzySystem, rule: int, i: int) -> tuple[Term, ...]:
+    return tuple(term for term in system.rules[rule].antecedents if term.input == i)
+
+
+def _strengths(system: FuzzySystem, X: Array) -> Array:
+    return firing_strengths(system, X, upper_membership, lower_membership)
+
+
+def _points(variable: Variable) -> Array:
+    """Many points of the universe, with the kinks of the sets among them."""
+    kinks = np.array([x for one in variable.sets for x in corners(one)])
+    inside = kinks[(variable.low <= kinks) & (kinks <= variable.high)]
+    return np.sort(np.concatenate([np.linspace(variable.low, variable.high, POINTS), inside]))
+
+
+def gaps(system: FuzzySystem, threshold: float) -> tuple[Gap, ...]:
+    """Gaps of each input by itself; their ends are right to a thousandth of the universe."""
+    return tuple(gap for variable in system.inputs for gap in _gaps_of(variable, threshold))
+
+
+def _gaps_of(variable: Variable, threshold: float) -> Iterator[Gap]:
+    x = np.linspace(variable.low, variable.high, POINTS)
+    empty = memberships(variable, x, membership).max(axis=0) <= threshold
+    for is_gap, run in groupby(range(POINTS), key=lambda k: bool(empty[k])):
+        places = list(run)
+        if is_gap:
+            yield Gap(variable.name, float(x[places[0]]), float(x[places[-1]]))
+
+
+def coverage(system: FuzzySystem, samples: int, threshold: float) -> Coverage:
+    """Coverage of evenly spread readings; the corners of the universe can be the least covered."""
+    X = np.concatenate([spread_readings(system, samples), _corner_readings(system)])
+    strongest = firing_strengths(system, X, membership).max(axis=0)
+    least = int(strongest.argmin())
+    return Coverage(
+        uncovered=float((strongest[:samples] <= threshold).mean()),
+        least_covered=tuple(float(x) for x in X[least]),
+        least_strength=float(strongest[least]),
+    )
+
+
+def spread_readings(system: FuzzySystem, samples: int) -> Array:
+    """Evenly spread readings of the universe, shape (samples, inputs)."""
+    low, high = _ends(system)
+    return np.asarray(low + (high - low) * spread(samples, len(system.inputs)))
+
+
+def _corner_readings(system: FuzzySystem) -> Array:
+    """All combinations of the universe's ends; only the two extreme ones if inputs are many."""
+    low, high = _ends(system)
+    if len(system.inputs) > MOST_INPUTS_WITH_CORNERS:
+        return np.array([low, high])
+    return np.array(list(product(*zip(low, high, strict=True))))
+
+
+def _ends(system: FuzzySystem) -> tuple[Array, Array]:
+    low = np.array([variable.low for variable in system.inputs])
+    high = np.array([variable.high for variable in system.inputs])
+    return low, high

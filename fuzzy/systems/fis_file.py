@@ -1,0 +1,267 @@
+"""MATLAB's `.fis` files of type-1 systems with one output, which Octave's toolkit shares.
+
+Every number is written with the digits that give it back, so a system that is written and read is
+the same system; only the terms of a rule come back in the order of the inputs. What such a file
+cannot say is refused with the remedy: footprints, a rule with two terms of one input, quotes in
+names. What a file says and this package does not do is refused likewise: other aggregations and
+defuzzifications, hedges, negated consequents, several outputs.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+from fuzzy.systems.fis_sections import TYPE_2, FisError, Line, Section, Values, read_sections, words
+from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
+
+SYSTEM_KEYS = (
+    "Name",
+    "Type",
+    "Version",
+    "NumInputs",
+    "NumOutputs",
+    "NumRules",
+    "AndMethod",
+    "OrMethod",
+    "ImpMethod",
+    "AggMethod",
+    "DefuzzMethod",
+)
+VARIABLE_KEYS = ("Name", "Range", "NumMFs")
+OPERATORS = {"AndMethod": "conjunction", "OrMethod": "disjunction", "ImpMethod": "implication"}
+# By type. A weighted average has nothing to aggregate: `sum` is MATLAB's word for that.
+AGGREGATIONS = {"mamdani": ("max",), "sugeno": ("sum", "max")}
+DEFUZZIFICATIONS = {"mamdani": ("centroid",), "sugeno": ("wtaver",)}
+# Octave's names for what MATLAB calls otherwise.
+SYNONYMS = {"algebraic_product": "prod", "algebraic_sum": "probor"}
+
+_SET = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*(\[.*\])")
+_RULE = re.compile(r"([^()]*)\(\s*([^()\s]*)\s*\)\s*:\s*([12])")
+
+
+def read_fis(path: Path) -> FuzzySystem:
+    """The system of a `.fis` file. FisError naming file, line and remedy."""
+    sections = read_sections(path)
+    values = sections["system"].values(SYSTEM_KEYS)
+    kind = _kind(values)
+    inputs = tuple(_variable(section) for section in sections.numbered("input"))
+    output = _only_output(sections.numbered("output"), kind)
+    lines = sections["rules"].body
+    values.check_count("NumInputs", len(inputs), "inputs")
+    values.check_count("NumOutputs", 1, "outputs")
+    values.check_count("NumRules", len(lines), "rules")
+    rules = tuple(_rule(line, inputs, output) for line in lines)
+    name = values["Name"].unquoted()
+    with values.head.blamed():
+        return FuzzySystem(inputs, output, rules, _operators(values, kind), name)
+
+
+def _kind(values: Values) -> str:
+    kind = values["Type"].unquoted().lower()
+    if "type2" in kind:
+        raise values["Type"].fault(f"Type {kind!r} {TYPE_2}")
+    if kind not in AGGREGATIONS:
+        raise values["Type"].fault(f"Type {kind!r}: use mamdani or sugeno")
+    return kind
+
+
+def _operators(values: Values, kind: str) -> Operators:
+    _check_method(values["AggMethod"], "aggregation", AGGREGATIONS[kind])
+    _check_method(values["DefuzzMethod"], "defuzzification", DEFUZZIFICATIONS[kind])
+    operators = Operators()
+    for key, field in OPERATORS.items():
+        name = values[key].unquoted().lower()
+        chosen: Any = {field: SYNONYMS.get(name, name)}
+        with values[key].blamed():
+            operators = replace(operators, **chosen)
+    return operators
+
+
+def _check_method(line: Line, what: str, allowed: tuple[str, ...]) -> None:
+    if line.unquoted().lower() not in allowed:
+        raise line.fault(
+            f"{what} {line.text} is not computed here; if the answers may differ, set "
+            f"{' or '.join(allowed)}"
+        )
+
+
+def _only_output(sections: list[Section], kind: str) -> Variable:
+    if len(sections) > 1:
+        raise sections[1].head.fault("a second output; write one file for each output")
+    output = _variable(sections[0])
+    for one, line in zip(output.sets, sections[0].values(VARIABLE_KEYS).sets(), strict=True):
+        if (one.kind in FUNCTION_KINDS) != (kind == "sugeno"):
+            wanted = "constant or linear" if kind == "sugeno" else "a membership function"
+            raise line.fault(f"set {one.name!r} is {one.kind}; in a {kind} system give {wanted}")
+    return output
+
+
+def _variable(section: Section) -> Variable:
+    values = section.values(VARIABLE_KEYS)
+    sets = tuple(_fuzzy_set(line) for line in values.sets())
+    values.check_count("NumMFs", len(sets), "sets")
+    ends = values["Range"].numbers()
+    if len(ends) != 2:
+        raise values["Range"].fault(f"Range {values['Range'].text}: give two numbers, [low high]")
+    with section.head.blamed():
+        return Variable(values["Name"].unquoted(), *ends, sets)
+
+
+def _fuzzy_set(line: Line) -> FuzzySet:
+    parts = _SET.fullmatch(line.text)
+    if not parts:
+        raise line.fault(f"{line.text}: write a set as 'name':'kind',[parameters]")
+    name, kind, numbers = parts.groups()
+    if kind.endswith("type2"):
+        raise line.fault(f"{kind} {TYPE_2}")
+    parameters = _unpadded(cast(Kind, kind), line._replace(text=numbers).numbers())
+    with line.blamed():
+        return FuzzySet(name, cast(Kind, kind), parameters)
+
+
+def _unpadded(kind: Kind, parameters: tuple[float, ...]) -> tuple[float, ...]:
+    """The parameters without the zeros by which older MATLAB files fill them up to four."""
+    count = len(FORMS[kind].parameters.split()) if kind in FORMS else len(parameters)
+    return parameters if any(parameters[count:]) else parameters[:count]
+
+
+def _rule(line: Line, inputs: tuple[Variable, ...], output: Variable) -> Rule:
+    parts = _RULE.fullmatch(line.text)
+    if not parts:
+        raise line.fault(
+            f"{line.text!r} is no rule; write a set of each input, the output's set, the weight, "
+            "and 1 for AND or 2 for OR, as in `1 0 -2, 3 (1) : 1`"
+        )
+    numbers = [_index(line, word) for word in words(parts[1])]
+    if len(numbers) != len(inputs) + 1:
+        raise line.fault(
+            f"{len(numbers)} sets for {len(inputs)} inputs and one output; give "
+            f"{len(inputs) + 1}, with 0 for an input that the rule does not use"
+        )
+    *chosen, consequent = numbers
+    if consequent <= 0:
+        raise line.fault(f"consequent {consequent}: give the number of a set of the output")
+    _check_index(line, consequent, output)
+    terms = tuple(_terms(line, chosen, inputs))
+    if not terms:
+        raise line.fault("the rule uses no input; give at least one a set other than 0")
+    weight = line.parsed(parts[2])
+    with line.blamed():
+        return Rule(terms, consequent - 1, "and" if parts[3] == "1" else "or", weight)
+
+
+def _terms(line: Line, chosen: list[int], inputs: tuple[Variable, ...]) -> Iterator[Term]:
+    for i, number in enumerate(chosen):
+        _check_index(line, abs(number), inputs[i])
+        if number:
+            yield Term(i, abs(number) - 1, number < 0)
+
+
+def _index(line: Line, word: str) -> int:
+    number = line.parsed(word)
+    if not number.is_integer():
+        raise line.fault(f"{word}: hedges, Octave's decimals, are not computed; drop them")
+    return int(number)
+
+
+def _check_index(line: Line, number: int, variable: Variable) -> None:
+    if number > len(variable.sets):
+        raise line.fault(
+            f"set {number} of {variable.name!r}, which has {len(variable.sets)}; correct the rule"
+        )
+
+
+def write_fis(system: FuzzySystem, path: Path) -> None:
+    """Write a type-1 system; ValueError, and no file, if a `.fis` file cannot hold it."""
+    text = fis_text(system)
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise FisError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def fis_text(system: FuzzySystem) -> str:
+    """Text of the `.fis` file of a type-1 system; ValueError if it cannot hold the system."""
+    _check_writable(system)
+    sections = [
+        _system_lines(system),
+        *(_variable_lines(f"Input{i}", one) for i, one in enumerate(system.inputs, start=1)),
+        _variable_lines("Output1", system.output),
+        ["[Rules]", *(_rule_text(rule, len(system.inputs)) for rule in system.rules)],
+    ]
+    return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
+
+
+def _check_writable(system: FuzzySystem) -> None:
+    for variable in (*system.inputs, system.output):
+        for one in variable.sets:
+            if one.footprint != TYPE_1:
+                raise ValueError(
+                    f"{variable.name}: set {one.name!r} has a footprint, which a .fis file cannot "
+                    "hold; write JSON, or the system without footprints (type_1_of)"
+                )
+        _check_names(variable.name, *(one.name for one in variable.sets))
+    _check_names(system.name)
+    for number, rule in enumerate(system.rules, start=1):
+        if len({term.input for term in rule.antecedents}) < len(rule.antecedents):
+            raise ValueError(
+                f"rule {number}: two terms of one input, and a .fis file holds one; write JSON"
+            )
+
+
+def _check_names(*names: str) -> None:
+    for name in names:
+        if re.search(r"['\r\n]", name):
+            raise ValueError(
+                f"name {name!r}: a .fis file holds no quotes or line breaks in names; rename it"
+            )
+
+
+def _system_lines(system: FuzzySystem) -> list[str]:
+    kind = "sugeno" if system.is_sugeno else "mamdani"
+    values = (
+        f"'{system.name}'",
+        f"'{kind}'",
+        "2.0",
+        f"{len(system.inputs)}",
+        "1",
+        f"{len(system.rules)}",
+        *(f"'{getattr(system.operators, field)}'" for field in OPERATORS.values()),
+        f"'{AGGREGATIONS[kind][0]}'",
+        f"'{DEFUZZIFICATIONS[kind][0]}'",
+    )
+    return ["[System]", *(f"{k}={v}" for k, v in zip(SYSTEM_KEYS, values, strict=True))]
+
+
+def _variable_lines(header: str, variable: Variable) -> list[str]:
+    return [
+        f"[{header}]",
+        f"Name='{variable.name}'",
+        f"Range={_bracketed((variable.low, variable.high))}",
+        f"NumMFs={len(variable.sets)}",
+        *(
+            f"MF{number}='{one.name}':'{one.kind}',{_bracketed(one.parameters)}"
+            for number, one in enumerate(variable.sets, start=1)
+        ),
+    ]
+
+
+def _bracketed(numbers: Iterable[float]) -> str:
+    return f"[{' '.join(_digits(x) for x in numbers)}]"
+
+
+def _digits(x: float) -> str:
+    """The shortest text that reads back as the same number."""
+    return repr(float(x)).removesuffix(".0")
+
+
+def _rule_text(rule: Rule, input_count: int) -> str:
+    numbers = [0] * input_count
+    for term in rule.antecedents:
+        numbers[term.input] = -(term.set + 1) if term.negated else term.set + 1
+    terms = " ".join(str(number) for number in numbers)
+    connective = 1 if rule.connective == "and" else 2
+    return f"{terms}, {rule.consequent + 1} ({_digits(rule.weight)}) : {connective}"

@@ -1,0 +1,95 @@
+"""Rules that repeat, contradict or outdo one another, by their terms alone.
+
+A rule is dominated if another one with the same consequent is at least as strong at every reading,
+as `if hcv is F2` is beside `if hcv is F2 and hbv is F4`. Where rules are merged by max it then
+changes no answer.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term
+
+
+class Pair(NamedTuple):
+    """A rule and the one it repeats, contradicts or gives way to, by index."""
+
+    rule: int
+    other: int
+
+
+class AntecedentForm(NamedTuple):
+    """An antecedent without what does not matter: order, and repetition under min and max.
+
+    A term that counts n times is there as (term, 1) to (term, n), so that an antecedent is part of
+    another exactly if its set is.
+    """
+
+    any_of: bool
+    terms: frozenset[tuple[Term, int]]
+
+
+def form(rule: Rule, operators: Operators) -> AntecedentForm:
+    """Form of the rule's antecedent; a single term is an AND."""
+    repeats = operators.conjunction == "prod"
+    if rule.connective == "or":
+        repeats = operators.disjunction == "probor"
+    times = Counter(rule.antecedents if repeats else set(rule.antecedents))
+    terms = frozenset((term, k) for term, n in times.items() for k in range(1, n + 1))
+    return AntecedentForm(rule.connective == "or" and len(terms) > 1, terms)
+
+
+def repeated(system: FuzzySystem) -> tuple[Pair, ...]:
+    """Rules with the antecedent and the consequent of an earlier one."""
+    return tuple(_met_before(system, same_consequent=True))
+
+
+def contradictory(system: FuzzySystem) -> tuple[Pair, ...]:
+    """Rules with the antecedent of an earlier one and another consequent."""
+    return tuple(_met_before(system, same_consequent=False))
+
+
+def _met_before(system: FuzzySystem, *, same_consequent: bool) -> Iterator[Pair]:
+    met: dict[AntecedentForm, dict[int, int]] = {}
+    for i, rule in enumerate(system.rules):
+        first = met.setdefault(form(rule, system.operators), {})
+        earlier = [j for k, j in first.items() if (k == rule.consequent) == same_consequent]
+        if earlier:
+            yield Pair(i, earlier[0])
+        first.setdefault(rule.consequent, i)
+
+
+def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
+    """Every dominated rule, with the shortest rule that it gives way to.
+
+    Rules of weight 0 are left out. Of rules that are equal, the first one stays.
+    """
+    forms = [form(rule, system.operators) for rule in system.rules]
+
+    def gives_way(i: int, j: int) -> bool:
+        one, other = system.rules[i], system.rules[j]
+        if i == j or one.consequent != other.consequent or one.weight > other.weight:
+            return False
+        if forms[i] == forms[j] and one.weight == other.weight:
+            return j < i
+        return _never_stronger(forms[i], forms[j])
+
+    everyone = range(len(forms))
+    stronger = {
+        i: [j for j in everyone if gives_way(i, j)] for i in everyone if system.rules[i].weight
+    }
+    return tuple(
+        Pair(i, min(others, key=lambda j: (len(forms[j].terms), j)))
+        for i, others in stronger.items()
+        if others
+    )
+
+
+def _never_stronger(one: AntecedentForm, other: AntecedentForm) -> bool:
+    """Whether `one` exceeds `other` at no reading: AND shrinks and OR grows with every term."""
+    if one.any_of:
+        return other.any_of and one.terms <= other.terms
+    if other.any_of:
+        return not one.terms.isdisjoint(other.terms)
+    return other.terms <= one.terms

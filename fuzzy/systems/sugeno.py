@@ -1,0 +1,64 @@
+"""Sugeno inference: a weighted average of numbers instead of an area.
+
+A Mamdani system is converted as MATLAB does: every output set becomes the constant at the centroid
+of the whole set on the output's universe, and rules and operators stay.
+"""
+
+import numpy as np
+
+from fuzzy.systems import exact
+from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import Output, centroid, is_exact, sampled
+from fuzzy.systems.sets import Array, membership
+from fuzzy.systems.system import MERGES, FuzzySystem, firing_strengths, joins, memberships, merged
+
+
+def consequents(system: FuzzySystem, sampling: str, samples: int) -> Array:
+    """Coefficients (sets, inputs + 1) of each consequent, one per input and then the constant.
+
+    A set cut by an end of the universe has its centroid off its centre.
+    """
+    table = np.zeros((len(system.output.sets), len(system.inputs) + 1))
+    if not system.is_sugeno:
+        table[:, -1] = constants(system, sampling, samples)
+        return table
+    for k, one in enumerate(system.output.sets):
+        table[k, -len(one.parameters) :] = one.parameters
+    return table
+
+
+def constants(system: FuzzySystem, sampling: str, samples: int) -> Array:
+    """Centroid of each whole output set on the output's universe, shape (sets,).
+
+    NaN for a set without mass on it.
+    """
+    if is_exact(sampling):
+        whole = np.eye(len(system.output.sets))
+        return np.array([exact.centroid(system, heights, membership) for heights in whole])
+    quadrature = sampled(system.output, samples, sampling)
+    return centroid(quadrature, memberships(system.output, quadrature.y, membership))
+
+
+def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output:
+    """Weighted average (N,) of the consequents for the readings X (N, inputs).
+
+    Aggregation by "sum" weighs every rule, as MATLAB does, so that a repeated rule counts twice; by
+    "max" every output set once, by its strongest rule, as Mamdani's aggregation and Octave do.
+    """
+    strengths = firing_strengths(system, X, membership)
+    weights = merged(system, strengths, options.sugeno_aggregation)
+    table = consequents(system, options.sampling, options.samples)
+    answers = table[:, :-1] @ X.T + table[:, -1:]
+    # A set without weight has no say, even if it is off the universe and so without a constant.
+    weighted = np.multiply(weights, answers, out=np.zeros_like(weights), where=weights > 0)
+    moment, total = weighted.sum(axis=0), weights.sum(axis=0)
+    value = np.divide(moment, total, out=np.full_like(total, np.nan), where=total > 0)
+    return Output(value, None, strengths.max(axis=0))
+
+
+def method(system: FuzzySystem, options: InferenceOptions) -> str:
+    """One sentence on how the answers are computed."""
+    average = f"weighted average over every {MERGES[options.sugeno_aggregation].weighed}"
+    if system.is_sugeno:
+        return f"Sugeno: {joins(system.operators)}, {average}"
+    return f"Sugeno: constants by {options.points} over each output set, {average}"

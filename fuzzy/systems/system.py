@@ -1,0 +1,227 @@
+"""A fuzzy system: variables with their sets, rules from inputs to one output, and the operators.
+
+One `FuzzySystem` serves the three kinds of inference; they share the firing of the rules. Rules
+with the same consequent meet only through their strengths, since max_r min(w_r, mu(y)) =
+min(max_r w_r, mu(y)), so they are merged to one height per output set before the output is sampled.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+
+from fuzzy.systems.sets import FUNCTION_KINDS, Array, FuzzySet
+
+Membership = Callable[[FuzzySet, Array], Array]
+Connective = Literal["and", "or"]
+
+
+class Merge(NamedTuple):
+    """How rules with one consequent join their strengths; `weighed` says what an average counts."""
+
+    join: np.ufunc
+    weighed: str
+
+    @property
+    def adds(self) -> bool:
+        """Whether every rule counts, not the strongest alone."""
+        return self.join is np.add
+
+
+MERGES: dict[str, Merge] = {
+    "max": Merge(np.maximum, "output set, by its strongest rule"),
+    "sum": Merge(np.add, "rule"),
+}
+
+
+class Term(NamedTuple):
+    """One `input is [not] set` of an antecedent, by index."""
+
+    input: int
+    set: int
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An input or the output on the universe [low, high], with its sets."""
+
+    name: str
+    low: float
+    high: float
+    sets: tuple[FuzzySet, ...]
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
+            raise ValueError(f"variable {self.name!r}: low {self.low} must be below {self.high}")
+        if not self.sets:
+            raise ValueError(f"variable {self.name!r}: has no set; give at least one")
+        names = [one.name for one in self.sets]
+        if len(set(names)) < len(names):
+            raise ValueError(f"variable {self.name!r}: two sets share a name; rename one")
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Terms joined by one connective, the output set's index, and a weight on the strength."""
+
+    antecedents: tuple[Term, ...]
+    consequent: int
+    connective: Connective = "and"
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.weight <= 1:
+            raise ValueError(f"rule weight {self.weight}: give a number from 0 to 1")
+        if self.connective not in get_args(Connective):
+            raise ValueError(f"rule connective {self.connective!r}: use and, or")
+
+
+@dataclass(frozen=True)
+class Operators:
+    """AND, OR and implication; aggregation is max, for which rules merge to heights."""
+
+    conjunction: Literal["min", "prod"] = "min"
+    disjunction: Literal["max", "probor"] = "max"
+    implication: Literal["min", "prod"] = "min"
+
+    def __post_init__(self) -> None:
+        for key, allowed in (
+            ("conjunction", ("min", "prod")),
+            ("disjunction", ("max", "probor")),
+            ("implication", ("min", "prod")),
+        ):
+            if getattr(self, key) not in allowed:
+                raise ValueError(f"{key} {getattr(self, key)!r}: use one of {', '.join(allowed)}")
+
+
+@dataclass(frozen=True)
+class FuzzySystem:
+    """Inputs, output, rules and operators; every index of every rule is checked.
+
+    With `constant` or `linear` output sets it is a Sugeno system as it stands; with membership
+    functions it is a Mamdani or type-2 system, which Sugeno inference converts.
+    """
+
+    inputs: tuple[Variable, ...]
+    output: Variable
+    rules: tuple[Rule, ...]
+    operators: Operators = Operators()
+    name: str = "system"
+
+    def __post_init__(self) -> None:
+        names = [variable.name for variable in self.inputs]
+        if not names or len(set(names)) < len(names):
+            raise ValueError("inputs: give at least one, each with a name of its own")
+        if not self.rules:
+            raise ValueError("the system has no rules: give at least one")
+        for number, rule in enumerate(self.rules, start=1):
+            if not _fits(rule, self):
+                raise ValueError(
+                    f"rule {number}: {rule} names an input or a set the system does not have"
+                )
+        _check_kinds(self)
+
+    @property
+    def is_sugeno(self) -> bool:
+        """Whether the consequents are functions of the inputs instead of fuzzy sets."""
+        return self.output.sets[0].kind in FUNCTION_KINDS
+
+
+def _fits(rule: Rule, system: FuzzySystem) -> bool:
+    known = all(
+        0 <= term.input < len(system.inputs) and 0 <= term.set < len(system.inputs[term.input].sets)
+        for term in rule.antecedents
+    )
+    return bool(rule.antecedents) and known and 0 <= rule.consequent < len(system.output.sets)
+
+
+def _check_kinds(system: FuzzySystem) -> None:
+    for variable in system.inputs:
+        for one in variable.sets:
+            if one.kind in FUNCTION_KINDS:
+                raise ValueError(
+                    f"input {variable.name!r}: set {one.name!r} is {one.kind}, which only an "
+                    "output can be; give it a membership function"
+                )
+    functions = [one.kind in FUNCTION_KINDS for one in system.output.sets]
+    if any(functions) and not all(functions):
+        raise ValueError(
+            f"output {system.output.name!r} mixes membership functions with constants; "
+            "use one or the other"
+        )
+    width = len(system.inputs) + 1
+    for one in system.output.sets:
+        if one.kind == "linear" and len(one.parameters) != width:
+            raise ValueError(
+                f"output set {one.name!r}: linear takes {width} parameters, one per input and the "
+                f"constant, got {len(one.parameters)}"
+            )
+
+
+def joins(operators: Operators) -> str:
+    """Words for the operators."""
+    return (
+        f"AND {operators.conjunction}, OR {operators.disjunction}, "
+        f"implication {operators.implication}, aggregation max"
+    )
+
+
+def memberships(variable: Variable, x: Array, membership: Membership) -> Array:
+    """Membership of x (M,) in every set of the variable, shape (sets, M)."""
+    return np.array([membership(fuzzy_set, x) for fuzzy_set in variable.sets])
+
+
+def firing_strengths(
+    system: FuzzySystem, X: Array, membership: Membership, opposite: Membership | None = None
+) -> Array:
+    """Strength of every rule at the readings X (N, inputs), shape (rules, N).
+
+    `opposite` gives the degrees that negated terms use: the upper bound of NOT A is one less the
+    lower bound of A.
+    """
+    degrees = _degrees(system, X, membership)
+    others = degrees if opposite is None else _degrees(system, X, opposite)
+    return np.array([_strength(rule, degrees, others, system.operators) for rule in system.rules])
+
+
+def _degrees(system: FuzzySystem, X: Array, membership: Membership) -> list[Array]:
+    return [memberships(variable, X[:, i], membership) for i, variable in enumerate(system.inputs)]
+
+
+def _strength(rule: Rule, degrees: list[Array], others: list[Array], operators: Operators) -> Array:
+    terms = [
+        1.0 - others[t.input][t.set] if t.negated else degrees[t.input][t.set]
+        for t in rule.antecedents
+    ]
+    return rule.weight * _joined(terms, rule.connective, operators)
+
+
+def _joined(terms: Sequence[Array], connective: Connective, operators: Operators) -> Array:
+    if connective == "and":
+        join = np.minimum if operators.conjunction == "min" else np.multiply
+        return np.asarray(join.reduce(terms))
+    if operators.disjunction == "max":
+        return np.asarray(np.maximum.reduce(terms))
+    # Folded, for 1 - (1 - a)(1 - b) would lose the digits of small degrees.
+    return np.asarray(reduce(lambda a, b: a + b * (1.0 - a), terms))
+
+
+def merged(system: FuzzySystem, strengths: Array, merge: str = "max") -> Array:
+    """Strength of every output set from those of the rules (rules, N), shape (sets, N)."""
+    consequents = np.array([rule.consequent for rule in system.rules])
+    join = MERGES[merge].join
+    return np.array(
+        [
+            join.reduce(strengths[consequents == k], axis=0, initial=0.0)
+            for k in range(len(system.output.sets))
+        ]
+    )
+
+
+def union(fired: Array, output: Array, operators: Operators) -> Array:
+    """Max of the output sets (K, M) implied at the heights (K, N), shape (N, M)."""
+    imply = np.minimum if operators.implication == "min" else np.multiply
+    return np.asarray(imply(fired[:, :, None], output[:, None, :]).max(axis=0))
