@@ -99,8 +99,11 @@ def identity(*things: object) -> str:
 
 def program() -> str:
     """SHA-256 of this package's sources and the versions of what runs them."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
-    texts = tuple((source.name, source.read_text(encoding="utf-8")) for source in sources)
+    package = Path(__file__).parent
+    sources = sorted(package.rglob("*.py"))
+    texts = tuple(
+        (str(source.relative_to(package)), source.read_text(encoding="utf-8")) for source in sources
+    )
     return identity(texts, np.__version__, numba.__version__)
 
 

@@ -14,7 +14,7 @@ from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
 from msm.integrators import INTEGRATORS
 from msm.lattice import Lattice
-from msm.laws import Hooke, Law
+from msm.laws import Law, force_law_of
 from msm.linearised import farthest, largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, Follower, critical_time_step
@@ -104,7 +104,7 @@ def run(
     checkpoint the run.
     """
     method = INTEGRATORS[integrator]
-    if method.hooke_only and not isinstance(material.law, Hooke):
+    if method.linear_only and not force_law_of(material.law).linear:
         raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")
     if material.damping.beta > 0.0 and not method.stiffness_damping:
         raise ValueError(

@@ -15,7 +15,7 @@ from msm.checkpoint import Checkpoint
 from msm.damping import Damping, eq_2, eq_9
 from msm.integrators import INTEGRATORS
 from msm.lattice import Lattice
-from msm.laws import Basafa, Hooke, Law, initial_stiffness, piecewise
+from msm.laws import Basafa, Hooke, Law, initial_stiffness
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Step
 from msm.volume import volume_term
 from study.problem.problem import Problem
@@ -64,7 +64,7 @@ def fuzzy_tuned(scene: Scene, lattice: Lattice, system: str, modulus: float) -> 
 def spring_law(scene: Scene, k: float) -> Law:
     """Linear springs of eq. (1), k [N/m], or the scene's law in proportion to them."""
     law = scene.lattice.law
-    return Hooke(k) if law is None else piecewise(law.strain, k * np.array(law.relative_tension))
+    return Hooke(k) if law is None else law.make(k)
 
 
 def elastic(lattice: Lattice, modulus: float, nu: float) -> Material:
