@@ -26,8 +26,9 @@ SECONDS = 60.0
 """Of wall time between two states."""
 IDENTITY = "identity"
 CHANGING = {
-    "motion": ("sample", "u", "v", "repeated", "wall"),
-    "pace": ("fraction", "substeps", "now", "at_rest", "margin", "unseen", "halvings"),
+    "motion": ("sample", "repeated", "wall"),
+    "stepper": ("u", "v", "t", "unseen"),
+    "pace": ("fraction", "substeps", "now", "at_rest", "margin", "halvings"),
     "follower": ("found", "omega", "mode", "bound", "bound_then", "then"),
     "recorder": ("strain", "inverted"),
     "trajectory": ("displacement", "velocity", "volume_field", "surface_field"),
