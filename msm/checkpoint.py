@@ -26,8 +26,9 @@ SECONDS = 60.0
 """Of wall time between two states."""
 IDENTITY = "identity"
 CHANGING = {
-    "motion": ("sample", "u", "v", "repeated", "wall"),
-    "pace": ("fraction", "substeps", "now", "at_rest", "margin", "unseen", "halvings"),
+    "motion": ("sample", "repeated", "wall"),
+    "stepper": ("u", "v", "t", "unseen"),
+    "pace": ("fraction", "substeps", "now", "at_rest", "margin", "halvings"),
     "follower": ("found", "omega", "mode", "bound", "bound_then", "then"),
     "recorder": ("strain", "inverted"),
     "trajectory": ("displacement", "velocity", "volume_field", "surface_field"),
@@ -99,8 +100,11 @@ def identity(*things: object) -> str:
 
 def program() -> str:
     """SHA-256 of this package's sources and the versions of what runs them."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
-    texts = tuple((source.name, source.read_text(encoding="utf-8")) for source in sources)
+    package = Path(__file__).parent
+    sources = sorted(package.rglob("*.py"))
+    texts = tuple(
+        (str(source.relative_to(package)), source.read_text(encoding="utf-8")) for source in sources
+    )
     return identity(texts, np.__version__, numba.__version__)
 
 

@@ -13,7 +13,7 @@ STAMP = "sources.stamp"
 
 
 def drop_outdated(package: Path) -> None:
-    """Delete the kernels kept in a package's folder unless they belong to its sources as they are.
+    """Delete the kernels kept in a package's folders unless they belong to its sources as they are.
 
     A folder that cannot be written is left alone, as is one that NUMBA_CACHE_DIR names.
     """
@@ -22,13 +22,13 @@ def drop_outdated(package: Path) -> None:
     with suppress(OSError):
         if stamp.exists() and stamp.read_text() == now:
             return
-        for file in kept.glob("*.nb[ci]"):  # numba's code and index files
+        for file in package.rglob("__pycache__/*.nb[ci]"):  # numba's code and index files
             file.unlink(missing_ok=True)
         kept.mkdir(exist_ok=True)
         stamp.write_text(now)
 
 
 def _stamp(package: Path) -> str:
-    """Name, time of change [ns] and size of every source, a line each."""
-    sources = ((file.name, file.stat()) for file in sorted(package.glob("*.py")))
+    """Path, time of change [ns] and size of every source, a line each."""
+    sources = ((file.relative_to(package), file.stat()) for file in sorted(package.rglob("*.py")))
     return "".join(f"{name} {found.st_mtime_ns} {found.st_size}\n" for name, found in sources)

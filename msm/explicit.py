@@ -11,18 +11,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import damping, internal_forces
+from msm.kernel import kernel
 from msm.network import Network
 from msm.rayleigh import add_stiffness_damping
 
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def symplectic_euler(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -41,7 +41,7 @@ def symplectic_euler(
                 u[i, d] += dt * v[i, d]
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def velocity_verlet(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -65,7 +65,7 @@ def velocity_verlet(
                 v[i, d] += share * (pushed - c * v[i, d])
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def runge_kutta_4(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """The classical four stages."""
     force = np.empty_like(u)

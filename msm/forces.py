@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.kernel import kernel
 from msm.laws import tension
 from msm.network import Network
 
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Set the force [N] (n, 3) of springs, cells and foundation on the nodes displaced by u."""
     force[:] = 0.0
@@ -31,7 +31,7 @@ def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     add_foundation_forces(net, u, force)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Add the force [N] of each spring to its two ends."""
     for s in range(net.ends.shape[0]):
@@ -49,7 +49,7 @@ def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
         force[j, 2] -= pull * dz
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Add the spring forces [N] of small displacements, along the springs at rest."""
     for s in range(net.ends.shape[0]):
@@ -66,7 +66,7 @@ def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -
         force[j, 2] -= pull * rz
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float, float, float]:
     """Mean gradient over a cell of component d of u; corners as in msm.lattice.CORNERS."""
     u0, u1, u2, u3 = u[cell[0], d], u[cell[1], d], u[cell[2], d], u[cell[3], d]
@@ -78,7 +78,7 @@ def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float
     return to_gradient * x, to_gradient * y, to_gradient * z
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> None:
     """Subtract the nodal forces along d of a stress with row (x, y, z), weights included."""
     plus, minus = x + y, x - y
@@ -93,7 +93,7 @@ def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> N
     force[cell[7], d] -= c0
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
     """J - 1 of a cell, and the rows of its cofactor matrix, J times the transposed inverse of F."""
     a, b, e = gradient_of(cell, u, 0, to_gradient)
@@ -110,7 +110,7 @@ def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
     return swelling + b * x[1] + e * x[2], x, y, z
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, z: Any) -> None:
     """Subtract the nodal forces of a pressure on the cofactors of a cell, weights included."""
     scatter(cell, force, 0, pressure * x[0], pressure * x[1], pressure * x[2])
@@ -118,7 +118,7 @@ def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, 
     scatter(cell, force, 2, pressure * z[0], pressure * z[1], pressure * z[2])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
     to_gradient = 0.25 / net.spacing
@@ -127,7 +127,7 @@ def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
         scatter_pressure(net.cells[c], force, net.bulk[c] * swelling * to_gradient, x, y, z)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V div(u) B_a for each corner a of each cell."""
     to_gradient = 0.25 / net.spacing
@@ -142,7 +142,7 @@ def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
         scatter(cell, force, 2, 0.0, 0.0, pressure)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_foundation_forces(net: Network, u: Floats, force: Floats) -> None:
     """Subtract S u.
 
@@ -159,7 +159,7 @@ def add_foundation_forces(net: Network, u: Floats, force: Floats) -> None:
         force[i, 2] -= z
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def damping(net: Network, u: Floats, i: int) -> float:
     """Damping [N s/m] of a node, eq. (9), or eq. (2) with gamma_1 = 0."""
     away = np.sqrt(u[i, 0] ** 2 + u[i, 1] ** 2 + u[i, 2] ** 2)

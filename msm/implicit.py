@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import damping, internal_forces
+from msm.kernel import kernel
 from msm.network import Network
 from msm.tangent import (
     Tangent,
@@ -54,7 +54,7 @@ class Workspace(NamedTuple):
     inertia: Floats
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def implicit_euler(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -67,7 +67,7 @@ def implicit_euler(
         set_sum(u, dt, v, u)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def implicit_midpoint(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -80,14 +80,14 @@ def implicit_midpoint(
         v[:] = 2.0 * work.w - v
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def empty_workspace(u: Floats) -> Workspace:
     """Arrays for a displacement of the shape of u."""
     a = np.empty((8, *u.shape))
     return Workspace(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], np.empty(u.shape[0]))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def solve_step(
     law: Any,
     net: Network,
@@ -116,7 +116,7 @@ def solve_step(
     return bool(size <= TOLERANCE * scale)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_residual(
     law: Any, net: Network, h: float, factor: float, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
@@ -135,7 +135,7 @@ def set_residual(
     return np.sqrt(size), np.sqrt(scale)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def search(
     law: Any, net: Network, h: float, factor: float, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
@@ -157,7 +157,7 @@ def search(
     return size, scale
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def correct(net: Network, h: float, work: Workspace, tangent: Tangent, enough: float) -> bool:
     """Newton's correction by conjugate gradients, until the remainder is small `enough`.
 
@@ -183,7 +183,7 @@ def correct(net: Network, h: float, work: Workspace, tangent: Tangent, enough: f
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_diagonal(net: Network, h: float, work: Workspace, tangent: Tangent) -> None:
     """The diagonal of what `multiply` multiplies with, made positive."""
     for i in range(work.diagonal.shape[0]):
@@ -191,7 +191,7 @@ def set_diagonal(net: Network, h: float, work: Workspace, tangent: Tangent) -> N
     add_diagonal(net, tangent, h * h, work.diagonal)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def multiply(net: Network, h: float, work: Workspace, tangent: Tangent) -> None:
     """Set product to (m + h c + h^2 K) direction."""
     for i in range(work.direction.shape[0]):
@@ -200,7 +200,7 @@ def multiply(net: Network, h: float, work: Workspace, tangent: Tangent) -> None:
     add_product(net, tangent, work.direction, h * h, work.product)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def dot(a: Floats, b: Floats) -> float:
     """Sum of the products of the entries of a and b (n, 3)."""
     total = 0.0
@@ -209,7 +209,7 @@ def dot(a: Floats, b: Floats) -> float:
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_sum(x: Floats, share: float, y: Floats, out: Floats) -> None:
     """Set out (n, 3) to x + share y; it may be one of them."""
     for i in range(x.shape[0]):
@@ -217,7 +217,7 @@ def set_sum(x: Floats, share: float, y: Floats, out: Floats) -> None:
             out[i, d] = x[i, d] + share * y[i, d]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def turn(r: Floats, diagonal: Floats, before: float, p: Floats) -> float:
     """Set p to the next direction of conjugate gradients; the product of r with its first part."""
     along = 0.0

@@ -19,7 +19,7 @@ class Integrator(NamedTuple):
     one column each; `advance(law, network, factors, dt, u, v)` takes a step per row of factors, in
     place. It is stable up to omega dt = `oscillation` without damping, and up to
     c dt / m = `damping` for damping alone. With `implicit_volume`, omega is that of the network
-    without its volume term. With `hooke_only` it takes no law but Hooke's; only with
+    without its volume term. With `linear_only` it takes linear springs only; only with
     `stiffness_damping` it takes the stiffness part of Rayleigh damping.
     """
 
@@ -29,7 +29,7 @@ class Integrator(NamedTuple):
     oscillation: float
     damping: float
     implicit_volume: bool = False
-    hooke_only: bool = False
+    linear_only: bool = False
     stiffness_damping: bool = False
 
 
@@ -43,5 +43,5 @@ INTEGRATORS = {
     "implicit-euler": Integrator(1, (1.0,), implicit.implicit_euler, UNBOUNDED, UNBOUNDED),
     "implicit-midpoint": Integrator(2, (0.5,), implicit.implicit_midpoint, UNBOUNDED, UNBOUNDED),
     "split-volume": Integrator(1, (1.0,), split.split_volume, 2.0, UNBOUNDED, implicit_volume=True),
-    "xpbd": Integrator(1, (1.0,), xpbd.xpbd, UNBOUNDED, UNBOUNDED, hooke_only=True),
+    "xpbd": Integrator(1, (1.0,), xpbd.xpbd, UNBOUNDED, UNBOUNDED, linear_only=True),
 }

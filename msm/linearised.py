@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import gradient_of
+from msm.kernel import kernel
 from msm.laws import stiffness, tension
 from msm.network import Network
 
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     """Direction, stiffness along and stiffness across [N/m] of a spring at the state u."""
     i, j = net.ends[s, 0], net.ends[s, 1]
@@ -39,13 +39,13 @@ def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     return rx / length, ry / length, rz / length, along, across
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def cross(a: Any, b: Any) -> Any:
     """Vector product of two rows."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def deformation(cell: Any, spacing: float, u: Floats) -> Any:
     """Rows of the mean deformation gradient F of a cell."""
     to_gradient = 0.25 / spacing
@@ -55,13 +55,13 @@ def deformation(cell: Any, spacing: float, u: Floats) -> Any:
     return (xx + 1.0, xy, xz), (yx, yy + 1.0, yz), (zx, zy, zz + 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def dot(a: Any, b: Any) -> Any:
     """Scalar product of two rows."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
     """Set (n,) values [1/s^2], the largest of which is no less than omega_max squared at u.
 
@@ -86,7 +86,7 @@ def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
         bound[i] /= net.mass[i]
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def cell_growth(net: Network, c: int, u: Floats) -> Any:
     """Largest slope of a cell's stress in F over kappa: 3 at rest."""
     if net.linear:
@@ -98,7 +98,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0) * size
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def inverted_cells(cells: NDArray[np.int64], spacing: float, u: Floats) -> int:
     """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F."""
     count = 0
@@ -108,7 +108,7 @@ def inverted_cells(cells: NDArray[np.int64], spacing: float, u: Floats) -> int:
     return count
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def farthest(u: Floats) -> tuple[float, int]:
     """Largest component [m] of u (n, 3) and its node; NaN and infinity count as infinite."""
     size, node = 0.0, 0
@@ -121,7 +121,7 @@ def farthest(u: Floats) -> tuple[float, int]:
     return size, node
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def largest_turn(net: Network, u: Floats, before: Floats) -> float:
     """Largest change of a spring's vector over its rest length, between two displacements [m]."""
     largest = 0.0
@@ -134,7 +134,7 @@ def largest_turn(net: Network, u: Floats, before: Floats) -> float:
     return float(np.sqrt(largest))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def largest_strain(net: Network, u: Floats) -> float:
     """Largest absolute strain of a spring at the displacement u [m] (n, 3)."""
     largest = 0.0

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
-from msm.integrators import INTEGRATORS
 from msm.lattice import Lattice
-from msm.laws import Hooke, Law
-from msm.linearised import farthest, largest_strain
+from msm.linearised import largest_strain
 from msm.network import Network
-from msm.stability import DEFAULT, Follower, critical_time_step
+from msm.stability import DEFAULT, critical_time_step
 from msm.statics import static_displacement
+from msm.stepper import Stepper
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
@@ -33,6 +32,7 @@ __all__ = [
     "Rate",
     "Run",
     "Step",
+    "Stepper",
     "arrays",
     "assemble",
     "critical_time_step",
@@ -42,7 +42,6 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Advance = Callable[[float, int, float, Floats, Floats], None]
 OnSample = Callable[[int, Floats, Floats], None]
 
 MAX_STEPS = 300_000
@@ -103,63 +102,39 @@ def run(
     many steps, if the step does not suit the samples, the integrator the springs, or the
     checkpoint the run.
     """
-    method = INTEGRATORS[integrator]
-    if method.hooke_only and not isinstance(material.law, Hooke):
-        raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")
-    if material.damping.beta > 0.0 and not method.stiffness_damping:
-        raise ValueError(
-            f"the integrator {integrator} has no stiffness part of Rayleigh damping; set "
-            "damping.stiffness to 0 or choose another"
-        )
-    net = arrays(assembly, material, linear=linear)
-    follower = Follower(material.law, net, method)
+    stepper = Stepper(assembly, material, factor, integrator, linear=linear)
     interval = float(observation.times[1] - observation.times[0])
-    pace = Pace(step, interval, len(observation.times) - 1, follower.limit)
-    pace.start(np.zeros_like(net.load))  # and compile what follows the limit
+    pace = Pace(step, interval, len(observation.times) - 1, stepper.limit_at_rest)
     _refuse_too_many_steps(pace)
-
-    def advance(start: float, count: int, dt: float, u: Floats, v: Floats) -> None:
-        starts = np.asarray(start + dt * np.arange(count), dtype=np.float64)
-        factors = np.stack([factor(starts + at * dt) for at in method.at], axis=1)
-        method.advance(material.law, net, factors, dt, u, v)
-
-    advance(0.0, 0, interval, np.zeros_like(net.load), np.zeros_like(net.load))  # compiles
-    recorder = _Recorder(assembly.lattice, net, observation)
-    motion = _Motion(*np.zeros((2, *net.load.shape)))
-    recorder.record(0, motion.u, motion.v)
+    recorder, motion = _Recorder(assembly.lattice, stepper.net, observation), _Motion()
+    recorder.record(0, stepper.u, stepper.v)
     keeper = None
     if checkpoint is not None:
-        found = _identity(assembly, material.law, net, integrator, step, observation, factor)
-        keeper = Keeper(checkpoint, found, _parts(motion, pace, follower, recorder))
+        found = _identity(assembly, stepper, integrator, step, observation)
+        keeper = Keeper(checkpoint, found, _parts(motion, stepper, pace, recorder))
         keeper.resume()
-    lost = _march(advance, pace, follower, recorder, motion, on_progress, on_sample, keeper)
+    lost = _march(stepper, pace, recorder, motion, on_progress, on_sample, keeper)
     return _result(motion, lost, pace, recorder)
 
 
 def _identity(
-    assembly: Assembly,
-    law: Law,
-    net: Network,
-    integrator: str,
-    step: Step,
-    observation: Observation,
-    factor: Callable[[Floats], Floats],
+    assembly: Assembly, stepper: Stepper, integrator: str, step: Step, observation: Observation
 ) -> str:
     """Of all that the trajectory follows from; the load's history at samples and between them."""
     times = observation.times
-    history = factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
+    history = stepper.factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
     seen = tuple(getattr(observation, field.name) for field in fields(observation))
-    return identity(program(), assembly.lattice.nodes, law, net, integrator, step, seen, history)
+    body = assembly.lattice.nodes, stepper.law, stepper.net
+    return identity(program(), body, integrator, step, seen, history)
 
 
-def _parts(
-    motion: _Motion, pace: Pace, follower: Follower, recorder: _Recorder
-) -> dict[str, object]:
+def _parts(motion: _Motion, stepper: Stepper, pace: Pace, recorder: _Recorder) -> dict[str, object]:
     """What changes in a run, by the names of `msm.checkpoint`."""
     return {
         "motion": motion,
+        "stepper": stepper,
         "pace": pace,
-        "follower": follower,
+        "follower": stepper.follower,
         "recorder": recorder,
         "trajectory": recorder.trajectory,
     }
@@ -186,19 +161,16 @@ class _Lost(NamedTuple):
 
 @dataclass
 class _Motion:
-    """Where a run stands: u [m] and v [m/s] (n, 3) at a sample, steps undone, time taken [s]."""
+    """Where a run stands: at which sample, steps undone, time taken [s]."""
 
-    u: Floats
-    v: Floats
     sample: int = 0
     repeated: int = 0
     wall: float = 0.0
 
 
 def _march(
-    advance: Advance,
+    stepper: Stepper,
     pace: Pace,
-    follower: Follower,
     recorder: _Recorder,
     motion: _Motion,
     on_progress: Callable[[float], None],
@@ -206,19 +178,19 @@ def _march(
     keeper: Keeper | None,
 ) -> _Lost | None:
     """Go from sample to sample, and back to the last one kept where the steps were too long."""
-    u, v, intervals = motion.u, motion.v, len(pace.substeps)
+    u, v, intervals = stepper.u, stepper.v, len(pace.substeps)
     kept = (motion.sample, u.copy(), v.copy())
     on_sample(motion.sample, u, v)
     while motion.sample < intervals:
         started = time.perf_counter()
-        taken, failed = _pass_interval(advance, pace, follower, recorder, motion.sample, u, v)
+        taken, failed = _pass_interval(stepper, pace, recorder, motion.sample)
         motion.wall += time.perf_counter() - started
         if failed is None:
             motion.sample += 1
             recorder.record(motion.sample, u, v)
             on_progress(motion.sample / intervals)
             on_sample(motion.sample, u, v)
-            if pace.unseen == 0:
+            if stepper.unseen == 0:
                 kept = (motion.sample, u.copy(), v.copy())
                 if keeper is not None:
                     keeper.keep(last=motion.sample == intervals)
@@ -227,6 +199,7 @@ def _march(
         else:
             motion.repeated += taken + int(pace.substeps[kept[0] : motion.sample].sum())
             motion.sample, u[:], v[:] = kept
+            stepper.unseen = 0
             on_sample(motion.sample, u, v)
     return None
 
@@ -238,28 +211,22 @@ def _lost(pace: Pace, recorder: _Recorder, sample: int, taken: int, node: int) -
 
 
 def _pass_interval(
-    advance: Advance,
-    pace: Pace,
-    follower: Follower,
-    recorder: _Recorder,
-    sample: int,
-    u: Floats,
-    v: Floats,
+    stepper: Stepper, pace: Pace, recorder: _Recorder, sample: int
 ) -> tuple[int, int | None]:
     """Steps taken from a sample to the next; a node where they failed, and then not all of them."""
     count = pace.choose(sample)
     dt = pace.interval / count
     taken = 0
     for stretch in _stretches(count):
-        advance(recorder.times[sample] + taken * dt, stretch, dt, u, v)
+        stepper.t = recorder.times[sample] + taken * dt
+        stepper.advance(stretch, dt)
         taken += stretch
-        pace.unseen += stretch
-        size, node = farthest(u)
+        size, node = stepper.farthest()
         if not size < recorder.far:
             pace.halve()
             return taken, node
-        if pace.is_due(sample) and not pace.keeps_up(dt, u):
-            return taken, follower.stiffest()
+        if pace.is_due(sample, stepper.unseen) and not pace.keeps_up(dt, stepper.limit()):
+            return taken, stepper.follower.stiffest()
     return taken, None
 
 

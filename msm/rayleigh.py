@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +20,7 @@ from msm.forces import (
     scatter_pressure,
     volume_change,
 )
+from msm.kernel import kernel
 from msm.laws import stiffness
 from msm.linearised import dot
 from msm.network import Network
@@ -28,7 +28,7 @@ from msm.network import Network
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add the damping [N] (n, 3) of nodes at u with velocities v, `ahead` = beta v [m]."""
     add_spring_damping(law, net, u, ahead, force)
@@ -39,7 +39,7 @@ def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, forc
     add_foundation_forces(net, ahead, force)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add a dashpot along each spring, of beta times its stiffness at the present strain."""
     for s in range(net.ends.shape[0]):
@@ -65,7 +65,7 @@ def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: 
         force[j, 2] -= pull * z
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_volume_damping(net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add -beta kappa V (dJ/dt) cof(F) B_a for each corner a of a cell; dJ/dt = cof(F) : dF/dt."""
     to_gradient = 0.25 / net.spacing

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import internal_forces
+from msm.kernel import kernel
 from msm.laws import Law
 from msm.linearised import nodal_bounds
 from msm.network import Network
@@ -63,7 +63,7 @@ def relax(
     return u, Relaxation("at rest" if reached else "not at rest", steps, residual)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def move_to_rest(
     law: Any, net: Network, factor: float, u: Floats, tolerance: float, most_steps: int
 ) -> tuple[int, float]:
@@ -92,14 +92,14 @@ def move_to_rest(
     return step, residual
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_inertia(law: Any, net: Network, u: Floats, inertia: Floats) -> None:
     """Masses (n,) with which no frequency exceeds the 2 that a step of one can follow."""
     nodal_bounds(law, net, u, inertia)
     inertia *= net.mass * MARGIN / 4.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def kick(force: Floats, inertia: Floats, share: float, v: Floats) -> float:
     """Add a share of force over inertia to v; twice the kinetic energy then."""
     energy = 0.0
@@ -110,7 +110,7 @@ def kick(force: Floats, inertia: Floats, share: float, v: Floats) -> float:
     return energy
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def size_of(x: Floats) -> float:
     """Root of the sum of the squares of x (n, 3)."""
     total = 0.0

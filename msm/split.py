@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +25,7 @@ from msm.forces import (
     gradient_of,
     scatter,
 )
+from msm.kernel import kernel
 from msm.network import Network
 from msm.tangent import Tangent, corner_slope, empty_tangent, linearise_cells
 
@@ -37,7 +37,7 @@ not add up: a tighter one changed displacements by less than 1e-5, for up to fou
 SOLVER_STEPS = 3000
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Springs kick, nodal damping and pressure act at the end of the step, then u += dt v."""
     force, inertia = np.empty_like(u), np.empty(u.shape[0])
@@ -57,7 +57,7 @@ def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, 
         u += dt * v
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def other_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Set the forces [N] (n, 3) of springs and foundation."""
     force[:] = 0.0
@@ -68,7 +68,7 @@ def other_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     add_foundation_forces(net, u, force)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def solve_pressure(
     net: Network,
     at: Tangent,
@@ -110,7 +110,7 @@ def solve_pressure(
     return False
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def multiply(
     net: Network,
     at: Tangent,
@@ -128,7 +128,7 @@ def multiply(
         out[c] = q[c] + np.sqrt(net.bulk[c]) * rates[c]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def spread_pressure(
     net: Network, at: Tangent, q: Floats, inertia: Floats, share: float, out: Floats
 ) -> None:
@@ -145,7 +145,7 @@ def spread_pressure(
             out[i, d] *= share / inertia[i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_rates(net: Network, at: Tangent, v: Floats, share: float, rates: Floats) -> None:
     """Set rates (c,) to share G v."""
     to_gradient = 0.25 / net.spacing
@@ -157,7 +157,7 @@ def set_rates(net: Network, at: Tangent, v: Floats, share: float, rates: Floats)
             rates[c] += share * (x * g[0] + y * g[1] + z * g[2])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def set_diagonal(net: Network, at: Tangent, inertia: Floats, dt: float, out: Floats) -> None:
     """Set out (c,) to the diagonal of what `multiply` multiplies with."""
     for c in range(net.cells.shape[0]):

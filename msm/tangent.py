@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import gradient_of, scatter
+from msm.kernel import kernel
 from msm.linearised import cross, spring_state
 from msm.network import Network
 
@@ -38,7 +38,7 @@ class Tangent(NamedTuple):
     pressure: Floats
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def empty_tangent(net: Network) -> Tangent:
     """Arrays for the stiffness of a network."""
     springs, cells = net.ends.shape[0], net.cells.shape[0]
@@ -53,7 +53,7 @@ def empty_tangent(net: Network) -> Tangent:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
     """Set the stiffness at the displacement u [m] (n, 3)."""
     for s in range(net.ends.shape[0]):
@@ -62,7 +62,7 @@ def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
     linearise_cells(net, u, at)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
     """Set F, its cofactors, J - 1 and the pressure of each cell."""
     for c in range(net.cells.shape[0]):
@@ -70,7 +70,7 @@ def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
         at.pressure[c] = 0.0 if net.linear else net.bulk[c] * at.swelling[c]
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
     """Set F and its cofactors (3, 3) of a cell; J - 1. At rest, and div u, if the net is linear."""
     for d in range(3):
@@ -90,7 +90,7 @@ def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
     return swelling
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def make_definite(at: Tangent) -> None:
     """Leave out what can make the stiffness indefinite.
 
@@ -102,7 +102,7 @@ def make_definite(at: Tangent) -> None:
     at.pressure[:] = 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add `share` times the stiffness times p (n, 3)."""
     add_spring_product(net, at, p, share, out)
@@ -113,7 +113,7 @@ def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats)
                 out[i, d] += share * net.value[e] * p[net.column[e], d]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add that of the springs."""
     for s in range(net.ends.shape[0]):
@@ -131,7 +131,7 @@ def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: 
         out[j, 2] += fz
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add that of the cells."""
     to_gradient = 0.25 / net.spacing
@@ -153,7 +153,7 @@ def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Fl
             scatter(cell, out, d, x, y, z)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
     """Add `share` times the diagonal (n, 3) of the stiffness made definite."""
     for s in range(net.ends.shape[0]):
@@ -174,7 +174,7 @@ def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
                     out[i, d] += share * net.value[e]
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def corner_slope(cofactor: Floats, a: int, d: int) -> Any:
     """Derivative of J by the displacement of corner a along d, times h."""
     g = cofactor[d]

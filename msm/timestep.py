@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 ROUNDING = 1e-9
@@ -98,25 +96,19 @@ def _dividing(seconds: float, interval: float) -> int:
 class Pace:
     """The steps of one run as it goes.
 
-    `limit(u)` [s]: the critical step at the displacement u. `substeps`: steps taken in each
-    interval; `margin`: smallest ratio of the limit to a step that was kept; `unseen`: steps since
-    the limit was looked at.
+    `at_rest` [s]: the critical step at rest, `now` [s] where it was last looked at. `substeps`:
+    steps taken in each interval; `margin`: smallest ratio of the limit to a step that was kept.
     """
 
-    def __init__(
-        self, step: Step, interval: float, intervals: int, limit: Callable[[Floats], float]
-    ) -> None:
+    def __init__(self, step: Step, interval: float, intervals: int, at_rest: float) -> None:
         self.fraction = step.fraction if isinstance(step, Automatic) else 0.0
         self.repeats = 0.0 < self.fraction < 1.0
         self.plan = planned(step, interval, intervals)
-        self.interval, self.limit = interval, limit
+        self.interval = interval
         self.substeps = np.zeros(intervals, dtype=np.int64)
-        self.now = self.at_rest = self.margin = float("inf")
-        self.unseen = self.halvings = 0
-
-    def start(self, u: Floats) -> None:
-        """Look at the limit at rest."""
-        self.now = self.at_rest = self.limit(u)
+        self.now = self.at_rest = at_rest
+        self.margin = float("inf")
+        self.halvings = 0
 
     def choose(self, sample: int) -> int:
         """Steps in the interval ahead; a tenth fewer than before are not worth the change."""
@@ -130,15 +122,14 @@ class Pace:
         self.margin = min(self.margin, self.now * count / self.interval)
         return count
 
-    def is_due(self, sample: int) -> bool:
+    def is_due(self, sample: int, unseen: int) -> bool:
         """Whether to look: every LOOK steps, also at the end of long intervals and of the run."""
         long = self.substeps[sample] > LOOK or sample == len(self.substeps) - 1
-        return bool(long or self.unseen >= LOOK)
+        return bool(long or unseen >= LOOK)
 
-    def keeps_up(self, dt: float, u: Floats) -> bool:
-        """Look at the limit; False if the steps of dt [s] since the last look were too long."""
-        self.unseen = 0
-        self.now = self.limit(u)
+    def keeps_up(self, dt: float, limit: float) -> bool:
+        """Take in the limit [s]; False if the steps of dt [s] since the last look were too long."""
+        self.now = limit
         longest = max(ALLOWED, self.fraction) * self.now * (1.0 + ROUNDING)
         if self.repeats and (not dt <= longest or self._is_too_short()):
             return False
@@ -147,7 +138,6 @@ class Pace:
 
     def halve(self) -> None:
         """Take half the steps from now on: with these the body went beyond all bounds."""
-        self.unseen = 0
         self.halvings += 1
         self.fraction *= 0.5
 

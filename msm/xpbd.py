@@ -9,25 +9,27 @@ be, were it alone, at the end of a step of implicit Euler:
 No step was found at which a linear lattice is unstable. But the longer the step, the softer the
 material, at rest too, and most where it is stiffest: each part gives back only
 1 / (1 + (omega dt)^2) of its force, with omega its own frequency. Nodal damping counts as inertia
-m + dt c, as in implicit Euler. Hooke's springs only.
+m + dt c, as in implicit Euler. Linear springs only.
 """
 
 from __future__ import annotations
 
-import numba
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import damping
-from msm.laws import Hooke
+from msm.kernel import kernel
+from msm.laws import stiffness
 from msm.network import Network
 from msm.tangent import corner_slope, deform
 
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
-def xpbd(law: Hooke, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
+@kernel(nogil=True)
+def xpbd(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Springs, cells and foundation in their order, once per step. Load at the end of the step."""
     inertia, before = np.empty(u.shape[0]), np.empty_like(u)
     work = np.empty((3, 8, 3))
@@ -44,9 +46,10 @@ def xpbd(law: Hooke, net: Network, factors: Floats, dt: float, u: Floats, v: Flo
         v[:] = (u - before) / dt
 
 
-@numba.njit(cache=True, error_model="numpy")
-def project_springs(law: Hooke, net: Network, inertia: Floats, dt: float, u: Floats) -> None:
+@kernel()
+def project_springs(law: Any, net: Network, inertia: Floats, dt: float, u: Floats) -> None:
     """Bring the ends of each spring together or apart."""
+    k = stiffness(law, 0.0)
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
         rx, ry, rz = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]
@@ -60,7 +63,7 @@ def project_springs(law: Hooke, net: Network, inertia: Floats, dt: float, u: Flo
             dx, dy, dz = rx + dx, ry + dy, rz + dz
             length = np.sqrt(dx * dx + dy * dy + dz * dz)
             stretch = length - rest
-        compliance = rest / (net.scale[s] * law.k * dt * dt)
+        compliance = rest / (net.scale[s] * k * dt * dt)
         pull = stretch / ((1.0 / inertia[i] + 1.0 / inertia[j] + compliance) * length)
         to_i, to_j = pull / inertia[i], pull / inertia[j]
         u[i, 0] += to_i * dx
@@ -71,7 +74,7 @@ def project_springs(law: Hooke, net: Network, inertia: Floats, dt: float, u: Flo
         u[j, 2] -= to_j * dz
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def project_cells(net: Network, inertia: Floats, dt: float, u: Floats, work: Floats) -> None:
     """Move the corners of each cell along the gradient of its volume."""
     f, g, slope = work[0, :3], work[1, :3], work[2]
@@ -88,7 +91,7 @@ def project_cells(net: Network, inertia: Floats, dt: float, u: Floats, work: Flo
                 u[i, d] -= swelling / give * slope[a, d] / inertia[i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def project_foundation(net: Network, inertia: Floats, dt: float, u: Floats) -> None:
     """Let the foundation push each node in turn, its neighbours held."""
     for i in range(u.shape[0]):

@@ -14,8 +14,9 @@ from msm.checkpoint import Checkpoint
 from msm.damping import Damping
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
-from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, run
+from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, Stepper, critical_time_step, run
 from msm.springs import connect
+from msm.timestep import LOOK
 from msm.volume import volume_term
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
@@ -164,7 +165,7 @@ def test_without_resume_a_state_is_left_unread_and_written_over(tmp_path):
     path = tmp_path / "state.npz"
     path.write_bytes(b"of something else")
     go(press(), checkpoint=Checkpoint(path, seconds=1e9))
-    assert len(np.load(path)["motion.u"]) == 125
+    assert len(np.load(path)["stepper.u"]) == 125
 
 
 def test_the_last_sample_told_is_where_the_run_stands(pressed):
@@ -191,7 +192,7 @@ def test_all_that_changes_in_a_run_is_in_its_state(monkeypatch):
     go(press(), checkpoint=Checkpoint(None, seconds=1e9))
     changed = differences(seen["before"], snapshot(seen["parts"]))
     assert changed <= {(part, name) for part, names in states.CHANGING.items() for name in names}
-    assert {("pace", "now"), ("follower", "mode"), ("motion", "u")} <= changed
+    assert {("pace", "now"), ("follower", "mode"), ("stepper", "u")} <= changed
 
 
 def snapshot(parts):
@@ -207,7 +208,7 @@ def differences(before, after):
     return {key for key in after if not np.array_equal(before[key], after[key], equal_nan=True)}
 
 
-@pytest.mark.parametrize("left_out", ["pace.now", "follower.mode", "motion.v"])
+@pytest.mark.parametrize("left_out", ["pace.now", "follower.mode", "stepper.v"])
 def test_a_state_that_lacks_a_part_is_noticed_by_these_tests(
     pressed, left_out, tmp_path, monkeypatch
 ):
@@ -308,3 +309,36 @@ def test_states_are_written_no_more_often_than_asked(tmp_path, monkeypatch):
 
 def test_keeping_states_does_not_change_a_run(pressed, tmp_path):
     assert_same(go(press(), checkpoint=Checkpoint(tmp_path / "state.npz", seconds=0.0)), pressed)
+
+
+# Step by step
+
+
+def test_a_lattice_that_is_stepped_goes_where_the_run_goes():
+    """By steps with looks or without, from rest and from rest again; times round differently."""
+    body, material = press()
+    found = run(body, material, ramp, watch(body), Fixed(1e-3)).trajectory.displacement[:, 0]
+    stepper = Stepper(body, material, ramp)
+    assert stepper.limit_at_rest == pytest.approx(critical_time_step(body, material), rel=5e-3)
+    for _ in range(200):
+        stepper.take_step(1e-3)
+    np.testing.assert_allclose(stepper.u[-1], found[20], rtol=1e-9)
+    looked = stepper.follower.limit(stepper.u)
+    assert looked < 0.9 * stepper.limit_at_rest  # its springs have stiffened
+    stepper.restart()
+    assert (stepper.t, np.abs(stepper.u).max(), np.abs(stepper.v).max()) == (0.0, 0.0, 0.0)
+    stepper.advance(150, 1e-3)
+    stepper.advance(250, 1e-3)
+    assert stepper.t == pytest.approx(0.4)
+    np.testing.assert_allclose(stepper.u[-1], found[40], rtol=1e-9)
+    assert np.abs(found[40] - found[20]).max() > 1e-3 * np.abs(found[20]).max()
+
+
+def test_a_stepper_looks_at_the_limit_as_often_as_a_run():
+    body, material = press()
+    stepper = Stepper(body, material, ramp)
+    seen = []
+    for _ in range(2 * LOOK + 1):
+        stepper.take_step(1e-3)
+        seen.append(stepper.unseen)
+    assert [step for step, unseen in enumerate(seen, 1) if unseen == 0] == [LOOK, 2 * LOOK]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 from numpy.linalg import eigvals, eigvalsh, norm
 from scipy.sparse import csr_array, eye_array, kron
 
@@ -11,14 +10,19 @@ from msm import volume as volumes
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, Damping
 from msm.forces import internal_forces
-from msm.integrators import INTEGRATORS
+from msm.integrators import INTEGRATORS, UNBOUNDED, Integrator
 from msm.lattice import build, interpolation, node_volumes
 from msm.laws import Basafa, Hooke
+from msm.model import Material, critical_time_step, run
 from msm.network import network
 from msm.relaxation import relax
 from msm.tangent import add_diagonal, add_product, empty_tangent, linearise, make_definite
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
+from study.run.lattices import assemble
+from study.scene.file import SceneError, read_scene
+from study.scene.problem import problem_of
+from tests.conftest import SMALL
 
 E, H, DENSITY = 4e3, 0.01, 1060.0
 IMPLICIT = ["implicit-euler", "implicit-midpoint"]
@@ -354,12 +358,16 @@ def test_an_implicit_step_is_solved_or_not_a_number():
     assert 0 < unsolved < 11  # both happen: six of these, from a kilonewton upwards
 
 
-def test_xpbd_takes_no_law_but_hooke_s():
-    """It would have to read the law as one stiffness; the compiler finds none to read."""
+def test_xpbd_is_offered_linear_springs_only_for_it_reads_a_law_as_one_stiffness():
     body = Held()
-    assert INTEGRATORS["xpbd"].hooke_only
-    with pytest.raises(TypingError, match="k"):
-        march("xpbd", Basafa(9.0, 1800.0, 0.05), body.arrays(), 1e-3, 1, *body.still())
+    assert [name for name, method in INTEGRATORS.items() if method.linear_only] == ["xpbd"]
+    found = []
+    for law in (Basafa(9.0, 1800.0, 0.05), Hooke(9.0)):
+        u, v = body.still()
+        march("xpbd", law, body.arrays(), 1e-3, 20, u, v)
+        found.append(u)
+    assert np.abs(found[0]).max() > 0.0
+    np.testing.assert_array_equal(*found)
 
 
 # Tangent -------------------------------------------------------------------------------------
@@ -412,3 +420,46 @@ def test_the_definite_tangent_is_positive_and_has_the_diagonal_it_says(rng):
     assert eigvalsh(definite)[0] > 0.0
     add_diagonal(net, tangent, 1.0, diagonal)
     assert np.diag(definite) == pytest.approx(diagonal.ravel(), rel=1e-12)
+
+
+# An integrator from elsewhere ----------------------------------------------------------------
+
+
+def leapfrog(law, net, factors, dt, u, v):
+    """Symplectic Euler once more, in plain Python, without damping."""
+    force = np.empty_like(u)
+    for (factor,) in factors:
+        internal_forces(law, net, u, force)
+        v += dt * (force + factor * net.load) / net.mass[:, None]
+        u += dt * v
+
+
+def test_an_integrator_added_to_the_table_runs_with_nothing_else_told(monkeypatch):
+    toy = Integrator(1, (1.0,), leapfrog, 2.0, UNBOUNDED, linear_only=True)
+    monkeypatch.setitem(INTEGRATORS, "toy", toy)
+    overrides = (*SMALL, "lattice.integrator=toy", 'models=["fem", "msm"]')
+    scene = read_scene("block", overrides)
+    posed = problem_of(scene)
+    assembly = assemble(scene, posed)
+    material = Material(Hooke(38.0))
+    limits = [critical_time_step(assembly, material, name) for name in ("toy", "symplectic-euler")]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-12)
+    ours, theirs = (
+        run(assembly, material, posed.factor, posed.observation, integrator=name).trajectory
+        for name in ("toy", "symplectic-euler")
+    )
+    assert ours.status == "finished"
+    size = np.abs(theirs.displacement).max()
+    np.testing.assert_allclose(ours.displacement, theirs.displacement, atol=1e-9 * size)
+    with pytest.raises(ValueError, match="toy takes linear springs only"):
+        run(
+            assembly,
+            Material(Basafa(9.0, 9.0, 0.1)),
+            posed.factor,
+            posed.observation,
+            integrator="toy",
+        )
+    with pytest.raises(SceneError, match="toy takes linear springs only"):
+        read_scene("block", ("lattice.integrator=toy", 'models=["basafa"]'))
+    with pytest.raises(SceneError, match=r"damping\.stiffness: toy has only the mass part"):
+        read_scene("block", (*overrides, "damping.kind=rayleigh", "damping.stiffness=1 ms"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, Self
 
 import numpy as np
@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 
 from msm import model as msm
 from msm import tetrahedra
-from msm.assembly import arrays
 from msm.integrators import INTEGRATORS
 from msm.lattice import Lattice as LatticeMesh
-from msm.linearised import farthest
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
-from msm.stability import Follower
-from msm.timestep import LOOK, whole_steps
+from msm.stepper import Stepper as LatticeStepper
+from msm.timestep import whole_steps
 from study.models.errors import place, step_checks, time_step_errors
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
@@ -168,31 +166,23 @@ class PreparedLattice:
 
     def stepper(self) -> Stepper:
         """The lattice at rest; between its steps the limit is looked at as often as in a run."""
-        method = INTEGRATORS[self.model.lattice.integrator]
-        material = self.springs.material
-        net = arrays(self.assembly, material, linear=self.linear)
-        follower = Follower(material.law, net, method)
-        u, v = np.zeros_like(net.load), np.zeros_like(net.load)
-        dt, taken = _step(self.model.lattice, follower.limit(u)), 0
-
-        def advance(count: int) -> None:
-            nonlocal taken
-            starts = dt * (taken + np.arange(count, dtype=np.float64))
-            factors = np.stack([self.problem.factor(starts + at * dt) for at in method.at], axis=1)
-            method.advance(material.law, net, factors, dt, u, v)
-            taken += count
-
-        def take_step() -> None:
-            advance(1)
-            if taken % LOOK == 0:
-                farthest(u)
-                follower.limit(u)
-
-        def restart() -> None:
-            nonlocal taken
-            u[:], v[:], taken = 0.0, 0.0, 0
-
-        return Stepper(take_step, u.copy, dt, net.load.size, advance, restart)
+        lattice = self.model.lattice
+        motion = LatticeStepper(
+            self.assembly,
+            self.springs.material,
+            self.problem.factor,
+            lattice.integrator,
+            linear=self.linear,
+        )
+        dt = _step(lattice, motion.limit_at_rest)
+        return Stepper(
+            partial(motion.take_step, dt),
+            motion.u.copy,
+            dt,
+            motion.u.size,
+            partial(motion.advance, dt=dt),
+            motion.restart,
+        )
 
     def _run(self, watch: Watch) -> Run:
         name, lattice = self.model.name, self.assembly.lattice

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from msm.laws import stiffness_at_rest
 from study.scene import Scene, SpringLaw
 
 
@@ -42,18 +41,20 @@ def _law(scene: Scene) -> str:
     law = scene.lattice.law
     if law is None:
         return "The fuzzy-tuned springs are linear, eq. (1)"
-    before, after = _slopes_at_rest(law)
+    before, after = stiffness_at_rest(law.make(1.0))
     return (
-        f"The fuzzy-tuned springs follow {len(law.strain)} points of the scene, which the paper "
-        "does not have, from the stiffness of the estimate: at rest they have "
-        f"{after:g} times that in tension and {before:g} times that in compression"
+        f"The fuzzy-tuned springs follow {_named(law)}, from the stiffness of the estimate: at "
+        f"rest they have {after:g} times that in tension and {before:g} times that in compression"
     )
 
 
-def _slopes_at_rest(law: SpringLaw) -> tuple[float, float]:
-    """Relative stiffness just below and just above no strain."""
-    rest, slopes = law.strain.index(0.0), np.diff(law.relative_tension) / np.diff(law.strain)
-    return float(slopes[max(rest - 1, 0)]), float(slopes[min(rest, len(slopes) - 1)])
+def _named(law: SpringLaw) -> str:
+    """A law as the points it goes through, or else as its numbers."""
+    points = [len(value) for value in law.parameters.values() if isinstance(value, tuple)]
+    if points:
+        return f"{points[0]} points of the scene, which the paper does not have"
+    numbers = " and ".join(f"{key} = {value:g}" for key, value in law.parameters.items())
+    return f"the law {law.kind} of the scene" + (f" with {numbers}" if numbers else "")
 
 
 def _damping(scene: Scene) -> str:

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from msm.calibration import POISSON_RATIO, reference_stiffness
 from msm.lattice import Lattice as LatticeMesh
-from msm.laws import Hooke, Law, initial_stiffness, piecewise
+from msm.laws import Hooke, Law, initial_stiffness
 from msm.model import Material
 from msm.volume import volume_term
 from study.models.damping import lattice_poisson_ratio, nodal_damping
@@ -39,7 +37,7 @@ def elastic(mesh: LatticeMesh, modulus: float, nu: float) -> Material:
 def spring_law(scene: Scene, k: float) -> Law:
     """Linear springs of eq. (1), k [N/m], or the scene's law in proportion to them."""
     law = scene.lattice.law
-    return Hooke(k) if law is None else piecewise(law.strain, k * np.array(law.relative_tension))
+    return Hooke(k) if law is None else law.make(k)
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[LatticeModel]:

@@ -2,6 +2,7 @@
 
 from study.problem.history import LoadHistory
 from study.problem.tissue import Tissue
+from study.scene.law import SpringLaw
 from study.scene.schema import (
     Aetiology,
     BasafaConstants,
@@ -14,7 +15,6 @@ from study.scene.schema import (
     Reference,
     Scene,
     Side,
-    SpringLaw,
     Superposition,
     Support,
     Time,

@@ -8,7 +8,6 @@ import math
 import tomllib
 from collections.abc import Iterator, Sequence
 from importlib import resources
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -23,6 +22,7 @@ MAX_BYTES = 65_536
 MAX_LINE = 1_000
 SPRINGS_POISSON_RATIO = 0.25
 _ON_POINT = ("basafa", "msm")
+_OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
 # What a scene without a mesh cannot use.
 _MESH_ONLY = (
     ("organ", "volume"),
@@ -262,17 +262,34 @@ def _lattice_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str
             f"lattice.volume_term: needs tissue.poisson_ratio of {SPRINGS_POISSON_RATIO} or more, "
             f"not {nu:g}; leave it out or raise the ratio"
         )
-    if lattice.integrator == "split-volume" and not lattice.volume_term:
-        yield "lattice.integrator: split-volume needs lattice.volume_term; set it to true"
-    if lattice.integrator == "xpbd" and "basafa" in scene.models:
-        yield (
-            "lattice.integrator: xpbd takes linear springs only; leave basafa out of models or "
-            "choose another integrator"
-        )
-    if lattice.integrator == "xpbd" and lattice.law is not None:
-        yield "lattice.law: xpbd takes linear springs only; remove it or change lattice.integrator"
+    if _has(table, ("lattice", "integrator")):
+        yield from _integrator_contradictions(scene)
     if lattice.time_step is not None and lattice.step_rate is not None:
         yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
+
+
+def _integrator_contradictions(scene: Scene) -> Iterator[str]:
+    from msm.integrators import INTEGRATORS
+
+    lattice = scene.lattice
+    name, method = lattice.integrator, INTEGRATORS[lattice.integrator]
+    if method.implicit_volume and not lattice.volume_term:
+        yield f"lattice.integrator: {name} needs lattice.volume_term; set it to true"
+    if method.linear_only and "basafa" in scene.models:
+        yield (
+            f"lattice.integrator: {name} takes linear springs only; leave basafa out of models or "
+            "choose another integrator"
+        )
+    if method.linear_only and lattice.law is not None and not lattice.law.is_linear:
+        yield (
+            f"lattice.law: {name} takes linear springs only; remove it or change lattice.integrator"
+        )
+    own_law = _OWN_LAW & set(scene.models)
+    if scene.damping.stiffness > 0.0 and own_law and not method.stiffness_damping:
+        yield (
+            f"damping.stiffness: {name} has only the mass part of Rayleigh damping; set it to 0, "
+            "or lattice.integrator to symplectic-euler"
+        )
 
 
 def _mesh_springs_contradictions(lattice: Lattice, table: dict[str, Any]) -> Iterator[str]:
@@ -287,40 +304,21 @@ def _mesh_springs_contradictions(lattice: Lattice, table: dict[str, Any]) -> Ite
 
 
 def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
-    if "msm" not in scene.models:
+    if not _OWN_LAW & set(scene.models):
         yield "lattice.law: only fuzzy-tuned springs follow it; add msm to models or remove it"
-    if not len(law.strain) == len(law.relative_tension) >= 2:
+    if scene.lattice.volume_term and not _is_unity_at_rest(law):
         yield (
-            f"lattice.law: has {len(law.strain)} of strain and {len(law.relative_tension)} of "
-            "relative_tension; give as many of each, two or more"
-        )
-        return
-    if not _rises(law.strain):
-        yield "lattice.law.strain: must rise from point to point; sort the points, each strain once"
-    elif not _rises(law.relative_tension):
-        yield (
-            "lattice.law.relative_tension: must rise with the strain; a spring that weakens as it "
-            "is stretched makes the lattice unstable"
-        )
-    points = list(zip(law.strain, law.relative_tension, strict=True))
-    if (0.0, 0.0) not in points:
-        yield "lattice.law: must be free of tension at rest; give a point of strain 0 and tension 0"
-    elif scene.lattice.volume_term and not _is_linear_at_rest(points):
-        yield (
-            "lattice.law: with lattice.volume_term the points beside 0 must have a relative "
-            "tension equal to their strain, or the springs lack the shear modulus that the term "
-            "completes; change them or leave the term out"
+            "lattice.law: with lattice.volume_term the springs must start as linear ones, with a "
+            "relative tension equal to their strain on both sides of 0, or they lack the shear "
+            "modulus that the term completes; change the law or leave the term out"
         )
 
 
-def _rises(values: Sequence[float]) -> bool:
-    return all(before < after for before, after in pairwise(values))
+def _is_unity_at_rest(law: SpringLaw) -> bool:
+    """Whether springs of the law start as linear ones, to either side."""
+    from msm.laws import stiffness_at_rest
 
-
-def _is_linear_at_rest(points: Sequence[tuple[float, float]]) -> bool:
-    """Whether the points next to (0, 0) lie where a linear spring has them."""
-    rest = points.index((0.0, 0.0))
-    return all(math.isclose(x, t) for x, t in points[max(rest - 1, 0) : rest + 2])
+    return all(math.isclose(slope, 1.0) for slope in stiffness_at_rest(law.make(1.0)))
 
 
 def _damping_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
@@ -335,12 +333,6 @@ def _damping_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str
         return
     if not given:
         yield "damping.kind: rayleigh needs damping.mass, damping.stiffness or both; give them"
-    implicit = scene.lattice.integrator != "symplectic-euler"
-    if damping.stiffness > 0.0 and implicit and "msm" in scene.models:
-        yield (
-            f"damping.stiffness: {scene.lattice.integrator} has only the mass part of Rayleigh "
-            "damping; set it to 0, or lattice.integrator to symplectic-euler"
-        )
 
 
 def _tool_contradictions(scene: Scene) -> Iterator[str]:
@@ -420,6 +412,8 @@ def _plain(item: Any) -> dict[str, Any]:
 
 
 def _plain_value(value: Any, hint: Any) -> Any:
+    if isinstance(value, SpringLaw):
+        return value.table()
     if dataclasses.is_dataclass(value):
         return _plain(value)
     if isinstance(value, dict):

@@ -13,6 +13,7 @@ from study.choice import Choice
 from study.problem.history import LoadHistory
 from study.problem.tissue import Tissue
 from study.quantity import Quantity
+from study.scene.law import SpringLaw
 
 Length = Annotated[float, Quantity("m", 1e-6, 10.0)]
 Share = Annotated[float, Quantity("", 0.0, 1.0)]
@@ -122,18 +123,6 @@ class Fuzzy:
     out_of_range: Annotated[str, Choice("fuzzy.systems.options:OUT_OF_RANGE")] = "clamp"
     surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
     sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpringLaw:
-    """Points of a spring's tension over its strain, joined by straight lines that go on beyond.
-
-    `relative_tension` is that of a linear spring at this strain: where it equals `strain`, the
-    spring has the stiffness of the estimated modulus.
-    """
-
-    strain: tuple[Annotated[float, Quantity("", -1.0, 10.0)], ...]
-    relative_tension: tuple[Annotated[float, Quantity("", -1e3, 1e3)], ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,52 @@
+"""The decorator of every compiled kernel of the package.
+
+Numba keeps the type of a kernel's arguments in an index on disk, a named tuple as the name of its
+class. A spring law from outside the package would make that index unreadable for a process that
+cannot import it, and an edit of it would go unseen: its kernels are compiled in each process anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, TypeVar
+
+import numba
+from numba.core.caching import FunctionCache
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+OURS = __name__.partition(".")[0]
+
+
+class _OwnTypes(FunctionCache):  # type: ignore[misc] # numba publishes no types
+    """Keeps on disk the kernels whose arguments are of types of this package alone."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kept kernel of a signature, None if there is none."""
+        return super().load_overload(sig, target_context) if _is_ours(sig) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a kernel, or leave it to this process."""
+        if _is_ours(sig):
+            super().save_overload(sig, data)
+
+
+def _is_ours(sig: Any) -> bool:
+    tuples = [kind.instance_class for kind in sig if hasattr(kind, "instance_class")]
+    return all(kind.__module__.partition(".")[0] == OURS for kind in tuples)
+
+
+def kernel(
+    *, nogil: bool = False, inline: Literal["never", "always"] = "never"
+) -> Callable[[F], F]:
+    """Decorate a function as a compiled kernel that is kept on disk; the options are numba's.
+
+    Division by zero follows IEEE.
+    """
+
+    def compiled(function: F) -> F:
+        made = numba.njit(error_model="numpy", nogil=nogil, inline=inline)(function)
+        made._cache = _OwnTypes(function)  # what cache=True sets
+        return made  # type: ignore[no-any-return] # numba publishes no types
+
+    return compiled
