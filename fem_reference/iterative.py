@@ -116,11 +116,13 @@ def _refined(
         if np.linalg.norm(left) <= max(tolerance * scale, min(reachable, IMBALANCE * scale)):
             return found
         wanted = STRICTER[method] * tolerance * scale / float(np.linalg.norm(left))
-        more, _ = method(
-            matrix, left, rtol=max(wanted, ROUNDING), maxiter=MAX_ITERATIONS, M=operator
-        )
+        within = {"rtol": max(wanted, ROUNDING), "maxiter": MAX_ITERATIONS}
+        with np.errstate(all="ignore"):  # a singular matrix may end in 0 / 0, as the residual tells
+            more, _ = method(matrix, left, M=operator, **within)
         found = found + more
         left = load - matrix @ found
+        if not np.isfinite(left).all():
+            break
     raise ValueError(
         "the finite elements find no rest: the support does not hold the body, or a tetrahedron is "
         "nearly flat; enlarge support.depth, raise support.stiffness, or repair organ.mesh"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,9 @@ from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
 from fem_reference.recording import Recorder
 from fem_reference.solvers import solve_static
-from fem_reference.subspace import Subspace
 from fem_reference.superposition import (
     LOAD_STEPS,
-    Posing,
+    Choose,
     Superposed,
     enough_modes,
     enough_ritz_vectors,
@@ -77,87 +76,62 @@ class Solution:
         return solve_static(body) if self.superposed is None else self.superposed.subspace.rest()
 
 
-class MotionMethod(Protocol):
-    """A way to find the motion of a body from rest, an entry of `METHODS`."""
-
-    def solution(
-        self,
-        body: Body,
-        damping: RayleighDamping,
-        factor: Factor,
-        recorder: Recorder,
-        method: Method,
-        advance: Advance,
-    ) -> Solution:
-        """The motion under `factor` times the body's load, as the recorder observes it."""
+MotionMethod = Callable[[Body, RayleighDamping, Factor, Recorder, Method, Advance], Solution]
+"""Motion under a load history, as a recorder observes it, by the settings of a method."""
 
 
-@dataclass(frozen=True)
-class TimeSteps:
-    """Implicit steps in time by a scheme, which factors a matrix of all unknowns."""
-
-    scheme: March
-
-    def solution(
-        self,
-        body: Body,
-        damping: RayleighDamping,
-        factor: Factor,
-        recorder: Recorder,
-        method: Method,
-        advance: Advance,
-    ) -> Solution:
-        """Motion by steps of equal length, a whole number of them per sample."""
-        times, every = recorder.observation.times, method.steps_per_sample
-        step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
-        system = Oscillator(body.mass, body.stiffness, body.load, damping)
-        started, seen = time.perf_counter(), recorder.at_probes
-        for n, (u, v) in enumerate(self.scheme(system, factor, step, count)):
-            if n % every == 0:
-                recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
-                recorder.field(n // every, u)
-                advance(n / count)
-        return _solution(body, recorder, step, count, time.perf_counter() - started)
+def _stepped(
+    scheme: March,
+    body: Body,
+    damping: RayleighDamping,
+    factor: Factor,
+    recorder: Recorder,
+    method: Method,
+    advance: Advance,
+) -> Solution:
+    """By equal steps in time, a whole number of them per sample."""
+    times, every = recorder.observation.times, method.steps_per_sample
+    step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
+    system = Oscillator(body.mass, body.stiffness, body.load, damping)
+    started, seen = time.perf_counter(), recorder.at_probes
+    for n, (u, v) in enumerate(scheme(system, factor, step, count)):
+        if n % every == 0:
+            recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
+            recorder.field(n // every, u)
+            advance(n / count)
+    return _solution(body, recorder, step, count, time.perf_counter() - started)
 
 
-@dataclass(frozen=True)
-class Superposition:
-    """Superposition of the modes of a subspace that `choose` makes as large as it takes."""
-
-    choose: Callable[[Body, Posing, int, Advance], Subspace]
-
-    def solution(
-        self,
-        body: Body,
-        damping: RayleighDamping,
-        factor: Factor,
-        recorder: Recorder,
-        method: Method,
-        advance: Advance,
-    ) -> Solution:
-        """Motion in the subspace, and where a control point is farthest out its strain."""
-        started = time.perf_counter()
-        posed = posing(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
-        found = superposed(posed, self.choose(body, posed, method.modes, advance))
-        wall = time.perf_counter() - started
-        for sample in range(len(recorder.observation.times)):
-            recorder.motion(sample, *(curve[sample] for curve in found.curves))
-        for frame in set(recorder.observation.frames):
-            recorder.field(frame, found.state(frame)[0])
-        farthest = np.linalg.norm(found.curves.displacement, axis=2).max(axis=1).argmax()
-        recorder.look(found.state(int(farthest))[0])
-        seen = _solution(body, recorder, found.time_step, found.steps, wall)
-        return replace(seen, superposed=found)
+def _superposed(
+    choose: Choose,
+    body: Body,
+    damping: RayleighDamping,
+    factor: Factor,
+    recorder: Recorder,
+    method: Method,
+    advance: Advance,
+) -> Solution:
+    """In a subspace; its strain also where a control point is farthest out."""
+    started = time.perf_counter()
+    posed = posing(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
+    found = superposed(posed, choose(body, posed, method.modes, advance))
+    wall = time.perf_counter() - started
+    for sample in range(len(recorder.observation.times)):
+        recorder.motion(sample, *(curve[sample] for curve in found.curves))
+    for frame in set(recorder.observation.frames):
+        recorder.field(frame, found.state(frame)[0])
+    farthest = np.linalg.norm(found.curves.displacement, axis=2).max(axis=1).argmax()
+    recorder.look(found.state(int(farthest))[0])
+    seen = _solution(body, recorder, found.time_step, found.steps, wall)
+    return replace(seen, superposed=found)
 
 
+STEPPING: dict[str, March] = {"tr-bdf2": march, "hht-alpha": hht}
 METHODS: dict[str, MotionMethod] = {
-    "ritz-vectors": Superposition(enough_ritz_vectors),
-    "modal": Superposition(enough_modes),
-    "tr-bdf2": TimeSteps(march),
-    "hht-alpha": TimeSteps(hht),
+    "ritz-vectors": partial(_superposed, enough_ritz_vectors),
+    "modal": partial(_superposed, enough_modes),
+    **{name: partial(_stepped, scheme) for name, scheme in STEPPING.items()},
 }
-STEPPING = {name: one.scheme for name, one in METHODS.items() if isinstance(one, TimeSteps)}
-"""Schemes of those that step in time."""
 
 
 def build(
@@ -186,7 +160,7 @@ def run(
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
     recorded = (Recorder(body, observation), method, on_progress)
-    return METHODS[method.name].solution(body, damping, factor, *recorded)
+    return METHODS[method.name](body, damping, factor, *recorded)
 
 
 def static_field(body: Body, points: Floats) -> Floats:

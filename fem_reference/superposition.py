@@ -135,6 +135,10 @@ def subspace_trajectory(
     return recorder.trajectory
 
 
+Choose = Callable[[Body, Posing, int, Advance], Subspace]
+"""A subspace for a body's motion, of so many modes where they are asked for."""
+
+
 def enough_modes(body: Body, posed: Posing, modes: int, advance: Advance) -> Subspace:
     """So many modes of vibration."""
     del posed, advance
