@@ -1,7 +1,6 @@
 """The compiled kernels against the numpy definitions, and scikit-fuzzy against both."""
 
 import math
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,14 +8,13 @@ import pytest
 
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
-from fuzzy.systems import interval_type2, kernel, mamdani
+from fuzzy.systems import interval_type2, kernel
 from fuzzy.systems.compiled import KERNEL_FORMS, compiled
 from fuzzy.systems.inference import infer
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.policy import LEAST_STRENGTH
 from fuzzy.systems.redundancy import dominated
-from fuzzy.systems.scikit_fuzzy import control_system
 from fuzzy.systems.sets import FORMS, TYPE_1, Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
@@ -470,84 +468,3 @@ def test_one_says_that_no_rule_fires(kind):
     assert answer.silent
     assert answer.value == 5.0
     assert compiled(wide, kind, InferenceOptions()).one((0.5,)).silent is False
-
-
-# scikit-fuzzy
-
-
-def tipper():
-    service = tuple(FuzzySet(f"s{c}", "gaussmf", (1.5, c)) for c in (0.0, 5.0, 10.0))
-    food = (
-        FuzzySet("rancid", "trapmf", (-2.0, 0.0, 1.0, 3.0)),
-        FuzzySet("delicious", "trapmf", (7.0, 9.0, 10.0, 12.0)),
-    )
-    tip = tuple(FuzzySet(f"t{a}", "trimf", (a, a + 5.0, a + 10.0)) for a in (0.0, 10.0, 20.0))
-    return FuzzySystem(
-        (Variable("service", 0, 10, service), Variable("food", 0, 10, food)),
-        Variable("tip", 0, 30, tip),
-        (
-            Rule((Term(0, 0), Term(1, 0)), 0, "or"),
-            Rule((Term(0, 1),), 1, weight=0.7),
-            Rule((Term(0, 2), Term(1, 1), Term(1, 0, negated=True)), 2),
-        ),
-    )
-
-
-def simulated(system, X, points):
-    """scikit-fuzzy's answers (N,)."""
-    simulation = control_system(system, points)
-    for i, variable in enumerate(system.inputs):
-        simulation.input[variable.name] = X[:, i].copy()
-    with warnings.catch_warnings():
-        # scikit-fuzzy 0.5 hands `out` to numpy.maximum by position.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        simulation.compute()
-    return simulation.output[system.output.name]
-
-
-@pytest.mark.parametrize(
-    "operators", [Operators(), Operators(conjunction="prod", disjunction="probor")]
-)
-def test_scikit_fuzzy_approaches_the_exact_answer_as_its_grid_is_refined(operators):
-    system = replace(tipper(), operators=operators)
-    X = np.random.default_rng(1).uniform(0, 10, (25, 2))
-    exact = mamdani.evaluate(system, X, EXACT).value
-    assert_second_order(*(np.abs(simulated(system, X, n) - exact).max() for n in (1001, 5001)))
-
-
-def test_scikit_fuzzy_agrees_on_the_liver():
-    X = INSIDE[:25]
-    exact = mamdani.evaluate(LIVER, X, EXACT).value
-    assert_second_order(*(np.abs(simulated(LIVER, X, n) - exact).max() for n in (1001, 5001)))
-
-
-def assert_second_order(coarse, fine):
-    """Errors of a grid and of one five times as fine.
-
-    Between samples scikit-fuzzy interpolates linearly, and its error goes with the square of their
-    distance: by 25, or some factor around it where the worst reading is another one. At 1001
-    points a degree is off by up to (75 / 1000)^2 / 8 sd^2 = 2e-4; areas and answers by less.
-    """
-    assert coarse < 1e-3
-    assert 12 < coarse / fine < 50
-
-
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        ({"operators": Operators(implication="prod")}, "clips"),
-        ({"output": replace(tipper().output, name="food")}, "rename"),
-        (
-            {
-                "output": replace(
-                    tipper().output,
-                    sets=tuple(FuzzySet(f"c{i}", "constant", (1.0,)) for i in range(3)),
-                )
-            },
-            "Sugeno",
-        ),
-    ],
-)
-def test_what_scikit_fuzzy_does_not_have_is_refused(change, match):
-    with pytest.raises(ValueError, match=match):
-        control_system(replace(tipper(), **change))

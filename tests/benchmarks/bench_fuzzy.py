@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from skfuzzy.control import ControlSystemSimulation
 
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
@@ -24,7 +25,7 @@ from fuzzy.systems import sugeno
 from fuzzy.systems.compiled import compiled
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
-from fuzzy.systems.scikit_fuzzy import control_system
+from fuzzy.systems.scikit_fuzzy import to_skfuzzy
 from fuzzy.systems.sets import Footprint, FuzzySet, core
 
 ROWS = 100_000
@@ -72,7 +73,7 @@ def ours(kind, pruned=True):
 
 def scikit_fuzzy_columns(X):
     """Its batch: columns as inputs."""
-    simulation = control_system(SYSTEM, SAMPLES)
+    simulation = ControlSystemSimulation(to_skfuzzy(SYSTEM, SAMPLES))
     for i, variable in enumerate(SYSTEM.inputs):
         simulation.input[variable.name] = X[:, i].copy()
     simulation.compute()
@@ -80,7 +81,7 @@ def scikit_fuzzy_columns(X):
 
 
 def scikit_fuzzy_rows():
-    simulation = control_system(SYSTEM, SAMPLES)
+    simulation = ControlSystemSimulation(to_skfuzzy(SYSTEM, SAMPLES))
     simulation.cache = False  # or it would look up the answers of the turn before
 
     def answer(x):
