@@ -1,0 +1,36 @@
+"""`export`: the finite-element problem for another code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study.commands.flags import Overrides
+
+
+def export(
+    target: str,
+    *,
+    to: str,
+    out: Path | None = None,
+    set_: Overrides = None,
+) -> None:
+    """Write the finite-element problem of a scene or of results for another code.
+
+    Parameters
+    ----------
+    target
+        A built-in scene, a TOML file, or a results folder.
+    to
+        calculix (input decks, and our displacement to compare with) or vtu (for ParaView).
+    out
+        Folder to write; export in the results folder, or NAME-export here, by default.
+    set_
+        Override of a scene, table.key=value. May be repeated.
+    """
+    from study.export import ExportRequest
+    from study.export import export as write
+    from study.progress import on_stderr
+
+    with on_stderr() as progress:
+        folder = write(ExportRequest(target=target, to=to, out=out, overrides=set_ or ()), progress)
+    print(folder)

@@ -1,0 +1,54 @@
+"""`stability`: every model at its extremes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from study.commands.flags import EXIT_FAILED_CHECK, HERE, Switch, Workers
+
+
+def stability(
+    scene: str = "block",
+    *,
+    out: Path | None = None,
+    quick: Switch = False,
+    dry_run: Switch = False,
+    where: Workers = HERE,
+) -> None:
+    """Try every model at its extremes, and hold what comes out to what is known beforehand.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a TOML file, whose own lattice is tried too.
+    out
+        Folder to write; results/NAME-stability by default. Finished cases are kept beside it.
+    quick
+        Only a part of the cases, half a minute.
+    dry_run
+        Say what would be run, and stop.
+    """
+    from study.known.stability import request as asked
+    from study.known.stability import table
+    from study.sweep.tally import on_stderr
+
+    request = asked.Request(
+        scene=scene,
+        out=out,
+        workers=where.workers,
+        scheduler=where.scheduler,
+        quick=quick,
+    )
+    if dry_run:
+        print(asked.planned(request))
+        return
+    with on_stderr("stability") as progress:
+        verdicts = asked.study(request, progress)
+    from reports.stability_map import write_figures
+
+    print("\n".join(table.lines(verdicts)))
+    print(f"table in {request.folder / table.NAME}")
+    print("\n".join(map(str, write_figures(request.folder))))
+    if not all(verdict.passed for verdict in verdicts):
+        sys.exit(EXIT_FAILED_CHECK)

@@ -1,0 +1,61 @@
+"""`tradeoff`: error and cost of every model in many settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study.commands.flags import HERE, Overrides, Switch, Workers
+
+
+def tradeoff(
+    scene: str = "liver",
+    *,
+    set_: Overrides = None,
+    contender: list[str] | None = None,
+    out: Path | None = None,
+    quick: Switch = False,
+    dry_run: Switch = False,
+    where: Workers = HERE,
+) -> None:
+    """Measure error and cost of every model of a scene in many settings.
+
+    Costs are always timed in this process, one configuration after another.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene or a TOML file.
+    set_
+        Override of the scene, table.key=value. May be repeated.
+    contender
+        Only this one, for example volume-springs. May be repeated.
+    out
+        Folder to write; results/NAME-tradeoff by default. Finished runs are kept beside it.
+    quick
+        Time three turns instead of five.
+    dry_run
+        Say what would be run, and stop.
+    """
+    from study.progress import on_stderr
+    from study.tradeoff import request as asked
+
+    request = asked.TradeoffRequest(
+        scene=scene,
+        overrides=set_ or (),
+        contenders=contender or (),
+        out=out,
+        workers=where.workers,
+        scheduler=where.scheduler,
+        quick=quick,
+    )
+    if dry_run:
+        print("\n".join(asked.planned(request)))
+        return
+    from reports import exchange, exchange_answers, exchange_figure
+
+    with on_stderr() as progress:
+        lines = asked.measure(request, progress)
+        with progress.stage("pictures"):
+            pictures = exchange_figure.write_figures(request.folder)
+    found = exchange_answers.sentences(exchange.configurations(request.folder))
+    print("\n".join([*lines, *found, *map(str, pictures)]))

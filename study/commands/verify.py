@@ -1,0 +1,39 @@
+"""`verify`: problems with known answers by the reference."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from study.commands.flags import EXIT_FAILED_CHECK, AsJson, Switch
+
+
+def verify(
+    *,
+    quick: Switch = False,
+    out: Path | None = None,
+    as_json: AsJson = False,
+) -> None:
+    """Solve problems with known answers by the finite-element reference and judge its errors.
+
+    Parameters
+    ----------
+    quick
+        Only the problems that take about a second each.
+    out
+        Table to write too (CSV).
+    as_json
+        Print JSON instead of a table.
+    """
+    from study.known import verify as verifying
+    from study.progress import on_stderr
+
+    if out is not None and not out.parent.is_dir():
+        raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")
+    with on_stderr() as progress:
+        verdicts = verifying.verify(progress, quick=quick)
+    if out is not None:
+        verifying.write_csv(verdicts, out)
+    print(verifying.as_json(verdicts) if as_json else "\n".join(verifying.table(verdicts)))
+    if not all(verdict.passed for verdict in verdicts):
+        sys.exit(EXIT_FAILED_CHECK)
