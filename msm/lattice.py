@@ -11,7 +11,7 @@ from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
-from msm.linearised import inverted_cells
+from msm.kinematics import inverted_cells
 from study.organ.occupancy import Body
 
 Floats = NDArray[np.float64]

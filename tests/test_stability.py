@@ -13,9 +13,9 @@ from msm.calibration import reference_stiffness
 from msm.damping import Damping
 from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS, UNBOUNDED
+from msm.kinematics import inverted_cells
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
-from msm.linearised import inverted_cells
 from msm.model import Automatic, Counts, Fixed, Rate, critical_time_step, run
 from msm.springs import Springs, connect
 from msm.stability import Follower, cell_bound, frequency_bound, largest_frequency, longest_step
