@@ -28,7 +28,7 @@ EXTRAPOLATION = 0.75
 """How far outside its cell, in spacings, a point may lie before its weights are clamped."""
 
 
-class Lattice(Protocol):
+class LatticeMesh(Protocol):
     """What a model needs to know of its lattice, whatever the cells."""
 
     @property

@@ -10,11 +10,11 @@ import numpy as np
 
 from msm import model as lattice_model
 from msm import tetrahedra
-from msm.calibration import POISSON_RATIO, reference_stiffness
+from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
 from msm.checkpoint import Checkpoint
-from msm.damping import Damping, eq_2, eq_9
+from msm.damping import NodalDamping, eq_2, eq_9
 from msm.integrators import INTEGRATORS
-from msm.lattice import Lattice
+from msm.lattice import LatticeMesh
 from msm.laws import Basafa, Hooke, Law, initial_stiffness
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Step
 from msm.volume import volume_term
@@ -42,7 +42,7 @@ class Contender:
 
 
 def contenders(
-    scene: Scene, lattice: Lattice, estimates: dict[str, Estimate]
+    scene: Scene, lattice: LatticeMesh, estimates: dict[str, Estimate]
 ) -> Iterator[Contender]:
     """The lattice models that the scene names."""
     if "basafa" in scene.models:
@@ -52,7 +52,7 @@ def contenders(
             yield fuzzy_tuned(scene, lattice, system, estimate.estimate)
 
 
-def fuzzy_tuned(scene: Scene, lattice: Lattice, system: str, modulus: float) -> Contender:
+def fuzzy_tuned(scene: Scene, lattice: LatticeMesh, system: str, modulus: float) -> Contender:
     """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""
     linear = elastic(lattice, modulus, poisson_ratio(scene))
     k = initial_stiffness(linear.law)
@@ -67,15 +67,15 @@ def spring_law(scene: Scene, k: float) -> Law:
     return Hooke(k) if law is None else law.make(k)
 
 
-def elastic(lattice: Lattice, modulus: float, nu: float) -> Material:
+def elastic(lattice: LatticeMesh, modulus: float, nu: float) -> Material:
     """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
     law = Hooke(reference_stiffness(modulus, lattice.spacing, nu))
-    return Material(law, volume_term(lattice, modulus, nu) if nu > POISSON_RATIO else None)
+    return Material(law, volume_term(lattice, modulus, nu) if nu > SPRING_POISSON_RATIO else None)
 
 
 def poisson_ratio(scene: Scene) -> float:
     """Poisson ratio of the fuzzy-tuned lattices."""
-    return scene.tissue.poisson_ratio if scene.lattice.volume_term else POISSON_RATIO
+    return scene.tissue.poisson_ratio if scene.lattice.volume_term else SPRING_POISSON_RATIO
 
 
 def benchmark(scene: Scene, spacing: float) -> Contender:
@@ -96,13 +96,13 @@ def damping_rates(scene: Scene) -> tuple[float, float]:
     return found.gamma_0, found.beta
 
 
-def node_damping(scene: Scene, modulus: float) -> Damping:
+def node_damping(scene: Scene, modulus: float) -> NodalDamping:
     """Rayleigh's damping, or eq. (2) for springs of a modulus [Pa].
 
     Eq. (2) is taken for a node at the reference spacing, so that h does not change it.
     """
     if scene.damping.kind == "rayleigh":
-        return Damping(scene.damping.mass, beta=scene.damping.stiffness)
+        return NodalDamping(scene.damping.mass, beta=scene.damping.stiffness)
     k = reference_stiffness(modulus, scene.damping.reference_spacing, poisson_ratio(scene))
     return eq_2(scene.damping.ratio, k, reference_mass(scene))
 
@@ -225,7 +225,7 @@ def _poisson_ratio_of(scene: Scene, contender: Contender) -> float | None:
     """Of a lattice model; None where the mesh decides, and not the springs."""
     if scene.lattice.springs == "tetrahedra":
         return None
-    return POISSON_RATIO if contender.material.volume is None else poisson_ratio(scene)
+    return contender.material.poisson_ratio
 
 
 def _node_mass(scene: Scene, assembly: Assembly) -> float:

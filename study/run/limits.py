@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fem_reference import model as fem
 from fem_reference.observation import at_points, evaluation
 from msm import model as lattice_model
-from msm.calibration import POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO
 from msm.model import Assembly
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -39,16 +39,16 @@ def lattice_limits(
     """
     points, volumes = posed.volume_rule.points, posed.volume_rule.weights
     with progress.stage("limits of the lattice at rest"):
-        field = _at_rest(scene, assembly, POISSON_RATIO, points)
+        field = _at_rest(scene, assembly, SPRING_POISSON_RATIO, points)
         body = solved.body
         truth = at_points(evaluation(body, points), solved.found.rest(body))
-        tissue = replace(scene.tissue, poisson_ratio=POISSON_RATIO)
+        tissue = replace(scene.tissue, poisson_ratio=SPRING_POISSON_RATIO)
         project = posed.geometry.project
         quarter = fem.build(body.mesh, tissue, posed.foundation, posed.tool, project=project)
         truth_at_quarter = fem.static_field(quarter, points)
     factor = best_factor(field, truth, volumes)
     nu = scene.tissue.poisson_ratio
-    can_lift = nu > POISSON_RATIO and scene.lattice.springs == "lattice"
+    can_lift = nu > SPRING_POISSON_RATIO and scene.lattice.springs == "lattice"
     lifted = _at_rest(scene, assembly, nu, points) if can_lift else None
     outcome.extra["lattice_limits"] = {
         "spacing_m": assembly.lattice.spacing,

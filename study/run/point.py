@@ -9,7 +9,7 @@ import numpy as np
 
 from msm import control_point
 from msm.calibration import reference_stiffness
-from msm.damping import Damping, eq_2, eq_9
+from msm.damping import NodalDamping, eq_2, eq_9
 from msm.laws import Basafa, Hooke, Law, initial_stiffness
 from study.problem.problem import PointProblem
 from study.problem.trajectory import Trajectory
@@ -69,7 +69,7 @@ def _run(
     point: PointProblem,
     name: str,
     law: Law,
-    damping: Damping,
+    damping: NodalDamping,
     outcome: Outcome,
     progress: Progress,
 ) -> Trajectory:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from msm import model
 from msm.assembly import arrays
-from msm.calibration import POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO
 from msm.integrators import INTEGRATORS
-from msm.lattice import Lattice
+from msm.lattice import LatticeMesh
 from msm.linearised import farthest
 from msm.stability import Follower
 from msm.timestep import LOOK, Automatic, Fixed, Rate
@@ -23,20 +23,20 @@ from study.scene import Scene
 from study.tradeoff.contender import Observed, Ready, Settings
 
 Floats = NDArray[np.float64]
-Choose = Callable[[Scene, Lattice], lattices.Contender]
+Choose = Callable[[Scene, LatticeMesh], lattices.Contender]
 
 FRACTION = 0.8
 """Of the critical step, where nothing else is asked for."""
 
 
-def of_tissue(scene: Scene, lattice: Lattice) -> lattices.Contender:
+def of_tissue(scene: Scene, lattice: LatticeMesh) -> lattices.Contender:
     """Springs of the tissue's own modulus, so that the error is the model's, not an estimate's."""
     return fuzzy_tuned(scene, lattice, "tissue", scene.tissue.youngs_modulus)
 
 
 def lifts(scene: Scene) -> bool:
     """Whether the tissue's Poisson ratio is one that springs alone do not have."""
-    return scene.tissue.poisson_ratio > POISSON_RATIO
+    return scene.tissue.poisson_ratio > SPRING_POISSON_RATIO
 
 
 def with_settings(scene: Scene, settings: Settings) -> Scene:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from msm.lattice import Lattice
+from msm.lattice import LatticeMesh
 from study.problem.problem import Problem
 from study.run import lattices
 from study.scene import Scene
@@ -32,5 +32,5 @@ def prepare(scene: Scene, posed: Problem, settings: Settings) -> Ready:
     return lattice.prepare(scene, posed, settings, _choose)
 
 
-def _choose(scene: Scene, built: Lattice) -> lattices.Contender:
+def _choose(scene: Scene, built: LatticeMesh) -> lattices.Contender:
     return lattices.benchmark(scene, built.spacing)
