@@ -10,8 +10,9 @@ from scipy.sparse import csr_array, diags_array
 
 from msm import lattice as cells
 from msm import volume as volumes
-from msm.damping import UNDAMPED, Damping
-from msm.lattice import Lattice
+from msm.calibration import SPRING_POISSON_RATIO
+from msm.damping import UNDAMPED, NodalDamping
+from msm.lattice import LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
 from msm.springs import Springs, connect
@@ -30,7 +31,7 @@ class Assembly:
     `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
     """
 
-    lattice: Lattice
+    lattice: LatticeMesh
     springs: Springs
     mass: Floats
     foundation: csr_array
@@ -43,7 +44,12 @@ class Material:
 
     law: Law
     volume: VolumeTerm | None = None
-    damping: Damping = UNDAMPED
+    damping: NodalDamping = UNDAMPED
+
+    @property
+    def poisson_ratio(self) -> float:
+        """Of a cubic lattice of it; springs on tetrahedra have that of the mesh."""
+        return SPRING_POISSON_RATIO if self.volume is None else self.volume.poisson_ratio
 
 
 def assemble(

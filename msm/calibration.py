@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-POISSON_RATIO = 0.25
+SPRING_POISSON_RATIO = 0.25
 """Of every lattice of central springs, whatever their stiffness."""
 
 
 def reference_stiffness(
-    youngs_modulus: float, spacing: float, poisson_ratio: float = POISSON_RATIO
+    youngs_modulus: float, spacing: float, poisson_ratio: float = SPRING_POISSON_RATIO
 ) -> float:
     """k_ref = mu h [N/m], the edge stiffness of the plain edge and face-diagonal lattice.
 

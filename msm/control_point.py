@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.laws import Law, tension
 from study.problem.trajectory import Trajectory
 
@@ -29,7 +29,7 @@ def run(
     law: Law,
     rest_length: float,
     mass: float,
-    damping: Damping,
+    damping: NodalDamping,
     force: Callable[[float], float],
     times: Floats,
 ) -> Trajectory:

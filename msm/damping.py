@@ -12,7 +12,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Damping:
+class NodalDamping:
     """Damping c = gamma_0 + gamma_1 |u| of a node, per mass: [1/s] and [1/(m s)].
 
     Per mass it is the same material at every lattice spacing. `beta` [s]: damping of springs, cells
@@ -24,17 +24,17 @@ class Damping:
     beta: float = 0.0
 
 
-def eq_2(zeta: float, k: float, mass: float) -> Damping:
+def eq_2(zeta: float, k: float, mass: float) -> NodalDamping:
     """Damping gamma = 2 zeta k / w with w = sqrt(k / m), k [N/m], m [kg]; per mass 2 zeta w."""
-    return Damping(2.0 * zeta * float(np.sqrt(k / mass)))
+    return NodalDamping(2.0 * zeta * float(np.sqrt(k / mass)))
 
 
-def eq_9(gamma_0: float, gamma_1: float, mass: float) -> Damping:
+def eq_9(gamma_0: float, gamma_1: float, mass: float) -> NodalDamping:
     """gamma_0 [N s/m] and gamma_1 [N s/m^2] of a node of the given mass [kg]."""
-    return Damping(gamma_0 / mass, gamma_1 / mass)
+    return NodalDamping(gamma_0 / mass, gamma_1 / mass)
 
 
-def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> Damping:
+def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> NodalDamping:
     """Damping alpha M + beta K that has the ratios at two frequencies.
 
     From zeta = (alpha / omega + beta omega) / 2, omega [rad/s]. ValueError if that takes a negative
@@ -51,7 +51,7 @@ def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> Damping
             f"it would need alpha = {alpha:.3g} 1/s and beta = {beta:.3g} s, both at least 0; "
             "bring the two ratios, or the two frequencies, closer together"
         )
-    return Damping(alpha, beta=beta)
+    return NodalDamping(alpha, beta=beta)
 
 
-UNDAMPED = Damping(0.0)
+UNDAMPED = NodalDamping(0.0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.kernel import kernel
+from msm.kinematics import gradient_of
 from msm.laws import tension
 from msm.network import Network
 
@@ -64,18 +65,6 @@ def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -
         force[j, 0] -= pull * rx
         force[j, 1] -= pull * ry
         force[j, 2] -= pull * rz
-
-
-@kernel(inline="always")
-def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float, float, float]:
-    """Mean gradient over a cell of component d of u; corners as in msm.lattice.CORNERS."""
-    u0, u1, u2, u3 = u[cell[0], d], u[cell[1], d], u[cell[2], d], u[cell[3], d]
-    u4, u5, u6, u7 = u[cell[4], d], u[cell[5], d], u[cell[6], d], u[cell[7], d]
-    u01, u23, u45, u67 = u0 + u1, u2 + u3, u4 + u5, u6 + u7
-    x = u45 + u67 - u01 - u23
-    y = u23 + u67 - u01 - u45
-    z = u1 - u0 + u3 - u2 + u5 - u4 + u7 - u6
-    return to_gradient * x, to_gradient * y, to_gradient * z
 
 
 @kernel(inline="always")

@@ -11,7 +11,7 @@ from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
-from msm.linearised import inverted_cells
+from msm.kinematics import inverted_cells
 from study.organ.occupancy import Body
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ EXTRAPOLATION = 0.75
 """How far outside its cell, in spacings, a point may lie before its weights are clamped."""
 
 
-class Lattice(Protocol):
+class LatticeMesh(Protocol):
     """What a model needs to know of its lattice, whatever the cells."""
 
     @property

@@ -1,4 +1,4 @@
-"""Springs and cells one by one at a displaced state: stiffness, bounds on it, inversion.
+"""Springs and cells one by one at a displaced state: stiffness and bounds on it.
 
 A spring of tangent k_t under tension T at length l resists k_t along itself and T / l across it,
 which is negative under compression. A cell resists kappa V [(cof F : G) cof F + (J - 1) dcof F[G]]
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.forces import gradient_of
 from msm.kernel import kernel
+from msm.kinematics import cross, deformation, dot
 from msm.laws import stiffness, tension
 from msm.network import Network
 
@@ -37,28 +37,6 @@ def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     across = net.scale[s] * tension(law, strain) / length
     along = weight * stiffness(law, strain)
     return rx / length, ry / length, rz / length, along, across
-
-
-@kernel(inline="always")
-def cross(a: Any, b: Any) -> Any:
-    """Vector product of two rows."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel(inline="always")
-def deformation(cell: Any, spacing: float, u: Floats) -> Any:
-    """Rows of the mean deformation gradient F of a cell."""
-    to_gradient = 0.25 / spacing
-    xx, xy, xz = gradient_of(cell, u, 0, to_gradient)
-    yx, yy, yz = gradient_of(cell, u, 1, to_gradient)
-    zx, zy, zz = gradient_of(cell, u, 2, to_gradient)
-    return (xx + 1.0, xy, xz), (yx, yy + 1.0, yz), (zx, zy, zz + 1.0)
-
-
-@kernel(inline="always")
-def dot(a: Any, b: Any) -> Any:
-    """Scalar product of two rows."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel()
@@ -96,16 +74,6 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     cofactor = dot(gh, gh) + dot(hf, hf) + dot(fg, fg)
     size = np.sqrt(dot(f, f) + dot(g, g) + dot(h, h))
     return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0) * size
-
-
-@kernel()
-def inverted_cells(cells: NDArray[np.int64], spacing: float, u: Floats) -> int:
-    """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F."""
-    count = 0
-    for c in range(cells.shape[0]):
-        f, g, h = deformation(cells[c], spacing, u)
-        count += 0 if dot(f, cross(g, h)) > 0.0 else 1
-    return count
 
 
 @kernel()

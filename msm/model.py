@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
-from msm.lattice import Lattice
+from msm.lattice import LatticeMesh
 from msm.linearised import largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, critical_time_step
@@ -256,7 +256,7 @@ def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder
 class _Recorder:
     """Writes what is observed into arrays, over what was written there before."""
 
-    def __init__(self, lattice: Lattice, net: Network, observation: Observation) -> None:
+    def __init__(self, lattice: LatticeMesh, net: Network, observation: Observation) -> None:
         self.net, self.lattice = net, lattice
         self.far = FAR * float(np.ptp(lattice.nodes, axis=0).max())
         self.times, self.frames = observation.times, observation.frames

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 if TYPE_CHECKING:
-    from msm.damping import Damping
+    from msm.damping import NodalDamping
     from msm.springs import Springs
     from msm.volume import VolumeTerm
 
@@ -50,7 +50,7 @@ def network(
     foundation: csr_array,
     load: Floats,
     volume: VolumeTerm,
-    damping: Damping,
+    damping: NodalDamping,
     *,
     linear: bool = False,
 ) -> Network:

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from msm.forces import (
     add_foundation_forces,
     add_linear_volume_forces,
-    gradient_of,
     scatter_pressure,
     volume_change,
 )
 from msm.kernel import kernel
+from msm.kinematics import dot, gradient_of
 from msm.laws import stiffness
-from msm.linearised import dot
 from msm.network import Network
 
 Floats = NDArray[np.float64]

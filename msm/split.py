@@ -22,10 +22,10 @@ from msm.forces import (
     add_linear_spring_forces,
     add_spring_forces,
     damping,
-    gradient_of,
     scatter,
 )
 from msm.kernel import kernel
+from msm.kinematics import gradient_of
 from msm.network import Network
 from msm.tangent import Tangent, corner_slope, empty_tangent, linearise_cells
 

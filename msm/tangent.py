@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.forces import gradient_of, scatter
+from msm.forces import scatter
 from msm.kernel import kernel
-from msm.linearised import cross, spring_state
+from msm.kinematics import cross, gradient_of
+from msm.linearised import spring_state
 from msm.network import Network
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.calibration import POISSON_RATIO, lame
-from msm.lattice import CORNERS, CellLattice, Lattice
+from msm.calibration import SPRING_POISSON_RATIO, lame
+from msm.lattice import CORNERS, CellLattice, LatticeMesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,19 +27,23 @@ LARGEST_POISSON_RATIO = 0.4999
 
 @dataclass(frozen=True)
 class VolumeTerm:
-    """Cells (c, 8), their kappa V [J] (c,) and edge [m]; no cells means no volume term."""
+    """Cells (c, 8), their kappa V [J] (c,) and edge [m]; no cells means no volume term.
+
+    `poisson_ratio`: of the material that the springs are with it.
+    """
 
     cells: Ints
     bulk: Floats
     spacing: float
+    poisson_ratio: float
 
 
 def none(spacing: float) -> VolumeTerm:
     """Springs alone."""
-    return VolumeTerm(np.zeros((0, 8), dtype=np.int64), np.zeros(0), spacing)
+    return VolumeTerm(np.zeros((0, 8), dtype=np.int64), np.zeros(0), spacing, SPRING_POISSON_RATIO)
 
 
-def volume_term(lattice: Lattice, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
+def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
     """The term that makes the lattice's springs of modulus mu a material of E [Pa] and nu.
 
     ValueError for a lattice that is not cubic, for a Poisson ratio below 1/4, where kappa is
@@ -50,15 +54,15 @@ def volume_term(lattice: Lattice, youngs_modulus: float, poisson_ratio: float) -
             "springs on tetrahedra have no volume term; leave out lattice.volume_term, or set "
             "lattice.springs to lattice"
         )
-    if not POISSON_RATIO <= poisson_ratio <= LARGEST_POISSON_RATIO:
+    if not SPRING_POISSON_RATIO <= poisson_ratio <= LARGEST_POISSON_RATIO:
         raise ValueError(
-            f"a lattice with a volume term has Poisson ratios from {POISSON_RATIO} to "
+            f"a lattice with a volume term has Poisson ratios from {SPRING_POISSON_RATIO} to "
             f"{LARGEST_POISSON_RATIO}, not {poisson_ratio:g}: below, the term would be negative "
             "and a swollen body gain energy; change tissue.poisson_ratio or leave the term out"
         )
     first, mu = lame(youngs_modulus, poisson_ratio)
     bulk = (first - mu) * lattice.fill * lattice.spacing**3
-    return VolumeTerm(lattice.cells, bulk, lattice.spacing)
+    return VolumeTerm(lattice.cells, bulk, lattice.spacing, poisson_ratio)
 
 
 def divergence(term: VolumeTerm, node_count: int) -> csr_array:

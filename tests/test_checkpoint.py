@@ -11,7 +11,7 @@ from msm import model
 from msm.assembly import Assembly, Material
 from msm.calibration import reference_stiffness
 from msm.checkpoint import Checkpoint
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
 from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, Stepper, critical_time_step, run
@@ -40,7 +40,7 @@ def press(nu=0.25, force=0.5, law=STIFFENING):
     load = np.outer(top / top.sum() * force, [0.2, 0.0, -1.0])
     ground = csr_array(diags_array(np.where(z < 1e-9, E * H, 0.0)))
     body = Assembly(lattice, connect(lattice), RHO * node_volumes(lattice), ground, load)
-    return body, Material(law, volume_term(lattice, E, nu), Damping(4.0))
+    return body, Material(law, volume_term(lattice, E, nu), NodalDamping(4.0))
 
 
 def ramp(times):
@@ -222,7 +222,7 @@ def test_a_state_that_lacks_a_part_is_noticed_by_these_tests(
 
 def other_damping(case):
     body, material = case
-    return body, dataclasses.replace(material, damping=Damping(4.1))
+    return body, dataclasses.replace(material, damping=NodalDamping(4.1))
 
 
 def other_load(case):

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array, eye_array, kron
 from msm import springs as lattice_springs
 from msm import volume as volumes
 from msm.calibration import reference_stiffness
-from msm.damping import UNDAMPED, Damping
+from msm.damping import UNDAMPED, NodalDamping
 from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS, UNBOUNDED, Integrator
 from msm.lattice import build, interpolation, node_volumes
@@ -105,7 +105,7 @@ def ends(name, body, net, duration, counts):
 @pytest.mark.parametrize("name", NEW)
 def test_on_a_lattice_the_integrator_has_the_order_it_declares(name, linear):
     """Against Runge-Kutta with errors a thousand times smaller; damping grows with displacement."""
-    body = Held(nu=0.45, load=0.05, damping=Damping(5.0, 200.0))
+    body = Held(nu=0.45, load=0.05, damping=NodalDamping(5.0, 200.0))
     net = body.arrays(linear)
     duration = 40 * body.critical_step()
     (exact,) = ends("runge-kutta-4", body, net, duration, [2000])
@@ -117,7 +117,7 @@ def test_on_a_lattice_the_integrator_has_the_order_it_declares(name, linear):
 
 def test_split_volume_approaches_symplectic_euler_near_incompressibility():
     """At nu = 0.499 both have order one and differ by less the shorter the step."""
-    body = Held(nu=0.499, damping=Damping(5.0))
+    body = Held(nu=0.499, damping=NodalDamping(5.0))
     net = body.arrays()
     duration = 40 * body.critical_step()
     counts = (100, 200, 400)
@@ -193,7 +193,7 @@ def test_the_springs_do_bound_the_step_of_split_volume():
 )
 def test_at_large_displacements_long_steps_stay_finite(name, times):
     """Bent over by more than a third of a cell; split-volume at the step of springs alone."""
-    body = Held((3, 3, 3), nu=0.499, load=0.1, damping=Damping(5.0))
+    body = Held((3, 3, 3), nu=0.499, load=0.1, damping=NodalDamping(5.0))
     u, v = body.still()
     dt = times * body.critical_step(volume=name != "split-volume")
     march(name, body.law, body.arrays(), dt, 500, u, v)
@@ -274,7 +274,7 @@ def test_relaxation_and_implicit_steps_agree_at_large_displacements():
 @pytest.mark.parametrize("linear", [True, False])
 def test_xpbd_approaches_the_static_solution_with_the_square_of_the_step(linear):
     """Softer than the lattice at rest by some 10 % at the explicit step, and declared so."""
-    body = Held((3, 3, 3), load=0.1, damping=Damping(60.0))
+    body = Held((3, 3, 3), load=0.1, damping=NodalDamping(60.0))
     net = body.arrays(linear)
     rest, _ = relax(body.law, net)
     errors = []
@@ -292,7 +292,7 @@ def test_xpbd_approaches_the_static_solution_with_the_square_of_the_step(linear)
 @pytest.mark.parametrize("nu", [0.45, 0.499])
 def test_split_volume_comes_to_rest_at_the_static_solution(nu):
     """Its loose solver tolerance does not add up: the bound is a tenth of that tolerance."""
-    body = Held((3, 3, 2), nu=nu, damping=Damping(60.0))
+    body = Held((3, 3, 2), nu=nu, damping=NodalDamping(60.0))
     u, v = body.still()
     dt = 0.9 * body.critical_step(volume=False)
     march("split-volume", body.law, body.arrays(linear=True), dt, int(3.0 / dt), u, v)

@@ -7,7 +7,7 @@ import pytest
 
 from msm import model
 from msm.checkpoint import Checkpoint
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.laws import Hooke, Piecewise, initial_stiffness
 from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
 from study.check import describe_scene
@@ -164,7 +164,7 @@ def test_the_report_states_the_slopes_of_a_law_at_rest():
 def test_rayleigh_reaches_springs_and_reference_alike_and_leaves_the_benchmark():
     scene, _, assembly = posed_with(*RAYLEIGH)
     found = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material.damping
-    assert found == Damping(30.0, beta=5e-4)
+    assert found == NodalDamping(30.0, beta=5e-4)
     assert damping_rates(scene) == (30.0, 5e-4)
     table = benchmark(scene, 0.01).material.damping
     assert table == benchmark(scene_with(), 0.01).material.damping
@@ -175,7 +175,7 @@ def test_the_step_is_kept_below_the_limit_that_dashpots_leave(share, status):
     """The limit is a third of the undamped one; negative control: 3 % above it, the run is lost."""
     scene, posed, assembly = posed_with("damping.kind=rayleigh", "damping.stiffness=3 ms")
     material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
-    undamped = dataclasses.replace(material, damping=Damping(0.0))
+    undamped = dataclasses.replace(material, damping=NodalDamping(0.0))
     limit = critical_time_step(assembly, material)
     assert limit < 0.35 * critical_time_step(assembly, undamped)
     interval = 30 * share * limit
@@ -205,7 +205,7 @@ def test_dashpots_slow_what_they_damp_and_not_where_it_comes_to_rest():
     scale = np.abs(weights @ rest).max()
     assert found.trajectory.displacement[-1] == pytest.approx(weights @ rest, abs=1e-3 * scale)
     early = np.abs(found.trajectory.displacement[1]).max()
-    bare = Material(material.law, damping=Damping(40.0))
+    bare = Material(material.law, damping=NodalDamping(40.0))
     faster = model.run(assembly, bare, np.ones_like, posed.observation, linear=True)
     assert early < 0.6 * np.abs(faster.trajectory.displacement[1]).max()
 
@@ -263,7 +263,7 @@ def test_a_run_on_tetrahedra_continues_to_the_same_bits(tmp_path):
     whole = motion(posed, assembly, material)
     assert first[0] > 0
     np.testing.assert_array_equal(resumed.trajectory.displacement, whole.trajectory.displacement)
-    softer = dataclasses.replace(material, damping=Damping(30.0, beta=4e-4))
+    softer = dataclasses.replace(material, damping=NodalDamping(30.0, beta=4e-4))
     with pytest.raises(ValueError, match="state of another run"):
         motion(posed, assembly, softer, checkpoint=kept)
 
@@ -272,7 +272,7 @@ def test_inverted_tetrahedra_of_a_run_are_counted():
     _, posed, assembly = posed_with(TETRAHEDRA)
     material = elastic(assembly.lattice, 200.0, 0.25)
     pressed = dataclasses.replace(assembly, load=40 * assembly.load)
-    found = motion(posed, pressed, dataclasses.replace(material, damping=Damping(50.0)))
+    found = motion(posed, pressed, dataclasses.replace(material, damping=NodalDamping(50.0)))
     assert found.inverted_cells > 0
 
 

@@ -143,7 +143,7 @@ def test_a_collapsed_lattice_has_a_warning_and_no_score(small_scene):
 
 def test_a_stiff_support_on_cut_cells_still_lets_the_lattice_settle(small_scene):
     """Negative control of a former scheme: added inertia held cut cells back by 20 %, unseen."""
-    from msm.damping import Damping
+    from msm.damping import NodalDamping
     from msm.laws import Hooke
     from msm.model import Material, assemble, run, static_displacement
     from study.problem.trajectory import Observation
@@ -155,7 +155,7 @@ def test_a_stiff_support_on_cut_cells_still_lets_the_lattice_settle(small_scene)
     lattice = assemble(
         posed.geometry.body, posed.surface_rule, 1054, 0.01, posed.foundation, posed.tool, 0.2
     )
-    material, none = Material(Hooke(38.0), damping=Damping(300.0)), np.zeros((0, 3))
+    material, none = Material(Hooke(38.0), damping=NodalDamping(300.0)), np.zeros((0, 3))
     watch = Observation(np.linspace(0, 1.0, 17), lattice.lattice.nodes, (16,), none, none)
     found = run(lattice, material, np.ones_like, watch).trajectory
     settled, static = found.displacement[-1], static_displacement(lattice, material)

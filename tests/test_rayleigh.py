@@ -7,7 +7,7 @@ from scipy.sparse import csr_array, eye_array, kron
 
 from msm import volume
 from msm.calibration import reference_stiffness
-from msm.damping import UNDAMPED, Damping, rayleigh
+from msm.damping import UNDAMPED, NodalDamping, rayleigh
 from msm.explicit import symplectic_euler
 from msm.integrators import INTEGRATORS
 from msm.lattice import build, node_volumes
@@ -166,7 +166,7 @@ def test_a_body_turns_on_under_the_stiffness_part_and_stops_under_the_mass_part(
     """Half a second at 2 rad/s: alpha = 4 / s leaves exp(-2) of the spin, any beta all of it."""
     dt, steps = 1e-4, 5000
     left = []
-    for damping in (Damping(0.0, beta=1e-3), Damping(4.0)):
+    for damping in (NodalDamping(0.0, beta=1e-3), NodalDamping(4.0)):
         block = Block(damping, linear=False)
         arm = block.lattice.nodes - block.lattice.nodes.mean(axis=0)
         u, v = np.zeros_like(arm), np.cross([0.0, 0.0, 2.0], arm)
@@ -183,7 +183,7 @@ def test_a_body_turns_on_under_the_stiffness_part_and_stops_under_the_mass_part(
 def test_the_step_limit_is_safe_and_sharp_without_a_mass_part(zeta, alpha, rng):
     """Stable 1 % below, and lost 1 % above if alpha, which only lengthens the step, is zero."""
     omega = Block(held=True).modes()[0][-1]
-    block = Block(Damping(alpha, beta=2 * zeta / omega), held=True)
+    block = Block(NodalDamping(alpha, beta=2 * zeta / omega), held=True)
     limit = longest_step(INTEGRATORS[DEFAULT], omega, 0.0, block.net.beta)
     largest = []
     for share in (0.99, 1.01):

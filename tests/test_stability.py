@@ -10,12 +10,12 @@ from scipy.sparse import csr_array, diags_array
 from msm import stability
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import reference_stiffness
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS, UNBOUNDED
+from msm.kinematics import inverted_cells
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
-from msm.linearised import inverted_cells
 from msm.model import Automatic, Counts, Fixed, Rate, critical_time_step, run
 from msm.springs import Springs, connect
 from msm.stability import Follower, cell_bound, frequency_bound, largest_frequency, longest_step
@@ -255,7 +255,7 @@ def test_divergence_is_seen_within_a_sample_of_many_steps(collapse):
 def test_steps_beyond_a_falling_limit_are_undone():
     """A law that stiffens 25-fold under a blow: the limit falls faster than it is looked at."""
     body, material = column((4, 4, 6), gravity=60.0)
-    material = dataclasses.replace(material, law=STIFFENING, damping=Damping(5.0))
+    material = dataclasses.replace(material, law=STIFFENING, damping=NodalDamping(5.0))
     found = run(body, material, np.ones_like, watch(body, 0.5, 26))
     assert found.trajectory.status == "finished"
     assert found.repeated_steps > 0
@@ -268,7 +268,7 @@ def test_steps_beyond_a_falling_limit_are_undone():
 @pytest.mark.parametrize(("integrator", "order"), [("symplectic-euler", 1), ("velocity-verlet", 2)])
 def test_halving_every_step_of_a_varying_sequence_shows_the_order(integrator, order):
     body, material = column((3, 3, 8), 0.45, gravity=6.0)
-    material = dataclasses.replace(material, damping=Damping(10.0))
+    material = dataclasses.replace(material, damping=NodalDamping(10.0))
     seen = watch(body, 0.2, 11)
 
     def ends(step):

@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 from fem_reference.model import build, static_field
 from msm.calibration import reference_stiffness
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
 from msm.lattice import interpolation
 from msm.laws import Hooke
@@ -280,7 +280,7 @@ def test_the_kernels_bring_a_tetrahedral_net_to_its_static_solution(pressed):
     found = pressed.on_mesh(mesh)
     stiff = found.foundation.diagonal().max()
     found.foundation.data *= 1e2 / stiff  # a soft support, so that the step is that of the springs
-    law, damping = hooke(mesh, E), Damping(40.0)
+    law, damping = hooke(mesh, E), NodalDamping(40.0)
     material = Material(law, None, damping)
     dt = 0.9 * critical_time_step(found, material)
     empty = none(found.lattice.spacing)

@@ -6,7 +6,7 @@ from scipy.sparse import csr_array
 
 from msm import control_point
 from msm.calibration import reference_stiffness
-from msm.damping import Damping, eq_2, eq_9
+from msm.damping import NodalDamping, eq_2, eq_9
 from msm.explicit import symplectic_euler
 from msm.integrators import INTEGRATORS
 from msm.lattice import build, interpolation, node_volumes
@@ -109,7 +109,7 @@ def test_a_wrong_calibration_factor_is_seen():
 def network(springs, mass, volume=None):
     count = len(mass)
     empty, still = csr_array((count, count)), np.zeros((count, 3))
-    return arrays(springs, mass, empty, still, volume or none(H), Damping(0.0))
+    return arrays(springs, mass, empty, still, volume or none(H), NodalDamping(0.0))
 
 
 def advance(law, net, factors, dt, u, v):
@@ -155,7 +155,7 @@ def oscillator(integrator, zeta, steps, duration=1.0):
     omega = 2 * np.pi
     nothing = Springs(np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros(0))
     ground, load = csr_array(omega**2 * np.eye(1)), np.array([[omega**2, 0, 0]])
-    net = arrays(nothing, np.ones(1), ground, load, none(H), Damping(2 * zeta * omega))
+    net = arrays(nothing, np.ones(1), ground, load, none(H), NodalDamping(2 * zeta * omega))
     u, v = np.zeros((2, 1, 3))
     method = INTEGRATORS[integrator]
     factors = np.ones((steps, len(method.at)))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from msm.calibration import POISSON_RATIO
 from msm.damping import eq_9
-from msm.lattice import Lattice as LatticeMesh
+from msm.lattice import LatticeMesh
 from msm.laws import Basafa
 from msm.model import Material
 from study.models.control_point import PointSpring, SpringDashpot
@@ -45,7 +44,7 @@ def _springs(scene: Scene, mesh: LatticeMesh) -> SpringMaterial:
     per_length = (h / h_0) ** 2 / h
     law = Basafa(table.k1 * per_length, table.k2 * per_length, table.x_c)
     damping = eq_9(table.gamma_0, table.gamma_1, reference_mass(scene))
-    return SpringMaterial(_modulus(scene), POISSON_RATIO, Material(law, damping=damping))
+    return SpringMaterial(_modulus(scene), Material(law, damping=damping))
 
 
 def _modulus(scene: Scene) -> float:

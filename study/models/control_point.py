@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from msm import control_point
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.laws import Law, initial_stiffness
 from study.models.errors import place
 from study.models.model import ModelRun, Watch
@@ -23,7 +23,7 @@ class SpringDashpot:
     """Law of the spring, damping of the point, and Young's modulus [Pa] that they stand for."""
 
     law: Law
-    damping: Damping
+    damping: NodalDamping
     modulus: float | None = None
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from msm.calibration import POISSON_RATIO, reference_stiffness
-from msm.damping import Damping, eq_2
+from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
+from msm.damping import NodalDamping, eq_2
 from study.problem.damping import RayleighDamping
 from study.scene import Scene
 
@@ -14,20 +14,20 @@ def reference_damping(scene: Scene) -> RayleighDamping:
     return RayleighDamping(found.gamma_0, found.beta)
 
 
-def nodal_damping(scene: Scene, modulus: float) -> Damping:
+def nodal_damping(scene: Scene, modulus: float) -> NodalDamping:
     """Rayleigh's damping, or eq. (2) for springs of a modulus [Pa].
 
     Eq. (2) is taken for a node at the reference spacing, so that h does not change it.
     """
     if scene.damping.kind == "rayleigh":
-        return Damping(scene.damping.mass, beta=scene.damping.stiffness)
+        return NodalDamping(scene.damping.mass, beta=scene.damping.stiffness)
     k = reference_stiffness(modulus, scene.damping.reference_spacing, lattice_poisson_ratio(scene))
     return eq_2(scene.damping.ratio, k, reference_mass(scene))
 
 
 def lattice_poisson_ratio(scene: Scene) -> float:
     """Poisson ratio of the lattices that are tuned: the tissue's with a volume term, else 1/4."""
-    return scene.tissue.poisson_ratio if scene.lattice.volume_term else POISSON_RATIO
+    return scene.tissue.poisson_ratio if scene.lattice.volume_term else SPRING_POISSON_RATIO
 
 
 def reference_mass(scene: Scene) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from msm import model as msm
 from msm import tetrahedra
 from msm.integrators import INTEGRATORS
-from msm.lattice import Lattice as LatticeMesh
+from msm.lattice import LatticeMesh
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
 from msm.stepper import Stepper as LatticeStepper
 from msm.timestep import whole_steps
@@ -34,10 +34,9 @@ MASS_LIMIT = 0.05
 
 @dataclass(frozen=True)
 class SpringMaterial:
-    """What springs are made of: modulus [Pa] and Poisson ratio at small strain, material."""
+    """What springs are made of: Young's modulus [Pa] at small strain, and the material."""
 
     modulus: float
-    poisson_ratio: float
     material: Material
 
 
@@ -288,7 +287,7 @@ class PreparedLattice:
         """None where the mesh decides, and not the springs."""
         if self.model.lattice.springs == "tetrahedra":
             return None
-        return self.springs.poisson_ratio
+        return self.springs.material.poisson_ratio
 
     def _node_mass(self) -> float:
         """Of an inner node of the cubic lattice, or the mean of a mesh [kg]."""

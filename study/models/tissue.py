@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-from msm.calibration import POISSON_RATIO, reference_stiffness
-from msm.lattice import Lattice as LatticeMesh
+from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
+from msm.lattice import LatticeMesh
 from msm.laws import Hooke, Law, initial_stiffness
 from msm.model import Material
 from msm.volume import volume_term
@@ -20,18 +20,17 @@ from study.scene import Scene
 
 def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> SpringMaterial:
     """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""
-    nu = lattice_poisson_ratio(scene)
-    linear = elastic(mesh, modulus, nu)
+    linear = elastic(mesh, modulus, lattice_poisson_ratio(scene))
     k = initial_stiffness(linear.law)
     law = spring_law(scene, k)
     material = replace(linear, law=law, damping=nodal_damping(scene, modulus))
-    return SpringMaterial(modulus * (initial_stiffness(law) / k), nu, material)
+    return SpringMaterial(modulus * (initial_stiffness(law) / k), material)
 
 
 def elastic(mesh: LatticeMesh, modulus: float, nu: float) -> Material:
     """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
     law = Hooke(reference_stiffness(modulus, mesh.spacing, nu))
-    return Material(law, volume_term(mesh, modulus, nu) if nu > POISSON_RATIO else None)
+    return Material(law, volume_term(mesh, modulus, nu) if nu > SPRING_POISSON_RATIO else None)
 
 
 def spring_law(scene: Scene, k: float) -> Law:

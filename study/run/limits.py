@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.calibration import POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO
 from study.models.finite_elements import PreparedElements
 from study.models.model import Prepared
 from study.models.tissue import models
@@ -33,9 +33,9 @@ def lattice_limits(
     volumes, nu = problem.volume_rule.weights, problem.tissue.poisson_ratio
     with progress.stage("limits of the lattice at rest"):
         spacing, field = _at_rest(scene, problem, volume_term=False)
-        truth, quarter = reference.rest(), reference.rest_at(POISSON_RATIO)
+        truth, quarter = reference.rest(), reference.rest_at(SPRING_POISSON_RATIO)
     factor = best_factor(field, truth, volumes)
-    can_have_term = nu > POISSON_RATIO and scene.lattice.springs == "lattice"
+    can_have_term = nu > SPRING_POISSON_RATIO and scene.lattice.springs == "lattice"
     return LatticeLimits(
         spacing_m=spacing,
         poisson_ratio=nu,

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
+from msm.calibration import SPRING_POISSON_RATIO
 from study.quantity import Quantity
 from study.scene import Lattice, Scene, SpringLaw
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 BUILT_IN = ("liver", "block", "paper")
 MAX_BYTES = 65_536
 MAX_LINE = 1_000
-SPRINGS_POISSON_RATIO = 0.25
 _ON_POINT = ("basafa", "msm")
 _OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
 # What a scene without a mesh cannot use.
@@ -257,9 +257,9 @@ def _lattice_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str
         yield from _mesh_springs_contradictions(lattice, table)
     if lattice.law is not None:
         yield from _law_contradictions(scene, lattice.law)
-    if lattice.volume_term and nu < SPRINGS_POISSON_RATIO:
+    if lattice.volume_term and nu < SPRING_POISSON_RATIO:
         yield (
-            f"lattice.volume_term: needs tissue.poisson_ratio of {SPRINGS_POISSON_RATIO} or more, "
+            f"lattice.volume_term: needs tissue.poisson_ratio of {SPRING_POISSON_RATIO} or more, "
             f"not {nu:g}; leave it out or raise the ratio"
         )
     if _has(table, ("lattice", "integrator")):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from msm.calibration import POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO
 from msm.integrators import INTEGRATORS
 from msm.stability import DEFAULT
 from study.models.model import Model
@@ -41,7 +41,7 @@ class Contender:
 
 def lacks_poisson_ratio(scene: Scene) -> bool:
     """Whether the tissue's Poisson ratio is one that springs alone do not have."""
-    return scene.tissue.poisson_ratio > POISSON_RATIO
+    return scene.tissue.poisson_ratio > SPRING_POISSON_RATIO
 
 
 def lattice_settings(scene: Scene, times: float, **more: str | float | bool) -> Settings:

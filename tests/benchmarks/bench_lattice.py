@@ -33,7 +33,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import reference_stiffness
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
 from msm.forces import add_spring_forces
 from msm.lattice import CORNERS, CellLattice, node_volumes
@@ -155,7 +155,7 @@ def free(lattice: CellLattice, *, with_volume: bool = True) -> Network:
         csr_array((count, count)),
         np.zeros((count, 3)),
         volume_term(lattice, MODULUS, 0.45),
-        Damping(600.0),
+        NodalDamping(600.0),
     )
     return net if with_volume else net._replace(cells=net.cells[:0], bulk=net.bulk[:0])
 

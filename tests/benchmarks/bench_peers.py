@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
 from msm.integrators import INTEGRATORS
 from msm.lattice import CellLattice, interpolation
@@ -135,7 +135,7 @@ def block(case: field_error.Case, spacing: float, nu: float, *, with_volume: boo
     mass = np.where(held, IMMOVABLE, found.mass)
     free = csr_array((len(held), len(held)))
     term = material.volume or none(spacing)
-    net = network(found.springs, mass, free, LOAD * found.load, term, Damping(DAMPING))
+    net = network(found.springs, mass, free, LOAD * found.load, term, NodalDamping(DAMPING))
     return Block(nu, case.youngs_modulus, found.lattice, material.law, net, held)  # type: ignore[arg-type]
 
 

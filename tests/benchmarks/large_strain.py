@@ -30,7 +30,7 @@ from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import lame
-from msm.lattice import CORNERS, CellLattice, Lattice, node_volumes
+from msm.lattice import CORNERS, CellLattice, LatticeMesh, node_volumes
 from msm.relaxation import relax
 from msm.statics import static_displacement
 from study.mesh.quadrature import over_volume
@@ -103,7 +103,7 @@ def at_rest(assembly: Assembly, matter: Material, load: float, start: Floats) ->
     return u
 
 
-def largest_strain(cells: Lattice, u: Floats) -> float:
+def largest_strain(cells: LatticeMesh, u: Floats) -> float:
     """Largest |principal stretch - 1| of the mean deformation of the cells."""
     slopes = (2.0 * CORNERS - 1.0) / (4.0 * cells.spacing)
     gradient = np.eye(3) + np.einsum("cad,ae->cde", u[cells.cells], slopes)

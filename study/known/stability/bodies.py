@@ -10,8 +10,8 @@ from scipy.sparse import csr_array, diags_array
 
 from msm import lattice as cells
 from msm.assembly import Assembly, Material
-from msm.calibration import reference_stiffness
-from msm.damping import UNDAMPED, Damping
+from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
+from msm.damping import UNDAMPED, NodalDamping
 from msm.laws import Hooke
 from msm.springs import connect
 from msm.volume import volume_term
@@ -58,7 +58,7 @@ class Make:
     density: float = 1054.0
     gravity: float = 0.0
     held: bool = True
-    damping: Damping = UNDAMPED
+    damping: NodalDamping = UNDAMPED
 
 
 def lattice_of(make: Make, body: Boxes | None = None) -> tuple[Assembly, Material]:
@@ -76,7 +76,8 @@ def lattice_of(make: Make, body: Boxes | None = None) -> tuple[Assembly, Materia
 
 def _material(make: Make, lattice: cells.CellLattice) -> Material:
     nu = make.poisson_ratio
-    law = Hooke(reference_stiffness(make.youngs_modulus, make.spacing, 0.25 if nu is None else nu))
+    of_law = SPRING_POISSON_RATIO if nu is None else nu
+    law = Hooke(reference_stiffness(make.youngs_modulus, make.spacing, of_law))
     term = None if nu is None else volume_term(lattice, make.youngs_modulus, nu)
     return Material(law, term, make.damping)
 

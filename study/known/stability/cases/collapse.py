@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.laws import initial_stiffness
 from msm.model import Automatic, Fixed, Run, Step, critical_time_step, run
 from msm.network import Network
@@ -101,7 +101,7 @@ def fall(integrator: str, nu: float | None, weights: float) -> Finding:
     then loses it at the same time.
     """
     gravity = 9.81 * weights
-    make = Make(counts=(3, 3, 5), poisson_ratio=nu, gravity=gravity, damping=Damping(RATE))
+    make = Make(counts=(3, 3, 5), poisson_ratio=nu, gravity=gravity, damping=NodalDamping(RATE))
     assembly, material = lattice_of(make)
     size = float(np.ptp(assembly.lattice.nodes, axis=0).max())
     interval = min(SECONDS, FALLS * float(np.sqrt(2.0 * size / gravity))) / (SAMPLES - 1)

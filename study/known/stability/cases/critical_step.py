@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from msm.assembly import arrays
-from msm.damping import Damping, eq_2
+from msm.damping import NodalDamping, eq_2
 from msm.integrators import INTEGRATORS, UNBOUNDED
 from msm.laws import Basafa, initial_stiffness
 from msm.model import critical_time_step
@@ -90,7 +90,7 @@ def damped(integrator: str, zeta: float, beta: float = 0.0) -> Finding:
     make = Make()
     assembly, material = lattice_of(make)
     c = eq_2(zeta, initial_stiffness(material.law), make.density * make.spacing**3).gamma_0
-    material = replace(material, damping=Damping(c, beta=beta))
+    material = replace(material, damping=NodalDamping(c, beta=beta))
     followed = critical_time_step(assembly, material, integrator)
     sharp = sharp_limit(integrator, frequencies(assembly, material), c, beta)
     measured = _measured(assembly, material, integrator, sharp)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from msm import control_point
 from msm.assembly import arrays
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.integrators import INTEGRATORS
 from msm.laws import Hooke
 from study.known.stability.bodies import Make, lattice_of
@@ -61,7 +61,7 @@ def rings(which: str, by_mass: float, by_stiffness: float) -> Finding:
     omegas, vectors = shapes(assembly, material)
     index = 0 if which == "slowest" else -1
     omega, mode = float(omegas[index]), vectors[:, index].reshape(-1, 3)
-    damping = Damping(2.0 * by_mass * omega, beta=2.0 * by_stiffness / omega)
+    damping = NodalDamping(2.0 * by_mass * omega, beta=2.0 * by_stiffness / omega)
     net = arrays(assembly, replace(material, damping=damping), linear=True)
     dt, method = STEP / omega, INTEGRATORS["symplectic-euler"]
     per_look = round(2.0 * np.pi * PERIODS / (LOOKS * STEP))
@@ -78,7 +78,7 @@ def pushed(zeta: float) -> Finding:
     k, mass, force = 20.0, 1e-3, 1e-4
     omega = float(np.sqrt(k / mass))
     times = np.linspace(0.0, 2.0 * np.pi * PERIODS / omega, LOOKS)
-    damping = Damping(2.0 * zeta * omega)
+    damping = NodalDamping(2.0 * zeta * omega)
     found = control_point.run(Hooke(k), 1.0, mass, damping, lambda _: force, times)
     return beside(1.0 - released(omega, zeta, times), found.displacement[:, 0, 0] * k / force)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import lame
-from msm.damping import Damping
+from msm.damping import NodalDamping
 from msm.integrators import INTEGRATORS
 from msm.laws import initial_stiffness
 from msm.model import critical_time_step, run
@@ -145,7 +145,7 @@ def _moved(size: float) -> Floats:
         spacing=size / 3.0,
         poisson_ratio=0.45,
         gravity=0.5 / size,
-        damping=Damping(0.5 / size),
+        damping=NodalDamping(0.5 / size),
     )
     assembly, material = lattice_of(make)
     seen = watch(assembly, 5.0 * size, 11)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays
-from msm.damping import UNDAMPED, Damping
+from msm.damping import UNDAMPED, NodalDamping
 from msm.integrators import INTEGRATORS
 from msm.laws import initial_stiffness
 from msm.model import Fixed, critical_time_step, run
@@ -90,7 +90,7 @@ def to_rest(times: float, *, linear: bool) -> Finding:
 
 def to_rest_by_position(times: float) -> Finding:
     """Position-based dynamics in short steps, damped until nothing moves."""
-    assembly, material = _loaded(Damping(60.0))
+    assembly, material = _loaded(NodalDamping(60.0))
     u, _ = _march("xpbd", assembly, material, times, 60_000, linear=True)
     return beside(static_displacement(assembly, material), u)
 
@@ -110,7 +110,7 @@ def softened(times: float, *, linear: bool) -> Finding:
 
     The bound is the static work over the least share of a force that is given back.
     """
-    assembly, material = _loaded(Damping(20.0))
+    assembly, material = _loaded(NodalDamping(20.0))
     net = arrays(assembly, material, linear=linear)
     u, _ = _march("xpbd", assembly, material, times, 4000, linear=linear)
     rest = static_displacement(assembly, material)
@@ -148,7 +148,7 @@ def _ending(found: Trajectory) -> Ending:
     return "diverged" if found.status == "diverged" else "bounded"
 
 
-def _loaded(damping: Damping = UNDAMPED) -> tuple[Assembly, Material]:
+def _loaded(damping: NodalDamping = UNDAMPED) -> tuple[Assembly, Material]:
     """A block under a tenth of its own weight, at nu 0.45."""
     return lattice_of(Make(poisson_ratio=0.45, gravity=1.0, damping=damping))
 
