@@ -1,1 +1,11 @@
-"""What a study found, on disk and in memory."""
+"""What a study found, on disk and in memory.
+
+>>> results = Results.load("results/block")
+>>> motion = results.curve("msm-mamdani", "tool")
+>>> plt.plot(motion.time, motion.displacement)
+"""
+
+from study.results.folder import Results, ResultsError
+from study.results.records import ModelRecord, StudyRecord
+
+__all__ = ["ModelRecord", "Results", "ResultsError", "StudyRecord"]

@@ -10,58 +10,45 @@ MODEL.vtkhdf    motion of all nodes, if asked for
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+import tomllib
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study import folders
+from study.problem.response import Motion
+from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
+from study.results.tables import (
+    BandSample,
+    CurveSample,
+    FieldDifference,
+    SensitivityEntry,
+    SimilarityScore,
+    read_table,
+    write_table,
+)
+from study.scene.file import validate, write_scene
+from study.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 Floats = NDArray[np.float64]
+Arrays = dict[str, NDArray[Any]]
 
-SCHEMA_VERSION = 1
 MARK = "results.json"
-TABLES: dict[str, tuple[str, ...]] = {
-    "curves": ("model", "probe", "time_s", "displacement_m", "velocity_m_per_s"),
-    "bands": (
-        "model",
-        "probe",
-        "time_s",
-        "displacement_at_lower_m",
-        "displacement_at_upper_m",
-        "velocity_at_lower_m_per_s",
-        "velocity_at_upper_m_per_s",
-    ),
-    "similarity": ("model", "reference", "probe", "curve", "measure", "score"),
-    "errors": ("model", "reference", "quantity", "value"),
-    "sensitivity": (
-        "choice",
-        "base",
-        "alternative",
-        "system",
-        "change_at_readings_pa",
-        "rms_change_pa",
-        "largest_change_pa",
-        "readings",
-    ),
-}
-TEXT_COLUMNS = {
-    *("model", "probe", "reference", "curve", "measure", "quantity"),
-    *("choice", "base", "alternative", "system"),
-}
 FILES = {
     *(MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", "export"),
-    *(f"{name}.csv" for name in TABLES),
+    *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
 }
 OURS, FIELDS = ".report.pdf", ".vtkhdf"
-Row = tuple[str | float, ...]
 
 
 class ResultsError(ValueError):
@@ -72,48 +59,103 @@ class ResultsError(ValueError):
 class Results:
     """Content of a results folder.
 
-    `scene`: its TOML text; `numbers`: results.json; `tables`: rows by table name as in TABLES;
-    `arrays`: arrays to draw, by file stem and name.
+    `record`: the numbers; then the rows of the tables. `fields`: arrays of the surface and of each
+    model's displacement on it, `fuzzy`: sets and output surfaces, both to be drawn and empty where
+    a scene has none.
     """
 
-    scene: str
-    numbers: dict[str, Any]
-    tables: dict[str, list[Row]]
-    arrays: dict[str, dict[str, NDArray[Any]]]
+    scene: Scene
+    record: StudyRecord
+    curves: tuple[CurveSample, ...] = ()
+    bands: tuple[BandSample, ...] = ()
+    scores: tuple[SimilarityScore, ...] = ()
+    field_differences: tuple[FieldDifference, ...] = ()
+    sensitivity: tuple[SensitivityEntry, ...] = ()
+    fields: Arrays = field(default_factory=dict)
+    fuzzy: Arrays = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Results:
+        """Content of a folder. ResultsError if it holds no results, or those of another version."""
+        return read(Path(folder))
+
+    def model(self, name: str) -> ModelRecord:
+        """Record of a model. KeyError with the names there are."""
+        for record in self.record.models:
+            if record.name == name:
+                return record
+        raise KeyError(f"{name}: not among {', '.join(one.name for one in self.record.models)}")
+
+    def curve(self, model: str, probe: str) -> Motion:
+        """Time [s], displacement [m] and velocity [m/s] along the push, (samples,) each.
+
+        Samples that a diverged run lost are missing. KeyError for a model or probe that there is
+        not.
+        """
+        self.model(model)
+        if probe not in self.record.probes:
+            raise KeyError(f"{probe}: not among {', '.join(self.record.probes)}")
+        rows = [row[2:] for row in self.curves if row.model == model and row.probe == probe]
+        return Motion(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
 def write(results: Results, folder: Path) -> None:
     """Write the files of a results folder into an empty folder; see `replacing`."""
-    (folder / "scene.toml").write_text(results.scene, encoding="utf-8")
-    text = json.dumps(results.numbers, indent=1, allow_nan=False)
+    (folder / "scene.toml").write_text(write_scene(results.scene), encoding="utf-8")
+    plain = _adapter().dump_python(results.record, mode="json")
+    text = json.dumps(plain, indent=1, allow_nan=False)
     (folder / MARK).write_text(text + "\n", encoding="utf-8")
-    for name, header in TABLES.items():
-        _write_table(folder / f"{name}.csv", header, results.tables.get(name, []))
-    for stem, arrays in results.arrays.items():
-        np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
+    write_table(folder / "curves.csv", CurveSample, results.curves)
+    write_table(folder / "bands.csv", BandSample, results.bands)
+    write_table(folder / "similarity.csv", SimilarityScore, results.scores)
+    write_table(folder / "errors.csv", FieldDifference, results.field_differences)
+    write_table(folder / "sensitivity.csv", SensitivityEntry, results.sensitivity)
+    for stem, arrays in (("fields", results.fields), ("fuzzy", results.fuzzy)):
+        if arrays:
+            np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
 
 
 def read(folder: Path) -> Results:
     """Read a results folder. ResultsError if it is none, or of another version."""
     try:
-        numbers = json.loads((folder / MARK).read_text(encoding="utf-8"))
-        scene = (folder / "scene.toml").read_text(encoding="utf-8")
-        tables = {name: list(_read_table(folder / f"{name}.csv", name)) for name in TABLES}
-        arrays = {path.stem: _read_arrays(path) for path in sorted(folder.glob("*.npz"))}
+        table = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        _check_version(folder, table)
+        scene = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
+        return Results(
+            validate(scene, "scene.toml"),
+            _adapter().validate_python(table),
+            read_table(folder / "curves.csv", CurveSample),
+            read_table(folder / "bands.csv", BandSample),
+            read_table(folder / "similarity.csv", SimilarityScore),
+            read_table(folder / "errors.csv", FieldDifference),
+            read_table(folder / "sensitivity.csv", SensitivityEntry),
+            _read_arrays(folder / "fields.npz"),
+            _read_arrays(folder / "fuzzy.npz"),
+        )
     except FileNotFoundError as error:
         missing = Path(error.filename).name
         raise ResultsError(
             f"{folder}: no results here ({missing} is missing); make some with liver-study run"
         ) from None
+    except ResultsError:
+        raise
     except (OSError, ValueError) as error:
         raise ResultsError(f"{folder}: damaged results: {error}") from None
-    version = numbers.get("schema_version")
+
+
+def _adapter() -> TypeAdapter[StudyRecord]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(StudyRecord)
+
+
+def _check_version(folder: Path, table: object) -> None:
+    version = table.get("schema_version") if isinstance(table, dict) else None
     if version != SCHEMA_VERSION:
         raise ResultsError(
             f"{folder}: results of schema {version}, this program reads {SCHEMA_VERSION}; "
             "run the scene again"
         )
-    return Results(scene, numbers, tables, arrays)
 
 
 def replacing(folder: Path) -> AbstractContextManager[Path]:
@@ -147,30 +189,9 @@ def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
             state.rmdir()  # where nothing was kept
 
 
-def _write_table(path: Path, header: Sequence[str], rows: Iterable[Row]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows([_cell(value) for value in row] for row in rows)
-
-
-def _cell(value: str | float) -> str:
-    return value if isinstance(value, str) else f"{value:.12g}"
-
-
-def _read_table(path: Path, name: str) -> Iterator[Row]:
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.reader(file)
-        header = tuple(next(reader, ()))
-        if header != TABLES[name]:
-            raise ValueError(f"{path.name} has columns {', '.join(header)}")
-        for row in reader:
-            yield tuple(
-                text if column in TEXT_COLUMNS else float(text)
-                for column, text in zip(header, row, strict=True)
-            )
-
-
-def _read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+def _read_arrays(path: Path) -> Arrays:
+    """Arrays of a file, none if it is missing: a single point has no fields."""
+    if not path.exists():
+        return {}
     with np.load(path, allow_pickle=False) as file:
         return {name: file[name] for name in file.files}

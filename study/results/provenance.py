@@ -8,7 +8,8 @@ import shutil
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+
+from study.results.records import Provenance
 
 PACKAGES = (
     "liver-study",
@@ -23,23 +24,20 @@ PACKAGES = (
     "similaritymeasures",
     "typst",
 )
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
-def provenance(scene: str, mesh: str | None) -> dict[str, Any]:
-    """Versions, commit, platform, and hashes of the scene and of its mesh file.
-
-    The study draws no random numbers: `seed` is null.
-    """
-    return {
-        "versions": {"python": platform.python_version()} | {p: _version(p) for p in PACKAGES},
-        "commit": _commit(),
-        "platform": platform.platform(),
-        "processor": _processor(),
-        "seed": None,
-        "scene_sha256": hashlib.sha256(scene.encode()).hexdigest(),
-        "mesh_sha256": hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None,
-    }
+def provenance(scene: str, mesh: str | None) -> Provenance:
+    """Versions, commit, platform, and hashes of the scene and of its mesh file."""
+    return Provenance(
+        versions={"python": platform.python_version()} | {p: _version(p) for p in PACKAGES},
+        commit=_commit(),
+        platform=platform.platform(),
+        processor=_processor(),
+        seed=None,
+        scene_sha256=hashlib.sha256(scene.encode()).hexdigest(),
+        mesh_sha256=hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None,
+    )
 
 
 def _version(package: str) -> str | None:

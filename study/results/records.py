@@ -1,0 +1,315 @@
+"""What results.json says, as frozen records that writer and readers share.
+
+Numbers are in SI units, errors relative in the L2 norm unless a name says otherwise; None where a
+model has no such number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SCHEMA_VERSION = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveErrors:
+    """Relative L2 errors of the two curves of a control point."""
+
+    displacement: float
+    velocity: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveOrders:
+    """Observed orders of convergence of the two curves of a control point."""
+
+    displacement: float | None
+    velocity: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A number that passes at or below its limit, and what it means."""
+
+    name: str
+    value: float
+    limit: float
+    meaning: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is within its limit; one that is not a number is not."""
+        return self.value <= self.limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshLevel:
+    """One mesh of a reference; `size` of its elements is relative to the finest."""
+
+    size: float
+    elements: int
+    unknowns: int
+    wall_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshError:
+    """Estimated discretisation error on the finest mesh.
+
+    `field_peak`: of the field at the peak; the rest by control point. `formal_order` of the element
+    bounds the orders that the estimate takes.
+    """
+
+    field_peak: float
+    field_order: float | None
+    formal_order: float
+    by_probe: dict[str, CurveErrors]
+    order_by_probe: dict[str, CurveOrders]
+
+    @property
+    def worst(self) -> CurveErrors:
+        """The largest of any control point."""
+        return largest(self.by_probe)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargeStrain:
+    """What a hyperelastic solid at rest does otherwise than the linear one on the same mesh."""
+
+    law: str
+    field_difference: float
+    largest_strain: float
+    unknowns: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElementsRecord:
+    """What only finite elements have.
+
+    `subspace_vectors` and `truncation_error` are those of a superposition; `accuracy_missed`: the
+    accuracy that was asked for and not reached.
+    """
+
+    element: str
+    elements: int
+    unknowns: int
+    method: str
+    subspace_vectors: int | None = None
+    truncation_error: float | None = None
+    largest_rotation_rad: float = 0.0
+    levels: tuple[MeshLevel, ...] = ()
+    mesh_error: MeshError | None = None
+    accuracy_missed: float | None = None
+    large_strain: LargeStrain | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeRecord:
+    """What only a lattice of springs has.
+
+    `smallest_step_margin`: smallest ratio of the critical step to the step taken; `poisson_ratio`:
+    None where the mesh decides it.
+    """
+
+    springs: int
+    integrator: str
+    poisson_ratio: float | None
+    smallest_time_step_s: float
+    smallest_step_margin: float | None
+    repeated_steps: int
+    node_mass_kg: float
+    inverted_cells: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointRecord:
+    """What only a single control mass point has."""
+
+    stiffness_n_per_m: float
+    mass_kg: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelRecord:
+    """What a run says of every model, and in `elements`, `lattice` or `point` of its kind.
+
+    `label`: its name in print; `system`: the fuzzy system whose estimate it was given;
+    `small_strain_modulus_pa`: Young's modulus it has at small strain; `time_step_errors`: by
+    control point, empty where they are not estimated.
+    """
+
+    name: str
+    label: str
+    simulated_s: float
+    status: str
+    diverged_at_s: float | None = None
+    diverged_near_m: tuple[float, float, float] | None = None
+    system: str | None = None
+    nodes: int | None = None
+    time_step_s: float | None = None
+    critical_time_step_s: float | None = None
+    steps: int | None = None
+    wall_s: float | None = None
+    small_strain_modulus_pa: float | None = None
+    damping_rate_per_s: float | None = None
+    stiffness_damping_s: float | None = None
+    largest_strain: float | None = None
+    time_step_errors: dict[str, CurveErrors]
+    elements: ElementsRecord | None = None
+    lattice: LatticeRecord | None = None
+    point: PointRecord | None = None
+
+    @property
+    def parts(self) -> int | None:
+        """Number of finite elements or of springs."""
+        if self.elements is not None:
+            return self.elements.elements
+        if self.lattice is not None:
+            return self.lattice.springs
+        return None if self.point is None else 1
+
+    @property
+    def mesh_error(self) -> MeshError | None:
+        """Estimated discretisation error, None where there is none or it is not estimated."""
+        return None if self.elements is None else self.elements.mesh_error
+
+    @property
+    def time_step_error(self) -> CurveErrors | None:
+        """The largest of any control point by the time step, None where it is not estimated."""
+        return largest(self.time_step_errors) if self.time_step_errors else None
+
+    @property
+    def inverted_cells(self) -> int:
+        """How many cells of a lattice turned inside out, zero of other models."""
+        return 0 if self.lattice is None else self.lattice.inverted_cells
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether its motion means something: it finished, and nothing turned inside out."""
+        return self.status == "finished" and not self.inverted_cells
+
+
+def largest(errors: dict[str, CurveErrors]) -> CurveErrors:
+    """The largest errors of any control point."""
+    return CurveErrors(
+        displacement=max(one.displacement for one in errors.values()),
+        velocity=max(one.velocity for one in errors.values()),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystemEstimate:
+    """Stiffness that one fuzzy system estimates; `interval_pa` of type-2 only."""
+
+    estimate_pa: float
+    relative_to_reference: float
+    quadrature_error_pa: float
+    method: str
+    notes: tuple[str, ...]
+    interval_pa: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessSet:
+    """A linguistic set of stiffness, with the elastography it is placed by [kPa] and its source."""
+
+    aetiology: str
+    stage: str
+    severity: str
+    placement: str
+    centre: float
+    centre_source: str
+    within_stage_sd: float
+    sd_kind: str
+    sd_source: str
+    between_study: float
+    between_study_kind: str
+    between_study_source: str
+    between_operator: float
+    between_operator_kind: str
+    between_operator_source: str
+    n: int | None
+    sourced: str
+    note: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FuzzyRecord:
+    """What the fuzzy systems were and found; empty for a scene without them."""
+
+    systems: dict[str, SystemEstimate]
+    rule_count: int | None = None
+    stiffness_sets: tuple[StiffnessSet, ...] = ()
+    surface_inputs: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeLimits:
+    """What springs cannot do at rest, whatever stiffness they are given.
+
+    Relative L2 differences of the field from the reference: with its modulus, against a reference
+    of Poisson ratio 1/4, at the best factor on the field, and with a volume term.
+    """
+
+    spacing_m: float
+    poisson_ratio: float
+    relative_l2_at_quarter: float
+    relative_l2: float
+    best_factor: float
+    relative_l2_at_best_factor: float
+    relative_l2_with_volume_term: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dimensionless:
+    """Size of the organ, and numbers that show a mistaken unit before anything is run."""
+
+    extent_m: float
+    volume_m3: float
+    sag_rho_g_l_over_e: float
+    tool_pressure_over_e: float
+    tool_radius_over_spacing: float
+    tool_radius_over_element_size: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlPoint:
+    """Mass and spring of a scene that is a single point."""
+
+    mass_kg: float
+    rest_length_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """What made the results; the study draws no random numbers, so `seed` is None."""
+
+    versions: dict[str, str | None]
+    commit: str | None
+    platform: str
+    processor: str | None
+    seed: int | None
+    scene_sha256: str
+    mesh_sha256: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyRecord:
+    """The whole of results.json."""
+
+    title: str
+    probes: tuple[str, ...]
+    fuzzy: FuzzyRecord
+    models: tuple[ModelRecord, ...]
+    checks: tuple[Check, ...]
+    warnings: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    notes: tuple[str, ...]
+    strain_limit: float
+    study_wall_s: float | None
+    provenance: Provenance
+    dimensionless: Dimensionless | None = None
+    lattice_limits: LatticeLimits | None = None
+    control_point: ControlPoint | None = None
+    schema_version: int = SCHEMA_VERSION
