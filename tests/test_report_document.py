@@ -250,7 +250,7 @@ def with_toy(results: Results, **changes) -> Results:
 
 
 def test_a_model_that_the_report_does_not_know_is_legible_everywhere(tmp_path):
-    """Under its label, in a look of its own, and with a name that sorts before none it knows."""
+    """Under its label and in a look of its own."""
     results = with_toy(results_of(), system=None)
     content, seen = document(results), looks(results)
     for rows in (content["glance"]["rows"], content["models"], content["numerics"]):
@@ -262,6 +262,7 @@ def test_a_model_that_the_report_does_not_know_is_legible_everywhere(tmp_path):
     assert not any(TOY in sentence for sentence in content["summary"])
     others = [look for name, look in seen.items() if name != TOY]
     assert seen[TOY].colour not in {look.colour for look in others}
+    assert "Toy model" in [one.look.label for one in motion_figures.motions(results, "tool")]
     assert "Toy model" in [panel.title for panel in views(results).sheets[0].panels]
     assert "Toy model, at the peak" in [bar.name for bar in bars(results)]
     assert pdf_of(results, tmp_path / "a")

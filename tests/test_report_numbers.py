@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from reports.appearance import LOOKS, looks
@@ -22,7 +23,7 @@ from reports.digits import (
     words,
 )
 from reports.fuzzy_figures import SET_LOOKS
-from reports.motion_figures import peak
+from reports.motion_figures import motions, peak
 from reports.paper import TABLE_III, TABLE_III_SPREAD
 from reports.ranking import leads, tool_probe
 from reports.summary import glance, sentences
@@ -307,6 +308,18 @@ def test_the_peak_is_that_of_the_curve():
     samples = [row.displacement_m for row in results.curves if row[:2] == ("fem", "tool")]
     assert peak(results, "fem", "tool") == max(samples)
     assert peak(replace(results, curves=()), "fem", "tool") is None
+
+
+def test_curves_are_drawn_in_millimetres_between_the_bounds_of_an_interval():
+    """The samples' softer bound moves 1.1 times as far, the stiffer 0.9 times."""
+    results = results_of()
+    drawn = {one.look.label: one for one in motions(results, "far")}
+    curve, type_2 = results.curve("msm-interval-type-2", "far"), drawn["MSM type-2"]
+    whole = np.stack([curve.time, 1e3 * curve.displacement, 1e3 * curve.velocity])
+    np.testing.assert_allclose(type_2.motion, whole)
+    softer, stiffer = (whole * [[1.0], [share], [share]] for share in (1.1, 0.9))
+    np.testing.assert_allclose(type_2.bounds, [softer, stiffer])
+    assert [len(one.bounds) for one in drawn.values()] == [0, 0, 0, 0, 2]
 
 
 def test_a_column_that_no_model_fills_is_left_out():
