@@ -7,26 +7,32 @@ Mamdani is broad and pale so that type-2, which nearly coincides with it, shows 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-FUZZY_PREFIX = "msm-"
+from study.results.folder import Results
+
 SYSTEM_NAMES = {"mamdani": "Mamdani", "sugeno": "Sugeno", "interval-type-2": "Interval type-2"}
 REFERENCE_NAMES = {"fem": "the finite-element reference", "basafa": "the Basafa benchmark"}
+
+Dashes = str | tuple[float, tuple[float, ...]]
+"""A line style as matplotlib takes it."""
+Style = dict[str, Any]
+"""Keyword arguments of a drawing function of matplotlib, which gives each a type of its own."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """`label` in legends and tables; `dashes` as matplotlib's line style; `width` in points."""
+    """Line of a model: `width` in points, `layer` above others; `label` in legends and tables."""
 
-    label: str
     colour: str
-    dashes: Any
+    dashes: Dashes
     width: float
     layer: float
+    label: str = ""
 
     @property
-    def line(self) -> dict[str, Any]:
+    def line(self) -> Style:
         """Keyword arguments of `Axes.plot`."""
         return {
             "color": self.colour,
@@ -36,23 +42,42 @@ class Look:
         }
 
 
-LOOKS = {
-    "fem": Look("Finite elements", "#000000", "-", 1.3, 3.0),
-    "basafa": Look("Basafa benchmark", "#D55E00", (0, (7, 1.6)), 1.3, 3.1),
-    "msm-mamdani": Look("MSM Mamdani", "#56B4E9", "-", 2.6, 2.5),
-    "msm-sugeno": Look("MSM Sugeno", "#009E73", (0, (5, 1.2, 1, 1.2)), 1.2, 3.2),
-    "msm-interval-type-2": Look("MSM type-2", "#882255", (0, (2.2, 1.6)), 1.2, 3.3),
+SYSTEM_LOOKS = {
+    "mamdani": Look("#56B4E9", "-", 2.6, 2.5),
+    "sugeno": Look("#009E73", (0, (5, 1.2, 1, 1.2)), 1.2, 3.2),
+    "interval-type-2": Look("#882255", (0, (2.2, 1.6)), 1.2, 3.3),
 }
+LOOKS = {
+    "fem": Look("#000000", "-", 1.3, 3.0),
+    "basafa": Look("#D55E00", (0, (7, 1.6)), 1.3, 3.1),
+    **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},
+}
+OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#B8860B", "#777777")
+OTHER_DASHES: tuple[Dashes, ...] = ((0, (1, 1)), (0, (9, 2, 1, 2)), "-", (0, (4, 1, 4, 3)))
 
 
-def look(model: str) -> Look:
-    """Look of a model; one that is not known appears grey under its own name."""
-    return LOOKS.get(model, Look(model, "#777777", ":", 1.2, 2.9))
+def other_look(k: int) -> Look:
+    """Look of the k-th model or system without one of its own; the first twenty all differ."""
+    colour = OTHER_COLOURS[k % len(OTHER_COLOURS)]
+    return Look(colour, OTHER_DASHES[k % len(OTHER_DASHES)], 1.2, 2.9)
 
 
-def system_of(model: str) -> str | None:
-    """Fuzzy system whose estimate a model was given, or None."""
-    return model.removeprefix(FUZZY_PREFIX) if model.startswith(FUZZY_PREFIX) else None
+def looks(results: Results) -> dict[str, Look]:
+    """Look of each model of a run by its name, in order, with the label of its record."""
+    models = results.record.models
+    others = [model.name for model in models if model.name not in LOOKS]
+    known = LOOKS | {name: other_look(k) for k, name in enumerate(others)}
+    return {model.name: replace(known[model.name], label=model.label) for model in models}
+
+
+def labels(results: Results) -> dict[str, str]:
+    """Label of each model of a run by its name."""
+    return {model.name: model.label for model in results.record.models}
+
+
+def system_colour(system: str) -> str:
+    """Colour of a fuzzy system wherever it is drawn, that of its model in the curves."""
+    return SYSTEM_LOOKS.get(system, other_look(0)).colour
 
 
 def system_name(system: str) -> str:
@@ -60,16 +85,16 @@ def system_name(system: str) -> str:
     return SYSTEM_NAMES.get(system, system)
 
 
-def reference_name(model: str) -> str:
-    """Name of a model in "against ..."."""
-    return REFERENCE_NAMES.get(model, look(model).label)
+def reference_name(results: Results, model: str) -> str:
+    """Name of a reference where a sentence says against what a model is compared."""
+    return REFERENCE_NAMES.get(model) or labels(results)[model]
 
 
 SERIES_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9")
 SERIES_MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")
 
 
-def series(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+def series(names: Iterable[str]) -> dict[str, Style]:
     """Colour and mark, as keyword arguments of `Axes.plot`, of names in the order they appear."""
     return {
         name: {

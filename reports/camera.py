@@ -19,7 +19,7 @@ NEARLY_PARALLEL = 0.9
 
 @dataclass(frozen=True)
 class Camera:
-    """Unit vectors `right`, `up` and `toward` the eye, (3,); `centre` [m] (3,).
+    """Parallel view: unit vectors `right`, `up`, `toward` the eye, (3,); `centre` [m] (3,).
 
     `half_width` and `half_height` [m] of what is seen.
     """

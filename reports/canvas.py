@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TEXT_WIDTH = 6.69
 """Width of the report's text [inch]."""
 RASTER_DPI = 200
-STYLE: dict[str, Any] = {
+STYLE: dict[str, object] = {
     "svg.hashsalt": "liver-study",
     "text.parse_math": False,  # names come from users
     "font.size": 7.5,
@@ -80,9 +80,22 @@ def pdf(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def write(figure: Figure, stem: Path) -> list[Path]:
-    """Write the figure as SVG and as PDF; the files."""
-    files = {stem.with_suffix(".svg"): svg(figure), stem.with_suffix(".pdf"): pdf(figure)}
+def picture(draw: Callable[[], Figure | None]) -> bytes | None:
+    """What a function draws in the report's style as SVG; None where it draws nothing."""
+    with style():
+        figure = draw()
+        return None if figure is None else svg(figure)
+
+
+def write(drawings: Mapping[Path, Callable[[], Figure | None]]) -> list[Path]:
+    """Write what functions draw as SVG and PDF beside their stems; the files written."""
+    files: dict[Path, bytes] = {}
+    with style():
+        for stem, draw in drawings.items():
+            figure = draw()
+            if figure is not None:
+                files |= {stem.with_suffix(".svg"): svg(figure)}
+                files |= {stem.with_suffix(".pdf"): pdf(figure)}
     for path, content in files.items():
         path.write_bytes(content)
     return list(files)

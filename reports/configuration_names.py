@@ -37,12 +37,12 @@ WORDS: dict[str, Callable[[str], str]] = {
 
 
 def contender_name(contender: str) -> str:
-    """A contender in legends; one that is not known under its own name."""
+    """Name of a contender in legends; one that is not known has its own name."""
     return CONTENDERS.get(contender, contender)
 
 
 def name_of(contender: str, settings: str) -> str:
-    """A configuration in a sentence, from its settings "key=value key=value"."""
+    """Name of a configuration in a sentence, from its settings "key=value key=value"."""
     known = dict(part.split("=", 1) for part in settings.split())
     head = SPRINGS.get(known.pop("volume_term", ""), contender_name(contender))
     return ", ".join([head, *(_said(key, value) for key, value in known.items())])

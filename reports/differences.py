@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from reports.digits import percent
 from study.results.folder import Results
+from study.results.records import ModelRecord
+
+
+def finite_elements(results: Results) -> ModelRecord | None:
+    """Record of the finite-element reference, None for a run without it."""
+    return next((model for model in results.record.models if model.name == "fem"), None)
 
 
 def field_errors(results: Results) -> dict[tuple[str, str], dict[str, float]]:
     """Differences of the whole field by (model, reference) and quantity."""
     found: dict[tuple[str, str], dict[str, float]] = {}
-    for model, reference, name, value in results.tables["errors"]:
-        found.setdefault((str(model), str(reference)), {})[str(name)] = float(value)
+    for row in results.field_differences:
+        found.setdefault((row.model, row.reference), {})[row.quantity] = row.value
     return found
 
 
@@ -19,10 +25,9 @@ def own_error(results: Results, reference: str = "fem") -> float | None:
 
     None where it has none or none was estimated.
     """
-    for record in results.numbers["models"]:
-        if record["name"] == reference and record.get("mesh_error"):
-            return float(record["mesh_error"]["field_peak"])
-    return None
+    errors = {model.name: model.mesh_error for model in results.record.models}
+    found = errors.get(reference)
+    return None if found is None else found.field_peak
 
 
 def resolved(share: float, error: float | None) -> str:

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import math
 import re
+from typing import TypedDict
 
 Table = list[list[str]]
 """Cells of a table, row by row."""
+
+
+class Group(TypedDict):
+    """Rows of a table that belong together, under a name."""
+
+    name: str
+    rows: Table
+
 
 PA_PER_KPA = 1e3
 DASH = "–"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports import canvas
-from reports.appearance import look
+from reports.appearance import Style, labels
 from reports.camera import Camera, facing_tool
 from reports.digits import fixed, short, significant
 from reports.renders import Job, Pictures
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-NOT_MODELS = ("points", "triangles", "tool", "probes")
 PEAK = 0
 MILLI = 1e3
 COLUMNS = 3
@@ -57,7 +56,7 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Views:
-    """All that is drawn of the organ.
+    """What is drawn of the organ: its surfaces, on sheets, as a camera sees them.
 
     `anchors` (probes + 1,): vertices at the tool and at the control points; `hidden`: whether they
     lie on the far side.
@@ -69,30 +68,30 @@ class Views:
     push: Floats
     anchors: NDArray[np.int64]
     hidden: NDArray[np.bool_]
-    probes: list[str]
+    probes: tuple[str, ...]
     sheets: list[Sheet]
 
 
 def drawable(results: Results) -> list[str]:
     """Models whose field at peak load is finite, in order."""
-    fields = results.arrays.get("fields", {})
-    return [n for n in fields if n not in NOT_MODELS and np.isfinite(fields[n][PEAK]).all()]
+    fields, names = results.fields, [model.name for model in results.record.models]
+    return [name for name in names if name in fields and np.isfinite(fields[name][PEAK]).all()]
 
 
 def views(results: Results) -> Views | None:
     """What to draw of a scene with fields, or None if there is nothing."""
     names = drawable(results)
-    if not names or not results.numbers["scene"].get("renders", True):
+    if not names or not results.scene.renders:
         return None
-    fields = results.arrays["fields"]
+    fields, named = results.fields, labels(results)
     rest, triangles = fields["points"], fields["triangles"]
     peak = {name: fields[name][PEAK] for name in names}
     limit = _limit([_length(u) for u in peak.values()])
     factor = _round_down(SHOWN_DEFORMATION * float(np.ptp(rest, axis=0).max()) / limit)
-    panels = [Panel(look(n).label, rest + factor * u, _length(u)) for n, u in peak.items()]
+    panels = [Panel(named[n], rest + factor * u, _length(u)) for n, u in peak.items()]
     sheets = [Sheet(panels, limit, "displacement [mm]", "YlGnBu")]
     if "fem" in peak and len(peak) > 1:
-        sheets.append(_differences(rest, peak))
+        sheets.append(_differences(rest, peak, named))
     centre, push = fields["tool"]
     everything = np.concatenate([rest, *(panel.points for panel in panels)])
     anchors = _nearest(rest, np.vstack([centre, fields["probes"]]))
@@ -104,14 +103,14 @@ def views(results: Results) -> Views | None:
         push=push,
         anchors=anchors,
         hidden=_normals(rest, triangles)[anchors] @ camera.toward < 0.0,
-        probes=results.numbers["probes"],
+        probes=results.record.probes,
         sheets=sheets,
     )
 
 
-def _differences(rest: Floats, peak: dict[str, Floats]) -> Sheet:
+def _differences(rest: Floats, peak: dict[str, Floats], named: dict[str, str]) -> Sheet:
     others = {name: _length(u - peak["fem"]) for name, u in peak.items() if name != "fem"}
-    panels = [Panel(f"{look(n).label} − finite elements", rest, d) for n, d in others.items()]
+    panels = [Panel(f"{named[n]} − finite elements", rest, d) for n, d in others.items()]
     limit = min(max(float(d.max()) for d in others.values()), _reach(peak["fem"]))
     return Sheet(panels, limit, "difference [mm]", "magma_r")
 
@@ -135,7 +134,7 @@ def _round_down(value: float) -> float:
 
 
 def job(views: Views) -> Job:
-    """The surfaces of all sheets as a job to render."""
+    """Job that renders the surfaces of all sheets."""
     panels = [(panel, sheet) for sheet in views.sheets for panel in sheet.panels]
     return Job(
         points=np.stack([panel.points for panel, _ in panels]),
@@ -146,7 +145,7 @@ def job(views: Views) -> Job:
 
 
 def field_figures(views: Views, pictures: Pictures) -> list[bytes]:
-    """One SVG figure per sheet."""
+    """Figures of the deformed organ and of its differences as SVG, one per sheet."""
     figures, first = [], 0
     for sheet in views.sheets:
         last = first + len(sheet.panels)
@@ -248,7 +247,7 @@ def _draw_triad(axes: Axes, camera: Camera) -> None:
     """Left, posterior and superior as they lie in the pictures."""
     origin = np.array([-0.55 * camera.half_width, -0.45 * camera.half_height])
     length = 0.3 * min(camera.half_width, camera.half_height)
-    arrow: dict[str, Any] = {"arrowstyle": "->", "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
+    arrow: Style = {"arrowstyle": "->", "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
     for name, direction in TRIAD.items():
         step = length * (np.array(direction) @ np.stack([camera.right, camera.up], axis=1))
         axes.annotate("", tuple(origin + step), tuple(origin), arrowprops=arrow)
@@ -301,7 +300,7 @@ def _normals(points: Floats, triangles: NDArray[np.int64]) -> Floats:
 
 
 def explain(views: Views) -> dict[str, str]:
-    """What the caption says of the drawing."""
+    """Exaggeration and direction of the push, as the caption of the pictures says them."""
     return {"factor": fixed(views.factor, 0), "push": _direction(views.push)}
 
 

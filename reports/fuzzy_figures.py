@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports import canvas
-from reports.appearance import FUZZY_PREFIX, SYSTEM_NAMES, look, system_name
+from reports.appearance import SYSTEM_NAMES, Dashes, Style, system_colour, system_name
 from study.results.folder import Results
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float64]
 
 KILO = 1e-3
-SET_LOOKS: tuple[tuple[str, Any], ...] = (
+SET_LOOKS: tuple[tuple[str, Dashes], ...] = (
     ("#999933", (0, (5, 1, 1, 1))),
     ("#0072B2", "-"),
     ("#E69F00", (0, (4, 1.2))),
@@ -35,7 +35,6 @@ COLUMNS = 3
 AT_REST = 0.01
 ROOM = 1.1
 OUTPUT = "stiffness"
-DEFAULT_INPUTS = ("hcv", "hbv")
 
 
 def variables(arrays: Arrays) -> list[str]:
@@ -50,14 +49,13 @@ def systems(arrays: Arrays) -> list[str]:
 
 
 def sets_figure(results: Results) -> bytes:
-    """Sets of every variable with their footprints, and the estimates, over kPa."""
-    found = results.numbers["stiffness"]
-    estimates = {system: one["estimate_pa"] for system, one in found.items()}
-    return draw_sets(results.arrays["fuzzy"], estimates)
+    """Fuzzy sets of every variable with footprints, and the estimates, over kPa as SVG."""
+    found = results.record.fuzzy.systems
+    return draw_sets(results.fuzzy, {system: one.estimate_pa for system, one in found.items()})
 
 
 def draw_sets(arrays: Arrays, estimates: Mapping[str, float]) -> bytes:
-    """The same as SVG, from the arrays and the estimate [Pa] of each system."""
+    """Sets as SVG, from the arrays and the estimate [Pa] of each system."""
     names = variables(arrays)
     rows = -(-len(names) // COLUMNS)
     with canvas.style():
@@ -84,7 +82,7 @@ def _draw_sets(axes: Axes, arrays: Arrays, variable: str) -> None:
         colour, dashes = SET_LOOKS[SET_NAMES.get(str(name), i) % len(SET_LOOKS)]
         lower, upper = arrays[f"{variable}.lower"][i], arrays[f"{variable}.upper"][i]
         axes.fill_between(x, lower, upper, color=colour, alpha=0.25, linewidth=0)
-        line = {"color": colour, "linestyle": dashes, "linewidth": 1.1}
+        line: Style = {"color": colour, "linestyle": dashes, "linewidth": 1.1}
         axes.plot(x, arrays[f"{variable}.principal"][i], label=str(name), **line)
     bounds = np.concatenate([arrays[f"{variable}.lower"], arrays[f"{variable}.upper"]])
     axes.set(xlim=(x[0], _last_change(x, bounds)), ylim=(0.0, 1.05))
@@ -110,31 +108,30 @@ def _rank(label: str) -> tuple[bool, str]:
 
 def _last_change(x: Floats, memberships: Floats) -> float:
     """Where the sets have come to rest, and a little room."""
-    moving = np.abs(memberships - memberships[:, -1:]).max(axis=0) > AT_REST
+    moving = still_moving(memberships)
     return float(min(x[-1], ROOM * x[moving].max())) if moving.any() else float(x[-1])
+
+
+def still_moving(curves: Floats) -> NDArray[np.bool_]:
+    """Where any of some curves (n, samples) is not yet at its last value, (samples,)."""
+    moving: NDArray[np.bool_] = np.abs(curves - curves[:, -1:]).max(axis=0) > AT_REST
+    return moving
 
 
 def _mark_estimates(axes: Axes, estimates: Mapping[str, float]) -> None:
     """Estimates as lines across the output's panel."""
     for system, modulus in estimates.items():
-        colour = look(f"{FUZZY_PREFIX}{system}").colour
-        line: dict[str, Any] = {"color": colour, "linewidth": 1.0, "zorder": 1.5}
+        line: Style = {"color": system_colour(system), "linewidth": 1.0, "zorder": 1.5}
         axes.axvline(KILO * modulus, label=system_name(system), **line)
 
 
-def surface_inputs(results: Results) -> tuple[str, str]:
-    """The two inputs that the surfaces are drawn over."""
-    first, second = results.numbers.get("surface_inputs", DEFAULT_INPUTS)
-    return str(first), str(second)
-
-
 def surfaces_figure(results: Results) -> bytes:
-    """Output of each system over two readings: as a surface, and in pseudo-colour."""
-    return draw_surfaces(results.arrays["fuzzy"], surface_inputs(results))
+    """Estimates of each system over two readings as SVG: as surfaces, and in pseudo-colour."""
+    return draw_surfaces(results.fuzzy, results.scene.fuzzy.surface)
 
 
 def draw_surfaces(arrays: Arrays, inputs: tuple[str, str]) -> bytes:
-    """The same as SVG, from the arrays and the names of the two inputs."""
+    """Output surfaces as SVG, from the arrays and the names of the two inputs."""
     labels = [f"{name.upper()} [kPa]" for name in inputs]
     names = systems(arrays)
     x, y, surfaces = _changing(arrays, names)
@@ -168,13 +165,13 @@ def _changing(arrays: Arrays, names: list[str]) -> tuple[Floats, Floats, list[Fl
     return x[:j], y[:i], list(z[:, :i, :j])
 
 
-def _scale(surfaces: list[Floats]) -> dict[str, Any]:
+def _scale(surfaces: list[Floats]) -> Style:
     """Range of all surfaces, of some width also where they are flat."""
     low, high = min(z.min() for z in surfaces), max(z.max() for z in surfaces)
     return {"vmin": float(low), "vmax": float(high) if high > low else float(low) + 1.0}
 
 
-def _draw_solid(axes: Any, x: Floats, y: Floats, z: Floats, scale: dict[str, Any]) -> None:
+def _draw_solid(axes: Any, x: Floats, y: Floats, z: Floats, scale: Style) -> None:
     x_grid, y_grid = np.meshgrid(x, y)  # z[i, j] belongs to y[i], x[j]
     axes.plot_surface(
         x_grid, y_grid, z, cmap="viridis", rcount=41, ccount=41, rasterized=True, **scale

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
-from typing import Any, NamedTuple
+from operator import attrgetter
 
 from reports.appearance import system_name
-from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, words
+from reports.digits import DASH, PA_PER_KPA, Group, Table, fixed, percent, words
 from study.results.folder import Results
+from study.results.records import StiffnessSet
+from study.results.tables import SensitivityEntry
 
 SYSTEM = "system"
 SOURCED_MARKS = {"yes": "", "partly": " †", "weak": " ‡", "no": " §"}
@@ -29,34 +30,9 @@ CHOICE_NAMES = {
 }
 
 
-class Change(NamedTuple):
-    """A row of the table `sensitivity`: one choice changed, for one system, in Pa.
-
-    `base_width` and `width`, the mean width of the interval before and after, are NaN but for
-    type-2.
-    """
-
-    choice: str
-    base: str
-    alternative: str
-    system: str
-    at_readings: float
-    rms: float
-    largest: float
-    rows: float
-    base_width: float = math.nan
-    width: float = math.nan
-
-
-def changes(results: Results) -> list[Change]:
-    """Every row of the sensitivity table, in order; none where it was not computed."""
-    rows: list[Any] = results.tables.get("sensitivity", [])
-    return [Change(*row) for row in rows]
-
-
-def between_systems(found: list[Change]) -> tuple[float, float] | None:
+def between_systems(found: Iterable[SensitivityEntry]) -> tuple[float, float] | None:
     """Smallest and largest rms difference [Pa] between two systems."""
-    values = [change.rms for change in found if change.choice == SYSTEM]
+    values = [entry.rms_change_pa for entry in found if entry.choice == SYSTEM]
     return (min(values), max(values)) if values else None
 
 
@@ -65,96 +41,90 @@ def choice_name(choice: str) -> str:
     return CHOICE_NAMES.get(choice, choice)
 
 
-def heading(change: Change) -> str:
+def heading(entry: SensitivityEntry) -> str:
     """Name of a choice and the base value that its alternatives replace."""
-    return words(f"{choice_name(change.choice)}: {change.base} →")
+    return words(f"{choice_name(entry.choice)}: {entry.base} →")
 
 
-def sensitivity_systems(results: Results) -> list[str]:
-    """Systems that have a column of their own in the sensitivity table, in order."""
-    found = (change.system for change in changes(results) if change.choice != SYSTEM)
-    return list(dict.fromkeys(found))
+def within_systems(found: Iterable[SensitivityEntry]) -> list[SensitivityEntry]:
+    """Entries of the choices that are made within a system."""
+    return [entry for entry in found if entry.choice != SYSTEM]
 
 
-def sensitivity_table(results: Results) -> dict[str, Any] | None:
-    """Grouped rows [kPa], or None: per system the change at the readings, rms and largest.
+def sensitivity_table(results: Results) -> dict[str, object] | None:
+    """Sensitivity of the estimates [kPa] to each choice as grouped rows, or None without any.
 
     `systems`: names of the columns' groups; `groups`: name of the choice and its rows, each the
-    alternative, three cells per system, the width of the type-2 interval where that is known, and
-    the number of rows.
+    alternative, per system the change at the readings, rms and largest, and the count of readings.
     """
-    found = [change for change in changes(results) if change.choice != SYSTEM]
+    found = within_systems(results.sensitivity)
     if not found:
         return None
-    systems = sensitivity_systems(results)
-    has_widths = any(math.isfinite(change.width) for change in found)
-    groups = [
-        {"name": name, "rows": list(_alternative_rows(members, systems, has_widths))}
+    systems = list(dict.fromkeys(entry.system for entry in found))
+    groups: list[Group] = [
+        {"name": name, "rows": list(_alternative_rows(members, systems))}
         for name, members in groupby(found, heading)
     ]
     return {
         "systems": [system_name(system) for system in systems],
         "groups": groups,
-        "between": [_system_row(c) for c in changes(results) if c.choice == SYSTEM],
-        "has_widths": has_widths,
+        "between": [_system_row(e) for e in results.sensitivity if e.choice == SYSTEM],
     }
 
 
 def _alternative_rows(
-    members: Iterable[Change], systems: list[str], has_widths: bool
+    members: Iterable[SensitivityEntry], systems: list[str]
 ) -> Iterator[list[str]]:
-    for alternative, group in groupby(members, lambda change: change.alternative):
-        found = {change.system: change for change in group}
+    for alternative, group in groupby(members, attrgetter("alternative")):
+        found = {entry.system: entry for entry in group}
         cells = [cell for system in systems for cell in _cells(found.get(system))]
-        widths = [_width(change) for change in found.values() if math.isfinite(change.width)]
-        count = fixed(next(iter(found.values())).rows, 0)
-        yield [words(alternative), *cells, *((widths or [DASH]) if has_widths else []), count]
+        yield [words(alternative), *cells, fixed(next(iter(found.values())).readings, 0)]
 
 
-def _cells(change: Change | None) -> list[str]:
-    if change is None:
+def _cells(entry: SensitivityEntry | None) -> list[str]:
+    if entry is None:
         return [DASH] * 3
-    return [_kilo(value) for value in (change.at_readings, change.rms, change.largest)]
+    changes = (entry.change_at_readings_pa, entry.rms_change_pa, entry.largest_change_pa)
+    return [_kilo(change) for change in changes]
 
 
 def _kilo(value: float) -> str:
     return fixed(value / PA_PER_KPA, 2)
 
 
-def _width(change: Change) -> str:
-    return f"{fixed(change.base_width / PA_PER_KPA, 1)} → {fixed(change.width / PA_PER_KPA, 1)}"
-
-
-def _system_row(change: Change) -> list[str]:
-    pair = f"{system_name(change.base)} → {system_name(change.alternative)}"
-    return [pair, *_cells(change), fixed(change.rows, 0)]
+def _system_row(entry: SensitivityEntry) -> list[str]:
+    pair = f"{system_name(entry.base)} → {system_name(entry.alternative)}"
+    return [pair, *_cells(entry), fixed(entry.readings, 0)]
 
 
 def sensitivity_sentences(results: Results) -> list[str]:
     """Which choices move the estimate more than the choice of system does."""
-    found = changes(results)
-    span = between_systems(found)
+    span = between_systems(results.sensitivity)
     if span is None:
         return []
     low, high = (_kilo(value) for value in span)
-    others = [change for change in found if change.choice != SYSTEM]
-    above = sorted((c for c in others if c.rms > span[1]), key=lambda c: -c.rms)
-    lesser = {c.choice for c in others if c.rms > span[0]} - {c.choice for c in above}
+    others = sorted(within_systems(results.sensitivity), key=lambda entry: -entry.rms_change_pa)
+    above = [entry for entry in others if entry.rms_change_pa > span[1]]
+    lesser = {entry.choice for entry in others if entry.rms_change_pa > span[0]}
+    lesser -= {entry.choice for entry in above}
     first = (
         f"Open choices: two systems differ by {low} to {high} kPa (rms over a spread of readings)."
     )
     return [" ".join([first, *_movers(above), *_lesser(lesser)])]
 
 
-def _movers(above: list[Change]) -> Iterator[str]:
+def _movers(above: Sequence[SensitivityEntry]) -> Iterator[str]:
+    """The largest of each choice, of entries in falling order."""
     if not above:
         yield "No choice within a system moves its estimate further."
         return
-    largest = {change.choice: change for change in reversed(above)}
+    largest: dict[str, SensitivityEntry] = {}
+    for entry in above:
+        largest.setdefault(entry.choice, entry)
     parts = [
-        words(f"{heading(change)} {change.alternative} ({system_name(change.system)} ")
-        + f"by {_kilo(change.rms)} kPa)"
-        for change in sorted(largest.values(), key=lambda change: -change.rms)
+        words(f"{heading(entry)} {entry.alternative} ({system_name(entry.system)} ")
+        + f"by {_kilo(entry.rms_change_pa)} kPa)"
+        for entry in largest.values()
     ]
     yield f"Further than that move an estimate: {'; '.join(parts)}."
 
@@ -166,30 +136,29 @@ def _lesser(choices: set[str]) -> Iterator[str]:
 
 
 def set_rows(results: Results) -> Table:
-    """Variable, set, centre, placement, spread and its kind, footprint's parts, n and source.
+    """Stiffness sets: variable, centre, placement, spread and its kind, footprint, n and source.
 
     The set's name bears a mark unless centre and spread are published for it.
     """
-    return [_set_row(record) for record in results.numbers.get("stiffness_sets", [])]
+    return [_set_row(one) for one in results.record.fuzzy.stiffness_sets]
 
 
-def _set_row(record: dict[str, Any]) -> list[str]:
-    n = record.get("n")
+def _set_row(one: StiffnessSet) -> list[str]:
     return [
-        words(str(record["aetiology"])),
-        f"{record['stage']}{SOURCED_MARKS.get(record['sourced'], ' §')}",
-        fixed(record["centre"], 1),
-        words(str(record["placement"])),
-        fixed(record["within_stage_sd"], 1),
-        words(str(record["sd_kind"])),
-        percent(record["between_study"]),
-        percent(record["between_operator"]),
-        DASH if n is None else fixed(n, 0),
-        words(str(record["centre_source"])),
+        words(one.aetiology),
+        f"{one.stage}{SOURCED_MARKS.get(one.sourced, ' §')}",
+        fixed(one.centre, 1),
+        words(one.placement),
+        fixed(one.within_stage_sd, 1),
+        words(one.sd_kind),
+        percent(one.between_study),
+        percent(one.between_operator),
+        DASH if one.n is None else fixed(one.n, 0),
+        words(one.centre_source),
     ]
 
 
 def unsourced_count(results: Results) -> tuple[int, int]:
     """Sets in use whose centre or spread is not published for them, and all sets."""
-    records = results.numbers.get("stiffness_sets", [])
-    return sum(record["sourced"] != "yes" for record in records), len(records)
+    sets = results.record.fuzzy.stiffness_sets
+    return sum(one.sourced != "yes" for one in sets), len(sets)

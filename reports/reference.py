@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
+from reports.differences import finite_elements
 from reports.digits import DASH, count, fixed, percent, significant, words
 from reports.summary import printed_peak
 from study.results.folder import Results
+from study.results.records import ElementsRecord, MeshLevel, ModelRecord
+from study.scene.schema import Scene
 
 ELEMENTS = {
     "p1": "linear tetrahedra",
@@ -21,26 +23,23 @@ SAFETY_ASSUMED = 3.0
 ASSUMED_ORDER = 2.0
 LEAST_ORDER = 1.0
 BEYOND = 0.5
-FORMAL_ORDER = {"p1": 2.0, "p2": 3.0, "taylor-hood": 3.0}
-
-Record = dict[str, Any]
 
 
-def reference(results: Results) -> dict[str, Any] | None:
-    """How the reference was found, its meshes and its errors; None where no meshes are known.
+def reference(results: Results) -> dict[str, object] | None:
+    """How the reference was found, its meshes and its errors; None where there is none.
 
     `formal_order` is empty where two meshes had to do with an assumed order.
     """
-    record: Record = next((m for m in results.numbers["models"] if m["name"] == "fem"), {})
-    levels = record.get("mesh_levels")
-    if not levels:
+    model = finite_elements(results)
+    if model is None or model.elements is None or not model.elements.levels:
         return None
-    by_three = len(levels) > 2
+    found, error = model.elements, model.elements.mesh_error
+    by_three = len(found.levels) > 2
     return {
-        "how": _how(results, record),
-        "levels": [_level_row(level) for level in levels],
-        "errors": list(_error_rows(results, record)) if record.get("mesh_error") else [],
-        "formal_order": f"{FORMAL_ORDER[record['element']]:g}" if by_three else "",
+        "how": _how(results.scene, model, found),
+        "levels": [_level_row(level) for level in found.levels],
+        "errors": list(_error_rows(results, model, found)),
+        "formal_order": f"{error.formal_order:g}" if error and by_three else "",
         "least_order": f"{LEAST_ORDER:g}",
         "assumed_order": f"{ASSUMED_ORDER:g}",
         "safety": f"{SAFETY:g}",
@@ -49,64 +48,71 @@ def reference(results: Results) -> dict[str, Any] | None:
     }
 
 
-def is_built_in_liver(scene: dict[str, Any]) -> bool:
+def is_built_in_liver(scene: Scene) -> bool:
     """Whether the organ is the built-in shape, whose surface is known and curved."""
-    organ = scene.get("organ", {})
-    return organ.get("shape") == "liver" and organ.get("mesh") is None
+    return scene.organ.shape == "liver" and scene.organ.mesh is None
 
 
-def _how(results: Results, record: Record) -> str:
+def _how(scene: Scene, model: ModelRecord, found: ElementsRecord) -> str:
     """Element and method in a sentence."""
-    curved = record["element"] != "p1" and is_built_in_liver(results.numbers["scene"])
+    curved = found.element != "p1" and is_built_in_liver(scene)
     surface = ", curved along the organ's surface" if curved else ""
-    return f"Linear elasticity on {ELEMENTS[record['element']]}{surface}; {_motion(record)}."
+    return f"Linear elasticity on {ELEMENTS[found.element]}{surface}; {_motion(model, found)}."
 
 
-def _motion(record: Record) -> str:
-    method, vectors = record["method"], record.get("subspace_vectors")
+def _motion(model: ModelRecord, found: ElementsRecord) -> str:
+    vectors = found.subspace_vectors
     if vectors is None:
-        step = significant(1e3 * record["time_step_s"])
-        return f"motion by {count(record['steps'])} implicit steps of {STEPPING[method]}, {step} ms"
+        steps, step = count(model.steps or 0), significant(1e3 * (model.time_step_s or 0.0))
+        return f"motion by {steps} implicit steps of {STEPPING[found.method]}, {step} ms"
     kind = (
         f"{vectors} load-dependent Ritz vectors"
-        if method == "ritz-vectors"
+        if found.method == "ritz-vectors"
         else f"the displacement at rest and {vectors - 1} modes of vibration"
     )
     return (
         f"motion by superposition of {kind}, the last quarter of which changes the curve of no "
-        f"control point by more than {percent(record['truncation_error'])} in relative L2"
+        f"control point by more than {percent(found.truncation_error or 0.0)} in relative L2"
     )
 
 
-def _level_row(level: Record) -> list[str]:
+def _level_row(level: MeshLevel) -> list[str]:
     return [
-        fixed(level["size"], 2),
-        count(level["elements"]),
-        count(level["unknowns"]),
-        significant(level["wall_s"], 2),
+        fixed(level.size, 2),
+        count(level.elements),
+        count(level.unknowns),
+        significant(level.wall_s, 2),
     ]
 
 
-def _error_rows(results: Results, record: Record) -> Iterator[list[str]]:
+def _error_rows(results: Results, model: ModelRecord, found: ElementsRecord) -> Iterator[list[str]]:
     """Control point, peak, error and order of displacement and velocity; the whole field last."""
-    for probe, errors in record["mesh_error_by_probe"].items():
-        orders = record["mesh_order_by_probe"][probe]
-        cells = [(percent(error), _order(record, orders[kind])) for kind, error in errors.items()]
+    errors = found.mesh_error
+    if errors is None:
+        return
+
+    formal = errors.formal_order if len(found.levels) > 2 else None
+    for probe, error in errors.by_probe.items():
+        observed = errors.order_by_probe[probe]
         yield [
             words(probe),
-            printed_peak(results, record, probe),
-            *(c for pair in cells for c in pair),
+            printed_peak(results, model, probe),
+            *(percent(error.displacement), _order(observed.displacement, formal)),
+            *(percent(error.velocity), _order(observed.velocity, formal)),
         ]
-    field = record["mesh_error"]["field_peak"], record["mesh_order"]["field_peak"]
-    yield ["whole field at the peak", DASH, percent(field[0]), _order(record, field[1]), DASH, DASH]
+    field = percent(errors.field_peak), _order(errors.field_order, formal)
+    yield ["whole field at the peak", DASH, *field, DASH, DASH]
 
 
-def _order(record: Record, observed: float | None) -> str:
-    """Observed order, and what was taken in its place where it was not fit to be used."""
-    if len(record["mesh_levels"]) < 3:
+def _order(observed: float | None, formal: float | None) -> str:
+    """Observed order, and what was taken in its place where it was not fit to be used.
+
+    `formal`: the highest that is taken, None where the order is assumed.
+    """
+    if formal is None:
         return f"{ASSUMED_ORDER:g} assumed"
     if observed is None:
         return "none"
-    taken = min(max(observed, LEAST_ORDER), FORMAL_ORDER[record["element"]])
+    taken = min(max(observed, LEAST_ORDER), formal)
     shown = fixed(observed, 1)
     return shown if taken == observed else f"{shown}, {taken:g} taken"

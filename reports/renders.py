@@ -42,7 +42,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Pictures:
-    """`pixels` (k, height, width, 3), or None if the surfaces are to be drawn flat."""
+    """Rendered surfaces: `pixels` (k, height, width, 3), or None where drawn flat."""
 
     renderer: str
     pixels: Pixels | None

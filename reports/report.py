@@ -8,15 +8,14 @@ import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from reports.content import document
 from reports.difference_figure import difference_figure
-from reports.extremes import extreme_figures
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
 from reports.renders import Pictures, render
+from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from study.results.folder import Results, ResultsError, read
@@ -53,18 +52,16 @@ def draw(results: Results) -> tuple[Figures, Drawing]:
 
 def _plots(results: Results) -> Figures:
     figures: Figures = {"motion": list(motion_figures(results))}
-    if "fuzzy" in results.arrays:
+    if results.fuzzy:
         figures["sets"] = [sets_figure(results)]
         figures["surfaces"] = [surfaces_figure(results)]
         figures["rules"] = rule_figures(results)
-    sensitivity = sensitivity_figure(results)
-    if sensitivity is not None:
-        figures["sensitivity"] = [sensitivity]
-    differences = difference_figure(results)
-    if differences is not None:
-        figures["differences"] = [differences]
-    figures |= {place: [svg] for place, svg in extreme_figures(results).items()}
-    return figures
+    single = {
+        "sensitivity": sensitivity_figure(results.sensitivity),
+        "differences": difference_figure(results),
+        **robustness_figures(results),
+    }
+    return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 
 def _with_pictures(
@@ -75,7 +72,7 @@ def _with_pictures(
     return drawn, explain(seen) | {"renderer": found.renderer}
 
 
-def compile_pdf(content: dict[str, Any], figures: Figures) -> bytes:
+def compile_pdf(content: dict[str, object], figures: Figures) -> bytes:
     """PDF of the template filled with text and figures.
 
     Raises ValueError for a number that is not finite, RuntimeError for a template that does not

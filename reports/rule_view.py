@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports import canvas
-from reports.appearance import FUZZY_PREFIX, look, system_name
+from reports.appearance import Style, system_colour, system_name
 from reports.digits import fixed
+from reports.fuzzy_figures import Arrays, still_moving
 from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Arrays = Mapping[str, NDArray[Any]]
 
 PREFIX = "view."
 ROW_HEIGHT = 0.27
@@ -29,7 +27,6 @@ CELL_TEXT = 6.0
 TOP = 1.5
 """Upper end of a small panel's axis; above 1 there is room for the name of the set."""
 ANTECEDENT, CONSEQUENT, READING = "#0072B2", "#E69F00", "#D55E00"
-AT_REST = 0.01
 ROOM = 1.15
 
 
@@ -40,18 +37,17 @@ def kinds(arrays: Arrays) -> list[str]:
 
 
 def rule_figures(results: Results) -> list[bytes]:
-    """One view of the rules per system, as SVG."""
-    arrays = results.arrays.get("fuzzy", {})
-    return [draw_rules(arrays, kind) for kind in kinds(arrays)]
+    """Views of the rules that fire as SVG, one per system."""
+    return [draw_rules(results.fuzzy, kind) for kind in kinds(results.fuzzy)]
 
 
 def view_names(results: Results) -> list[str]:
     """Name of the system in each view, for its caption."""
-    return [system_name(kind) for kind in kinds(results.arrays.get("fuzzy", {}))]
+    return [system_name(kind) for kind in kinds(results.fuzzy)]
 
 
 def draw_rules(arrays: Arrays, kind: str) -> bytes:
-    """View of one system from the arrays named view.KIND, as SVG."""
+    """View of the rules of one system as SVG, from the arrays named view.KIND."""
     prefix = f"{PREFIX}{kind}."
     view = {
         name.removeprefix(prefix): array
@@ -103,7 +99,7 @@ def _label_row(axes: Axes, view: Arrays, row: int) -> None:
     shares = view["rules.share"]
     if shares.size:
         text += f"\n{fixed(100 * shares[row], 1)} %"
-    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "center"}
+    place: Style = {"transform": axes.transAxes, "ha": "right", "va": "center"}
     axes.text(-0.08, 0.4, text, fontsize=CELL_TEXT, **place)
 
 
@@ -153,7 +149,7 @@ def _draw_set(
 
 
 def _label(axes: Axes, text: str) -> None:
-    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "top"}
+    place: Style = {"transform": axes.transAxes, "ha": "right", "va": "top"}
     axes.text(0.99, 1.0, text, fontsize=CELL_TEXT, **place)
 
 
@@ -163,7 +159,7 @@ def _span(low: float, high: float) -> str:
 
 def _last_change(x: NDArray[Any], memberships: NDArray[Any], reading: float) -> float:
     """Where the sets have come to rest, and the reading is in view."""
-    moving = np.abs(memberships - memberships[:, -1:]).max(axis=0) > AT_REST
+    moving = still_moving(memberships)
     return float(min(x[-1], ROOM * max(x[moving].max(initial=x[0]), reading)))
 
 
@@ -201,7 +197,7 @@ def _output_axes(figure: Figure, height: float) -> Axes:
 
 def _draw_output(axes: Axes, view: Arrays, kind: str) -> None:
     """The union of what the rules imply, or the weights of the constants, and the answer."""
-    colour = look(f"{FUZZY_PREFIX}{kind}").colour
+    colour = system_colour(kind)
     unit, answer = str(view["unit"]), float(view["answer"])
     draw = _draw_shares if view["outputs.constant"].size else _draw_union
     draw(axes, view)
@@ -210,7 +206,7 @@ def _draw_output(axes: Axes, view: Arrays, kind: str) -> None:
         label = f"interval {fixed(low, 2)} to {fixed(high, 2)} {unit}"
         axes.axvspan(low, high, color=colour, alpha=0.13, linewidth=0, label=label)
     if view["switches"].size:
-        mark: dict[str, Any] = {"color": colour, "marker": "^", "linestyle": "", "markersize": 5}
+        mark: Style = {"color": colour, "marker": "^", "linestyle": "", "markersize": 5}
         places = view["switches"].mean(axis=1)
         axes.plot(places, [0.0, 0.0], label="bounds switch", clip_on=False, zorder=4, **mark)
     label = f"{system_name(kind)}: {fixed(answer, 2)} {unit}"
@@ -238,7 +234,7 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
     rows = zip(view["outputs"], view["outputs.constant"], view["outputs.share"], strict=True)
     for name, constant, share in rows:
         _draw_stem(axes, constant, share)
-        place: dict[str, Any] = {
+        place: Style = {
             "textcoords": "offset points",
             "va": "center",
             "fontsize": CELL_TEXT,

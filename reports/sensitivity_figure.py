@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import canvas
-from reports.appearance import FUZZY_PREFIX, look, system_name
+from reports.appearance import Style, system_colour, system_name
 from reports.digits import words
-from reports.fuzzy_tables import (
-    SYSTEM,
-    Change,
-    between_systems,
-    changes,
-    heading,
-)
-from study.results.folder import Results
+from reports.fuzzy_tables import between_systems, heading, within_systems
+from study.results.tables import SensitivityEntry
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 LINE_HEIGHT = 0.132
@@ -32,18 +27,13 @@ LEAST = 1e-3
 """Smallest change drawn to scale [kPa]."""
 MARKS = {"mamdani": "o", "sugeno": "s", "interval-type-2": "D"}
 
-Line = tuple[float, str, list[Change]]
+Line = tuple[float, str, list[SensitivityEntry]]
 """Position, label and changes of one alternative."""
 
 
-def sensitivity_figure(results: Results) -> bytes | None:
-    """Rms and largest change per alternative and system, or None if there are none."""
-    return draw_sensitivity(changes(results))
-
-
-def draw_sensitivity(found: Sequence[Change]) -> bytes | None:
-    """The same as SVG, from the rows."""
-    inner = [change for change in found if change.choice != SYSTEM]
+def sensitivity_figure(found: Sequence[SensitivityEntry]) -> bytes | None:
+    """Figure of the rms and largest change of the estimates as SVG, or None if there are none."""
+    inner = within_systems(found)
     if not inner:
         return None
     lines, heads = layout(inner)
@@ -52,7 +42,7 @@ def draw_sensitivity(found: Sequence[Change]) -> bytes | None:
         figure = canvas.sheet(FRAME_HEIGHT + LINE_HEIGHT * bottom)
         axes = figure.subplots()
         axes.set(xscale="log", ylim=(bottom, -0.9), xlim=(LEAST / 1.35, 1.6 * _most(inner)))
-        _draw_band(axes, list(found))
+        _draw_band(axes, found)
         for line in lines:
             _draw_line(axes, line)
         _label(axes, lines, heads)
@@ -60,15 +50,17 @@ def draw_sensitivity(found: Sequence[Change]) -> bytes | None:
         return canvas.svg(figure)
 
 
-def layout(found: Sequence[Change]) -> tuple[list[Line], list[tuple[float, str]]]:
-    """Lines of the alternatives from the top, and the head of each choice, with their positions."""
+def layout(
+    found: Sequence[SensitivityEntry],
+) -> tuple[list[Line], list[tuple[float, str]]]:
+    """Lines of the alternatives from the top, and the heads of the choices, with positions."""
     lines: list[Line] = []
     heads: list[tuple[float, str]] = []
     y = 0.0
     for name, members in groupby(found, heading):
         heads.append((y, name))
         y += 1.0
-        for _, group in groupby(members, lambda change: change.alternative):
+        for _, group in groupby(members, lambda entry: entry.alternative):
             same = list(group)
             lines.append((y, words(same[0].alternative), same))
             y += 1.0
@@ -76,11 +68,11 @@ def layout(found: Sequence[Change]) -> tuple[list[Line], list[tuple[float, str]]
     return lines, heads
 
 
-def _most(found: Sequence[Change]) -> float:
-    return max(LEAST, *(KILO * change.largest for change in found))
+def _most(found: Sequence[SensitivityEntry]) -> float:
+    return max(LEAST, *(KILO * entry.largest_change_pa for entry in found))
 
 
-def _draw_band(axes: Axes, found: list[Change]) -> None:
+def _draw_band(axes: Axes, found: Sequence[SensitivityEntry]) -> None:
     span = between_systems(found)
     if span is None:
         return
@@ -93,21 +85,21 @@ def _draw_line(axes: Axes, line: Line) -> None:
     """One mark per system at the rms, and a whisker to the largest change."""
     y, _, same = line
     order = list(MARKS)
-    for change in same:
-        place = order.index(change.system) - 1 if change.system in order else 0
-        colour = look(f"{FUZZY_PREFIX}{change.system}").colour
+    for entry in same:
+        place = order.index(entry.system) - 1 if entry.system in order else 0
+        colour = system_colour(entry.system)
         at = y + SPREAD * place
-        rms, largest = (max(KILO * value, LEAST) for value in (change.rms, change.largest))
+        changes = (entry.rms_change_pa, entry.largest_change_pa)
+        rms, largest = (max(KILO * value, LEAST) for value in changes)
         if largest > LEAST:
             axes.plot([rms, largest], [at, at], color=colour, linewidth=0.8)
             axes.plot([largest], [at], color=colour, marker="|", markersize=4)
-        axes.plot([rms], [at], **_mark(change.system))
+        axes.plot([rms], [at], **_mark(entry.system))
 
 
-def _mark(system: str) -> dict[str, Any]:
-    colour = look(f"{FUZZY_PREFIX}{system}").colour
+def _mark(system: str) -> Style:
     return {
-        "color": colour,
+        "color": system_colour(system),
         "marker": MARKS.get(system, "o"),
         "markersize": 3.4,
         "markeredgecolor": "white",
@@ -121,7 +113,7 @@ def _label(axes: Axes, lines: list[Line], heads: list[tuple[float, str]]) -> Non
     axes.set_yticks([y for y, _, _ in lines], [label for _, label, _ in lines])
     axes.tick_params(axis="y", length=0, labelsize=6.5)
     for y, name in heads:
-        place: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
+        place: Style = {"transform": axes.get_yaxis_transform(), "va": "center"}
         axes.text(-0.01, y, name, ha="right", fontweight="bold", fontsize=7, **place)
     ticks = [LEAST, 0.01, 0.1, 1.0, 10.0]
     axes.set_xticks(ticks, [f"≤ {LEAST:g}", *(f"{tick:g}" for tick in ticks[1:])])
@@ -129,10 +121,10 @@ def _label(axes: Axes, lines: list[Line], heads: list[tuple[float, str]]) -> Non
     axes.grid(visible=False, axis="y")
 
 
-def _legend(found: Sequence[Change], axes: Axes) -> list[Any]:
+def _legend(found: Sequence[SensitivityEntry], axes: Axes) -> list[Artist]:
     """A mark per system, and the band."""
     from matplotlib.lines import Line2D
 
-    systems = dict.fromkeys(change.system for change in found)
+    systems = dict.fromkeys(entry.system for entry in found)
     marks = [Line2D([], [], label=system_name(system), **_mark(system)) for system in systems]
     return [*marks, *axes.get_legend_handles_labels()[0]]

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 
-from reports.beforehand import Line, read
+from reports.benchmarks import Line, read
 from reports.digits import count, percent, words
 
 NAME = "stability"
@@ -27,8 +27,8 @@ MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
-class Case:
-    """A line of the table; numbers that there are not are None.
+class StabilityCase:
+    """A case of the stability study; numbers that there are not are None.
 
     `tolerance`: of the difference; None for a refusal.
     """
@@ -45,25 +45,25 @@ class Case:
 
     @property
     def judged(self) -> str:
-        """Its column of the matrix."""
+        """Column of the matrix that the case is counted in."""
         return OUTCOMES[self.outcome] if self.passed else FAILED
 
     @property
     def departure(self) -> float | None:
-        """What was measured over what was predicted, less one."""
+        """Measured over predicted value, less one; None without a prediction."""
         if not self.predicted or self.measured is None:
             return None
         return self.measured / self.predicted - 1.0
 
 
-def cases(folder: Traversable | None = None) -> list[Case]:
-    """Cases of a folder's table, or of the one that comes with the program; none if missing."""
+def cases(folder: Traversable | None = None) -> list[StabilityCase]:
+    """Stability cases of a folder's table, or of that of the program; none if it is missing."""
     return [_case(line) for line in read(NAME, folder)]
 
 
-def _case(line: Line) -> Case:
+def _case(line: Line) -> StabilityCase:
     within = re.search(r"within ([-+.\de]+)", line["expected"])
-    return Case(
+    return StabilityCase(
         family=line["family"],
         name=line["case"],
         outcome=line["outcome"],
@@ -80,8 +80,8 @@ def _number(text: str) -> float | None:
     return float(text) if text else None
 
 
-def matrix(found: Iterable[Case]) -> dict[str, Counter[str]]:
-    """Counts of each column of the matrix, by family."""
+def matrix(found: Iterable[StabilityCase]) -> dict[str, Counter[str]]:
+    """Counts of stability cases by family and by how they ended."""
     counts: dict[str, Counter[str]] = {}
     for case in found:
         counts.setdefault(case.family, Counter())[case.judged] += 1
@@ -90,7 +90,7 @@ def matrix(found: Iterable[Case]) -> dict[str, Counter[str]]:
 
 @dataclass(frozen=True)
 class Boundary:
-    """Where a series of cases, told apart by the number that their names begin with, breaks.
+    """Where a series of stability cases, told apart by the number in their names, breaks.
 
     `held`: the largest that did not diverge, None where all did; `broke`: the smallest that did;
     `those`: which of the integrators or models the two are of.
@@ -103,8 +103,8 @@ class Boundary:
     those: tuple[str, ...]
 
 
-def boundaries(found: Iterable[Case]) -> list[Boundary]:
-    """Every series in which a case diverges; integrators that break at the same place together."""
+def boundaries(found: Iterable[StabilityCase]) -> list[Boundary]:
+    """Boundaries of every series in which a case diverges; those at one place together."""
     series: dict[tuple[str, str, str], list[tuple[float, bool]]] = {}
     for case in found:
         split = NUMBERED.fullmatch(case.name)
@@ -120,8 +120,8 @@ def boundaries(found: Iterable[Case]) -> list[Boundary]:
     return [Boundary(*key, tuple(which)) for key, which in shared.items()]
 
 
-def sentences(found: Sequence[Case]) -> list[str]:
-    """How the cases ended and how well critical steps were predicted; where models break."""
+def sentences(found: Sequence[StabilityCase]) -> list[str]:
+    """Sentences on how the cases ended, how well steps were predicted, where models break."""
     told = [_ended(found)]
     steps = [case for case in found if case.family == CRITICAL_STEP and case.departure is not None]
     if steps:
@@ -132,7 +132,7 @@ def sentences(found: Sequence[Case]) -> list[str]:
     return told
 
 
-def _ended(found: Sequence[Case]) -> str:
+def _ended(found: Sequence[StabilityCase]) -> str:
     failed = [case for case in found if not case.passed]
     families = len(matrix(found))
     start = f"Of {count(len(found))} cases in {families} families "
@@ -144,7 +144,7 @@ def _ended(found: Sequence[Case]) -> str:
     return f"{start}{len(failed)} {verb} not end as expected: {named}{more}."
 
 
-def _predicted(steps: Sequence[Case]) -> str:
+def _predicted(steps: Sequence[StabilityCase]) -> str:
     worst = max(steps, key=lambda case: abs(case.departure or 0.0))
     return (
         f"The critical step was measured in {len(steps)} cases; it differs from the predicted one "

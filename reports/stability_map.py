@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import canvas
-from reports.appearance import series
-from reports.stability import CRITICAL_STEP, FAILED, OUTCOMES, Case, cases, matrix
+from reports.appearance import Style, series
+from reports.stability import CRITICAL_STEP, FAILED, OUTCOMES, StabilityCase, cases, matrix
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 MAP, STEPS = "stability", "critical_step"
 ALARM = "#B3261E"
@@ -29,29 +30,22 @@ PER_CENT = 100.0
 
 
 def write_figures(folder: Path) -> list[Path]:
-    """Draw the table of a folder as SVG and PDF into it; what it has no cases for is left out."""
+    """Draw the stability cases of a folder as SVG and PDF into it; none without cases."""
     found = cases(folder)
-    with canvas.style():
-        figures = {MAP: _map(found), STEPS: _steps(found)}
-        drawn = ((folder / name, figure) for name, figure in figures.items())
-        return [path for stem, figure in drawn if figure for path in canvas.write(figure, stem)]
+    return canvas.write({folder / MAP: lambda: _map(found), folder / STEPS: lambda: _steps(found)})
 
 
-def stability_map(found: Sequence[Case]) -> bytes | None:
-    """Counts by family and outcome, and the share of its tolerance that each case used, as SVG."""
-    with canvas.style():
-        figure = _map(found)
-        return None if figure is None else canvas.svg(figure)
+def stability_map(found: Sequence[StabilityCase]) -> bytes | None:
+    """Map of cases by family and outcome, and of the tolerance that each used, as SVG."""
+    return canvas.picture(lambda: _map(found))
 
 
-def critical_step_figure(found: Sequence[Case]) -> bytes | None:
-    """Measured over predicted critical step by case and integrator, as SVG; None without any."""
-    with canvas.style():
-        figure = _steps(found)
-        return None if figure is None else canvas.svg(figure)
+def critical_step_figure(found: Sequence[StabilityCase]) -> bytes | None:
+    """Figure of measured over predicted critical step as SVG, None without any."""
+    return canvas.picture(lambda: _steps(found))
 
 
-def _map(found: Sequence[Case]) -> Figure | None:
+def _map(found: Sequence[StabilityCase]) -> Figure | None:
     if not found:
         return None
     families = list(matrix(found))
@@ -64,7 +58,7 @@ def _map(found: Sequence[Case]) -> Figure | None:
     return figure
 
 
-def _draw_counts(axes: Axes, found: Sequence[Case]) -> None:
+def _draw_counts(axes: Axes, found: Sequence[StabilityCase]) -> None:
     for y, counts in enumerate(matrix(found).values()):
         for x, head in enumerate(HEADS):
             wrong = head == FAILED and counts[head] > 0
@@ -80,7 +74,7 @@ def _draw_counts(axes: Axes, found: Sequence[Case]) -> None:
     axes.spines[:].set_visible(False)
 
 
-def _draw_shares(axes: Axes, found: Sequence[Case], families: Sequence[str]) -> None:
+def _draw_shares(axes: Axes, found: Sequence[StabilityCase], families: Sequence[str]) -> None:
     """One mark per case with a number; marks of a family are spread so that they show."""
     for y, family in enumerate(families):
         members = [case for case in found if case.family == family and case.tolerance is not None]
@@ -95,7 +89,7 @@ def _draw_shares(axes: Axes, found: Sequence[Case], families: Sequence[str]) -> 
     axes.tick_params(axis="y", length=0, labelleft=False)
 
 
-def _share(case: Case) -> float:
+def _share(case: StabilityCase) -> float:
     """Of its tolerance; a case without a difference did not meet its end and is off the scale."""
     if case.difference is None or case.tolerance is None:
         return 2.5
@@ -103,13 +97,13 @@ def _share(case: Case) -> float:
     return float(np.clip(case.difference / limit, LEAST, 2.5))
 
 
-def _mark(case: Case) -> dict[str, Any]:
+def _mark(case: StabilityCase) -> Style:
     if case.passed:
         return {"marker": "o", "markersize": 2.4, "color": "#0072B2", "alpha": 0.55, "mew": 0}
     return {"marker": "X", "markersize": 5, "color": ALARM, "linestyle": ""}
 
 
-def _steps(found: Sequence[Case]) -> Figure | None:
+def _steps(found: Sequence[StabilityCase]) -> Figure | None:
     shown = [case for case in found if case.family == CRITICAL_STEP and case.departure is not None]
     if not shown:
         return None
@@ -128,13 +122,13 @@ def _steps(found: Sequence[Case]) -> Figure | None:
     return figure
 
 
-def _parts(case: Case) -> tuple[str, str]:
+def _parts(case: StabilityCase) -> tuple[str, str]:
     """What is varied, and the integrator, of a case named "varied: integrator"."""
     title, _, which = case.name.rpartition(": ")
     return (title, which) if title else (which, "")
 
 
-def _label_steps(axes: Axes, titles: Sequence[str], shown: Sequence[Case]) -> None:
+def _label_steps(axes: Axes, titles: Sequence[str], shown: Sequence[StabilityCase]) -> None:
     limit = PER_CENT * max((case.tolerance or 0.0) for case in shown)
     axes.axvspan(-limit, limit, color="#f0f0f0", linewidth=0, zorder=0.3)
     axes.axvline(0.0, color="black", linewidth=0.8, zorder=0.6)
@@ -147,7 +141,7 @@ def _label_steps(axes: Axes, titles: Sequence[str], shown: Sequence[Case]) -> No
     axes.tick_params(axis="y", length=0)
 
 
-def _legend(looks: dict[str, dict[str, Any]]) -> list[Any]:
+def _legend(looks: dict[str, Style]) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
     return [

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from typing import Any
 
-from reports.appearance import look, reference_name, system_name, system_of
-from reports.differences import field_errors, own_error, resolved
+from reports.appearance import labels, reference_name, system_name
+from reports.differences import field_errors, finite_elements, own_error, resolved
 from reports.digits import (
     DASH,
     PA_PER_KPA,
+    Table,
     fixed,
     percent,
     quantity,
@@ -20,8 +21,9 @@ from reports.digits import (
 )
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
-from reports.ranking import Verdict, references, tool_probe, verdicts
+from reports.ranking import Lead, leads, references, tool_probe
 from study.results.folder import Results
+from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
 GLANCE = (
     "model",
@@ -38,49 +40,54 @@ LAWS = {"neo-hookean": "neo-Hookean", "st-venant-kirchhoff": "Saint Venant-Kirch
 MILLI = 1e3
 
 
-def glance(results: Results) -> dict[str, Any]:
-    """Header and one row per model; a column that no model fills is left out."""
-    rows = [_glance_row(results, record) for record in results.numbers["models"]]
+def glance(results: Results) -> dict[str, list[str] | Table]:
+    """Table of the first page, a row per model; a column that no model fills is left out."""
+    rows = [_glance_row(results, model) for model in results.record.models]
     kept = [
         i for i, name in enumerate(GLANCE) if name in ALWAYS or any(row[i] != DASH for row in rows)
     ]
     return {"header": [GLANCE[i] for i in kept], "rows": [[row[i] for i in kept] for row in rows]}
 
 
-def _glance_row(results: Results, record: dict[str, Any]) -> list[str]:
-    name = record["name"]
-    modulus, reference = young_modulus(results, record), _reference_modulus(results)
-    errors = field_errors(results).get((name, "fem"), {})
+def _glance_row(results: Results, model: ModelRecord) -> list[str]:
+    modulus, reference = young_modulus(results, model), results.scene.tissue.youngs_modulus
+    errors = field_errors(results).get((model.name, "fem"), {})
     own = own_error(results)
-    wall = record.get("wall_s")
     return [
-        look(name).label,
+        model.label,
         DASH if modulus is None else fixed(modulus / PA_PER_KPA, 2),
         DASH if modulus is None else fixed(modulus / reference, 2),
-        _peak_at_tool(results, record),
-        _own(own) if name == "fem" else _difference(errors.get("field-relative-l2-peak"), own),
+        _peak_at_tool(results, model),
+        _own(own)
+        if model.name == "fem"
+        else _difference(errors.get("field-relative-l2-peak"), own),
         _difference(errors.get("field-relative-l2-peak-at-best-factor"), own),
-        DASH if not wall else significant(record["simulated_s"] / wall, 2),
-        status(record),
+        real_time_factor(model),
+        status(model),
     ]
 
 
-def _peak_at_tool(results: Results, record: dict[str, Any]) -> str:
-    probe = tool_probe(results)
-    if probe is None or record["status"] != "finished":
+def _peak_at_tool(results: Results, model: ModelRecord) -> str:
+    if model.status != "finished":
         return DASH
-    return printed_peak(results, record, probe)
+    return printed_peak(results, model, tool_probe(results))
 
 
-def printed_peak(results: Results, record: dict[str, Any], probe: str) -> str:
+def printed_peak(results: Results, model: ModelRecord, probe: str) -> str:
     """Largest displacement [mm] at a probe, with the error of that curve by the mesh if known."""
-    largest = peak(results, record["name"], probe)
+    largest = peak(results, model.name, probe)
     if largest is None:
         return DASH
-    there = record.get("mesh_error_by_probe", {}).get(probe)
-    if not there:
+    if model.mesh_error is None:
         return significant(MILLI * largest)
-    return with_error(MILLI * largest, MILLI * largest * there["displacement"])
+    return with_error(
+        MILLI * largest, MILLI * largest * model.mesh_error.by_probe[probe].displacement
+    )
+
+
+def real_time_factor(model: ModelRecord) -> str:
+    """Simulated over wall time of a model as printed, a dash where it was not timed."""
+    return significant(model.simulated_s / model.wall_s, 2) if model.wall_s else DASH
 
 
 def _own(error: float | None) -> str:
@@ -91,22 +98,20 @@ def _difference(share: float | None, error: float | None) -> str:
     return DASH if share is None else resolved(share, error)
 
 
-def young_modulus(results: Results, record: dict[str, Any]) -> float | None:
+def young_modulus(results: Results, model: ModelRecord) -> float | None:
     """Small-strain Young's modulus [Pa] of a model, or None if it has none."""
-    if record["name"] == "fem":
-        return _reference_modulus(results)
-    system = system_of(record["name"])
-    found = results.numbers["stiffness"].get(system, {}) if system else {}
-    modulus = record.get("small_strain_modulus_pa", found.get("estimate_pa"))
-    return None if modulus is None else float(modulus)
+    if model.name == "fem":
+        return results.scene.tissue.youngs_modulus
+    if model.small_strain_modulus_pa is not None or model.system is None:
+        return model.small_strain_modulus_pa
+    return results.record.fuzzy.systems[model.system].estimate_pa
 
 
-def status(record: dict[str, Any]) -> str:
+def status(model: ModelRecord) -> str:
     """Whether a model finished, or when it diverged."""
-    if record["status"] != "diverged":
-        return str(record["status"])
-    when = record.get("diverged_at_s")
-    return "diverged" if when is None else f"diverged at {significant(when)} s"
+    if model.status != "diverged" or model.diverged_at_s is None:
+        return model.status
+    return f"diverged at {significant(model.diverged_at_s)} s"
 
 
 def sentences(results: Results) -> list[str]:
@@ -122,20 +127,20 @@ def sentences(results: Results) -> list[str]:
 
 
 def _estimates(results: Results) -> Iterator[str]:
-    found = results.numbers["stiffness"]
+    found = results.record.fuzzy.systems
     if not found:
         return
-    reference = _reference_modulus(results)
-    printed = quantity(results.numbers["scene"]["tissue"]["youngs_modulus"])
-    shares = sorted(one["estimate_pa"] / reference for one in found.values())
-    kilo = sorted(one["estimate_pa"] / PA_PER_KPA for one in found.values())
+    reference = results.scene.tissue.youngs_modulus
+    printed = quantity(f"{reference} Pa")
+    shares = sorted(one.estimate_pa / reference for one in found.values())
+    kilo = sorted(one.estimate_pa / PA_PER_KPA for one in found.values())
     yield (
         f"Stiffness: the fuzzy systems estimate {spread([fixed(k, 2) for k in kilo])} kPa, "
         f"{spread([fixed(s, 2) for s in shares])} times the reference modulus of {printed}."
     )
     for name, one in found.items():
-        if one.get("interval_pa"):
-            low, high = one["interval_pa"]
+        if one.interval_pa is not None:
+            low, high = one.interval_pa
             verb = "contains" if low <= reference <= high else "does not contain"
             yield (
                 f"The interval of {system_name(name)}, {fixed(low / PA_PER_KPA, 2)} to "
@@ -151,9 +156,9 @@ def _fields(results: Results) -> Iterator[str]:
         if reference == "fem"
     }
     if found:
+        error, named = own_error(results), labels(results)
         ranked = sorted(found, key=lambda model: found[model])
-        error = own_error(results)
-        parts = [f"{look(model).label} {resolved(found[model], error)}" for model in ranked]
+        parts = [f"{named[model]} {resolved(found[model], error)}" for model in ranked]
         yield (
             "Field: at peak load the displacement over the whole organ differs from that of the "
             f"finite elements by, in relative L2, {', '.join(parts)}."
@@ -161,69 +166,68 @@ def _fields(results: Results) -> Iterator[str]:
 
 
 def _limits(results: Results) -> Iterator[str]:
-    limits = results.numbers.get("lattice_limits")
-    if limits:
-        places = {
-            "relative_l2": f"at Poisson ratio {limits['poisson_ratio']:g}",
-            "relative_l2_at_best_factor": "at best factor",
-            "relative_l2_at_quarter": "against Poisson ratio 0.25",
-            "relative_l2_with_volume_term": (
-                "with one volume term per cell, which frees the Poisson ratio"
-            ),
-        }
-        error = own_error(results)
-        parts = [
-            f"{resolved(limits[key], error)} {place}"
-            for key, place in places.items()
-            if limits.get(key) is not None
-        ]
+    limits, error = results.record.lattice_limits, own_error(results)
+    if limits is not None:
+        parts = [f"{resolved(share, error)} {place}" for share, place in _by_place(limits)]
         yield (
             "Limit of the springs: at rest and with the exact modulus the lattice's field still "
             f"differs, in relative L2: {', '.join(parts)}."
         )
 
 
+def _by_place(limits: LatticeLimits) -> Iterator[tuple[float, str]]:
+    yield limits.relative_l2, f"at Poisson ratio {limits.poisson_ratio:g}"
+    yield limits.relative_l2_at_best_factor, "at best factor"
+    yield limits.relative_l2_at_quarter, "against Poisson ratio 0.25"
+    if limits.relative_l2_with_volume_term is not None:
+        place = "with one volume term per cell, which frees the Poisson ratio"
+        yield limits.relative_l2_with_volume_term, place
+
+
 def _rankings(results: Results) -> Iterator[str]:
-    probe = tool_probe(results)
-    for reference in references(results) if probe else ():
-        found = list(verdicts(results, reference, str(probe)))
+    probe, named = tool_probe(results), labels(results)
+    for reference in references(results):
+        found = list(leads(results, reference, probe))
         if found:
             yield (
-                f"Similarity to {reference_name(reference)} at control point {words(str(probe))}: "
-                f"{_winners(found)}{_elsewhere(results, reference, str(probe))}"
+                f"Similarity to {reference_name(results, reference)} at control point "
+                f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
             )
 
 
-def _winners(found: list[Verdict]) -> str:
+def _winners(found: list[Lead], named: dict[str, str]) -> str:
     """Who scored highest by how many measures, and how many of the leads are resolved."""
-    leaders = [verdict.best for verdict in found if verdict.lead > 0.0]
-    ranked = sorted(dict.fromkeys(leaders), key=lambda model: -leaders.count(model))
-    if not ranked:
+    counts = _times_highest(found)
+    if not counts:
         return f"the two highest scores are equal on all {len(found)} measures."
-    first, *others = [f"on {leaders.count(model)}" for model in ranked]
-    parts = [f"{look(ranked[0]).label} scores highest {first} of {len(found)} measures"]
-    parts += [f"{look(m).label} {count}" for m, count in zip(ranked[1:], others, strict=True)]
-    leads = sorted(verdict.lead for verdict in found)
-    span = spread([fixed(lead, 4) for lead in (leads[0], leads[-1])])
+    (first, most), *others = counts
+    parts = [f"{named[first]} scores highest on {most} of {len(found)} measures"]
+    parts += [f"{named[model]} on {times}" for model, times in others]
+    margins = [lead.margin for lead in found]
+    span = spread([fixed(margin, 4) for margin in (min(margins), max(margins))])
     return f"{', '.join(parts)}; leads over the next: {span}. {_resolution(found)}"
+
+
+def _times_highest(found: list[Lead]) -> list[tuple[str, int]]:
+    """Models that scored highest, and how often, the most frequent first."""
+    return Counter(lead.best for lead in found if lead.margin > 0.0).most_common()
 
 
 def _elsewhere(results: Results, reference: str, probe: str) -> str:
     """Who scored highest how often at the other control points."""
-    others = [name for name in results.numbers["probes"] if name != probe]
-    found = [verdict for other in others for verdict in verdicts(results, reference, other)]
-    leaders = [verdict.best for verdict in found if verdict.lead > 0.0]
-    if not leaders:
+    others = [name for name in results.record.probes if name != probe]
+    found = [lead for other in others for lead in leads(results, reference, other)]
+    named = labels(results)
+    parts = [f"{named[model]} {times}" for model, times in _times_highest(found)]
+    if not parts:
         return ""
-    ranked = sorted(dict.fromkeys(leaders), key=lambda model: -leaders.count(model))
-    parts = [f"{look(model).label} {leaders.count(model)}" for model in ranked]
     return (
         f" Highest at the other control points, of {len(found)} scores: {', '.join(parts)}. "
         f"{_resolution(found)}"
     )
 
 
-def _resolution(found: list[Verdict]) -> str:
+def _resolution(found: list[Lead]) -> str:
     counts = {
         "{} above the numerical error of the curves": True,
         "{} not resolved": False,
@@ -232,60 +236,47 @@ def _resolution(found: list[Verdict]) -> str:
     parts = [
         text.format(n)
         for text, value in counts.items()
-        if (n := sum(verdict.is_resolved is value for verdict in found))
+        if (n := sum(lead.is_resolved is value for lead in found))
     ]
     return f"Of these leads {', '.join(parts)}."
 
 
 def _reference(results: Results) -> Iterator[str]:
     """Discretisation error and largest strain of the reference."""
-    record = next((m for m in results.numbers["models"] if m["name"] == "fem"), None)
-    if record is None:
+    model = finite_elements(results)
+    if model is None or model.elements is None:
         return
-    error = record.get("mesh_error")
-    if error:
-        meshes = record.get("mesh_levels")
-        source = f" from {min(len(meshes), 3)} meshes" if meshes else ""
-        yield (
-            f"Reference: its own discretisation error is estimated{source} at "
-            f"{percent(error['field_peak'])} of the field at the peak and at most "
-            f"{percent(error['displacement'])} of a displacement and {percent(error['velocity'])} "
-            f"of a velocity curve{_at_tool(results, record)}."
-        )
-    else:
+    error = model.elements.mesh_error
+    if error is None:
         yield "Reference: its discretisation error is not estimated."
-    strain = record.get("largest_strain")
+    else:
+        worst, probe = error.worst, tool_probe(results)
+        there = error.by_probe[probe]
+        yield (
+            "Reference: its own discretisation error is estimated from "
+            f"{min(len(model.elements.levels), 3)} meshes at {percent(error.field_peak)} of the "
+            f"field at the peak and at most {percent(worst.displacement)} of a displacement and "
+            f"{percent(worst.velocity)} of a velocity curve ({percent(there.displacement)} and "
+            f"{percent(there.velocity)} at control point {words(probe)})."
+        )
+    strain, limit = model.largest_strain, results.record.strain_limit
     if strain is not None:
-        limit = results.numbers["strain_limit"]
+        beyond = _large_strain(model.elements.large_strain) if strain > limit else ""
         side = "below" if strain < limit else "not below"
         yield (
             f"Its largest strain is {percent(strain)}, {side} the {percent(limit)} up to "
-            f"which linear strain is trusted here.{_beyond(record, strain, limit)}"
+            f"which linear strain is trusted here.{beyond}"
         )
 
 
-def _beyond(record: dict[str, Any], strain: float, limit: float) -> str:
+def _large_strain(found: LargeStrain | None) -> str:
     """What large deformation changes where linear strain is not trusted, if it was computed."""
-    found = record.get("hyperelastic")
-    if not found or strain <= limit:
+    if found is None:
         return ""
-    law = LAWS.get(found["law"], found["law"])
+    law = LAWS.get(found.law, found.law)
     return (
-        f" A {law} solid on the same mesh moves otherwise by {percent(found['field_difference'])} "
+        f" A {law} solid on the same mesh moves otherwise by {percent(found.field_difference)} "
         f"of the field at the peak (relative L2; largest logarithmic strain "
-        f"{percent(found['largest_strain'])}): so much of a difference from the linear reference "
+        f"{percent(found.largest_strain)}): so much of a difference from the linear reference "
         "may be large deformation, which that leaves out."
     )
-
-
-def _at_tool(results: Results, record: dict[str, Any]) -> str:
-    probe = tool_probe(results)
-    there = record.get("mesh_error_by_probe", {}).get(probe)
-    if not there:
-        return ""
-    shares = f"{percent(there['displacement'])} and {percent(there['velocity'])}"
-    return f" ({shares} at control point {words(str(probe))})"
-
-
-def _reference_modulus(results: Results) -> float:
-    return float(results.numbers["scene"]["tissue"]["youngs_modulus"].split()[0])

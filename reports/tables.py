@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import groupby
-from typing import Any
+from operator import itemgetter
 
-from reports.appearance import look, reference_name, system_name
+from reports.appearance import labels, reference_name, system_name
 from reports.differences import field_errors, own_error, resolved
 from reports.digits import (
     DASH,
     PA_PER_KPA,
+    Group,
     Table,
     count,
     fixed,
@@ -23,15 +24,17 @@ from reports.digits import (
 from reports.paper import TABLE_III
 from reports.ranking import (
     Column,
-    Verdict,
+    Lead,
     columns,
+    leads,
     references,
     score_table,
     tool_probe,
-    verdicts,
 )
-from reports.summary import status
+from reports.summary import real_time_factor, status
 from study.results.folder import Results
+from study.results.records import CurveErrors, ModelRecord, SystemEstimate
+from study.scene.file import resolved as resolved_scene
 from study.similarity.score import FORMULAS
 
 BEST = "*"
@@ -74,51 +77,52 @@ AT_PEAK = ("field-relative-l2-peak", "field-relative-l2-peak-at-best-factor")
 
 
 def estimate_rows(results: Results) -> Table:
-    """System, estimate, interval, quadrature error, relative to the reference."""
-    return [_estimate_row(name, one) for name, one in results.numbers["stiffness"].items()]
+    """Estimates of the fuzzy systems with interval and quadrature error, beside the reference."""
+    return [_estimate_row(name, one) for name, one in results.record.fuzzy.systems.items()]
 
 
-def _estimate_row(name: str, one: dict[str, Any]) -> list[str]:
-    interval = one.get("interval_pa")
-    bounds = [fixed(bound / PA_PER_KPA, 2) for bound in interval or ()]
+def _estimate_row(name: str, one: SystemEstimate) -> list[str]:
+    bounds = [fixed(bound / PA_PER_KPA, 2) for bound in one.interval_pa or ()]
     return [
         system_name(name),
-        fixed(one["estimate_pa"] / PA_PER_KPA, 2),
+        fixed(one.estimate_pa / PA_PER_KPA, 2),
         " to ".join(bounds) or DASH,
-        significant(one["quadrature_error_pa"] / PA_PER_KPA, 1),
-        fixed(one["relative_to_reference"], 3),
+        significant(one.quadrature_error_pa / PA_PER_KPA, 1),
+        fixed(one.relative_to_reference, 3),
     ]
 
 
 def estimate_notes(results: Results) -> list[str]:
     """What the fuzzy systems say of the readings, each once."""
-    notes = [note for one in results.numbers["stiffness"].values() for note in one["notes"]]
+    notes = [note for one in results.record.fuzzy.systems.values() for note in one.notes]
     return [words(note) for note in dict.fromkeys(notes)]
 
 
-def scene_groups(results: Results) -> list[dict[str, Any]]:
+def scene_groups(results: Results) -> list[Group]:
     """Tables of the resolved scene: name, and rows of key and value."""
-    scene = results.numbers["scene"]
-    whole = [[key, words(_value(v))] for key, v in scene.items() if _is_value(v)]
-    groups = [{"name": "scene", "rows": [row for row in whole if row[0] not in LEFT_OUT]}]
-    for name, table in scene.items():
-        if isinstance(table, dict) and table:
-            rows = [[words(key), words(value)] for key, value in _flat(table)]
-            groups.append({"name": name, "rows": rows})
-    return [{**group, "name": words(str(group["name"]).replace("_", " "))} for group in groups]
+    scene = resolved_scene(results.scene)
+    whole = {key: v for key, v in scene.items() if not isinstance(v, dict) and key not in LEFT_OUT}
+    tables = {"scene": whole} | {key: v for key, v in scene.items() if isinstance(v, dict) and v}
+    return [
+        {
+            "name": words(name.replace("_", " ")),
+            "rows": [[words(key), words(value)] for key, value in _flat(table)],
+        }
+        for name, table in tables.items()
+    ]
 
 
-def balanced(groups: list[dict[str, Any]], count: int) -> list[list[dict[str, Any]]]:
-    """Groups in order in so many columns, the tallest of which is as low as can be."""
+def balanced(groups: list[Group], count: int) -> list[list[Group]]:
+    """Groups of rows in order in so many columns, the tallest of which is as low as can be."""
     whole = sum(_height(group) for group in groups)
     limits = range(max(map(_height, groups), default=0), whole + 1)
     columns = next(c for limit in limits if len(c := _filled(groups, limit)) <= count)
     return columns + [[]] * (count - len(columns))
 
 
-def _filled(groups: list[dict[str, Any]], limit: int) -> list[list[dict[str, Any]]]:
+def _filled(groups: list[Group], limit: int) -> list[list[Group]]:
     """Columns of groups up to a height, one after the other."""
-    columns: list[list[dict[str, Any]]] = []
+    columns: list[list[Group]] = []
     left = 0
     for group in groups:
         if _height(group) > left:
@@ -129,25 +133,21 @@ def _filled(groups: list[dict[str, Any]], limit: int) -> list[list[dict[str, Any
     return columns
 
 
-def _height(group: dict[str, Any]) -> int:
+def _height(group: Group) -> int:
     """Lines that a group takes, about."""
     rows = (max(-(-len(key) // KEY), -(-len(value) // VALUE)) for key, value in group["rows"])
     return HEADING_ROWS + sum(rows)
 
 
-def _is_value(value: Any) -> bool:
-    return value is not None and not isinstance(value, dict)
-
-
-def _flat(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
     for key, value in table.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")
-        elif value is not None:
+        else:
             yield f"{prefix}{key}", _value(value)
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(_value(entry) for entry in value)
     if isinstance(value, bool):
@@ -156,20 +156,20 @@ def _value(value: Any) -> str:
 
 
 def dimensionless_rows(results: Results) -> Table:
-    """Label and value of the numbers that show a mistaken unit."""
-    found = results.numbers.get("dimensionless", {})
-    return [
-        [label, show(found[key])] for key, (label, show) in DIMENSIONLESS.items() if key in found
-    ]
+    """Labels and values of the numbers that show a mistaken unit."""
+    found = results.record.dimensionless
+    if found is None:
+        return []
+    return [[label, show(getattr(found, key))] for key, (label, show) in DIMENSIONLESS.items()]
 
 
-def similarity_tables(results: Results) -> list[dict[str, Any]]:
-    """One table per reference: curves and measures as header, rows grouped by control point."""
+def similarity_tables(results: Results) -> list[dict[str, object]]:
+    """Similarity tables, one per reference: curves and measures over rows by control point."""
     heads = columns(results)
-    curves = [[CURVE_NAMES.get(c, c), len(list(g))] for c, g in groupby(heads, lambda h: h[0])]
+    curves = [(CURVE_NAMES.get(c, c), len(list(g))) for c, g in groupby(heads, itemgetter(0))]
     return [
         {
-            "reference": reference_name(reference),
+            "reference": reference_name(results, reference),
             "curves": [{"name": name, "count": count} for name, count in curves],
             "measures": [MEASURE_NAMES.get(measure, measure) for _, measure in heads],
             "groups": list(_score_groups(results, reference, heads)),
@@ -178,48 +178,47 @@ def similarity_tables(results: Results) -> list[dict[str, Any]]:
     ]
 
 
-def _score_groups(
-    results: Results, reference: str, heads: list[Column]
-) -> Iterator[dict[str, Any]]:
+def _score_groups(results: Results, reference: str, heads: list[Column]) -> Iterator[Group]:
     """Scores by control point; a highest one bears a mark where its lead is resolved."""
-    for probe in results.numbers["probes"]:
+    named = labels(results)
+    for probe in results.record.probes:
         scores = score_table(results, reference, probe)
-        found = verdicts(results, reference, probe)
-        winners = {(v.best, v.column) for v in found if v.is_resolved}
+        found = leads(results, reference, probe)
+        winners = {(lead.best, lead.column) for lead in found if lead.is_resolved}
         rows = [
-            [look(model).label, *(_score(row.get(h), is_best=(model, h) in winners) for h in heads)]
+            [named[model], *(_score(row.get(h), is_best=(model, h) in winners) for h in heads)]
             for model, row in scores.items()
         ]
         if rows:
-            yield {"probe": words(probe), "rows": rows}
+            yield {"name": words(probe), "rows": rows}
 
 
 def _score(value: float | None, *, is_best: bool) -> str:
     return DASH if value is None else fixed(value, 4) + (BEST if is_best else "")
 
 
-def verdict_rows(results: Results) -> Table:
-    """Reference, curve, measure, best, runner-up, lead, numerical error, whether resolved."""
-    probe = tool_probe(results)
+def lead_rows(results: Results) -> Table:
+    """Leads at the tool: reference, measure, best, next, margin, error, whether resolved."""
+    probe, named = tool_probe(results), labels(results)
     return [
-        _verdict_row(verdict)
-        for reference in (references(results) if probe else ())
-        for verdict in verdicts(results, reference, str(probe))
+        _lead_row(lead, named)
+        for reference in references(results)
+        for lead in leads(results, reference, probe)
     ]
 
 
-def _verdict_row(verdict: Verdict) -> list[str]:
-    curve, measure = verdict.column
-    error = DASH if verdict.error is None else _tiny_too(verdict.error)
+def _lead_row(lead: Lead, named: dict[str, str]) -> list[str]:
+    curve, measure = lead.column
+    error = DASH if lead.error is None else _tiny_too(lead.error)
     return [
-        look(verdict.reference).label,
+        named[lead.reference],
         CURVE_NAMES.get(curve, curve),
         MEASURE_NAMES.get(measure, measure),
-        look(verdict.best).label,
-        look(verdict.runner_up).label,
-        fixed(verdict.lead, 4),
-        error if verdict.is_whole or verdict.error is None else f"≥ {error}",
-        RESOLVED[verdict.is_resolved],
+        named[lead.best],
+        named[lead.runner_up],
+        fixed(lead.margin, 4),
+        error if lead.is_whole or lead.error is None else f"≥ {error}",
+        RESOLVED[lead.is_resolved],
     ]
 
 
@@ -229,18 +228,18 @@ def _tiny_too(value: float) -> str:
 
 def paper_rows(results: Results) -> Table:
     """The paper's Table III beside this run's lowest and highest score against the benchmark."""
-    probe = tool_probe(results)
-    scores = score_table(results, "basafa", probe) if probe else {}
+    scores = score_table(results, "basafa", tool_probe(results))
+    tuned = {model.system: scores.get(model.name, {}) for model in results.record.models}
     rows = []
     for system, printed in TABLE_III.items():
-        ours = list(scores.get(f"msm-{system}", {}).values())
+        ours = list(tuned.get(system, {}).values())
         span = f"{fixed(min(ours), 4)} to {fixed(max(ours), 4)}" if ours else DASH
         rows.append([f"Benchmark – {system_name(system)}", fixed(printed, 4), span])
     return rows
 
 
 def formula_rows() -> Table:
-    """Measure, its formula as typst mathematics, and what its symbols mean."""
+    """Measures of similarity, their formulas as typst mathematics, and what the symbols mean."""
     return [_formula_row(name, text) for name, text in FORMULAS.items()]
 
 
@@ -251,11 +250,12 @@ def _formula_row(name: str, text: str) -> list[str]:
 
 
 def error_rows(results: Results) -> Table:
-    """Reference, model, field differences and best factor."""
+    """Field differences and best factor of each model from each reference."""
+    named = labels(results)
     return [
         [
-            look(reference).label,
-            look(model).label,
+            named[reference],
+            named[model],
             *_differences(values, own_error(results, reference)),
             fixed(values["field-best-factor-peak"], 3),
         ]
@@ -270,25 +270,23 @@ def _differences(values: dict[str, float], error: float | None) -> Iterator[str]
 
 def model_rows(results: Results) -> Table:
     """Size, steps and cost of each model."""
-    return [_model_row(record) for record in results.numbers["models"]]
+    return [_model_row(model) for model in results.record.models]
 
 
-def _model_row(record: dict[str, Any]) -> list[str]:
-    parts = record.get("elements", record.get("springs"))
-    step, critical = record.get("time_step_s"), record.get("critical_time_step_s")
-    wall, simulated = record.get("wall_s"), record["simulated_s"]
+def _model_row(model: ModelRecord) -> list[str]:
+    step, critical = model.time_step_s, model.critical_time_step_s
     return [
-        look(record["name"]).label,
-        _integer(record.get("nodes")),
-        _integer(parts),
+        model.label,
+        _integer(model.nodes),
+        _integer(model.parts),
         DASH if step is None else significant(1e3 * step),
         DASH if critical is None else significant(1e3 * critical),
         DASH if not step or not critical else fixed(step / critical, 2),
-        _integer(record.get("steps")),
-        DASH if wall is None else significant(wall, 2),
-        significant(simulated),
-        DASH if not wall else significant(simulated / wall, 2),
-        status(record),
+        _integer(model.steps),
+        DASH if model.wall_s is None else significant(model.wall_s, 2),
+        significant(model.simulated_s),
+        real_time_factor(model),
+        status(model),
     ]
 
 
@@ -298,17 +296,20 @@ def _integer(number: int | None) -> str:
 
 def numerics_rows(results: Results) -> Table:
     """Estimated errors of each model by time step and mesh, its strain, its inverted cells."""
-    rows = [_numerics_row(record) for record in results.numbers["models"]]
+    rows = [_numerics_row(model) for model in results.record.models]
     return [row for row in rows if any(cell != DASH for cell in row[1:])]
 
 
-def _numerics_row(record: dict[str, Any]) -> list[str]:
-    mesh = record.get("mesh_error") or {}
-    shares = [record.get("time_step_error"), record.get("time_step_error_velocity")]
-    shares += [mesh.get(name) for name in ("displacement", "velocity", "field_peak")]
-    shares.append(record.get("largest_strain", record.get("largest_spring_strain")))
+def _numerics_row(model: ModelRecord) -> list[str]:
+    mesh, lattice = model.mesh_error, model.lattice
+    whole = [None if mesh is None else mesh.field_peak, model.largest_strain]
+    shares = [*_both(model.time_step_error), *_both(None if mesh is None else mesh.worst), *whole]
     cells = [DASH if share is None else _share(share) for share in shares]
-    return [look(record["name"]).label, *cells, _integer(record.get("inverted_cells"))]
+    return [model.label, *cells, _integer(None if lattice is None else lattice.inverted_cells)]
+
+
+def _both(errors: CurveErrors | None) -> list[float | None]:
+    return [None, None] if errors is None else [errors.displacement, errors.velocity]
 
 
 def _share(share: float) -> str:
@@ -316,26 +317,25 @@ def _share(share: float) -> str:
 
 
 def check_rows(results: Results) -> Table:
-    """Name, value, limit, meaning and outcome of each check."""
+    """Checks of the study on itself: name, value, limit, meaning and outcome."""
     return [
         [
-            check["name"],
-            significant(check["value"], 2),
-            significant(check["limit"], 2),
-            check["meaning"],
-            "passed" if check["passed"] else "FAILED",
+            check.name,
+            significant(check.value, 2),
+            significant(check.limit, 2),
+            check.meaning,
+            "passed" if check.passed else "FAILED",
         ]
-        for check in results.numbers["checks"]
+        for check in results.record.checks
     ]
 
 
 def provenance_rows(results: Results) -> Table:
-    """Versions, commit, platform, hashes and time taken."""
-    found = results.numbers["provenance"]
-    versions = ", ".join(f"{name} {v}" for name, v in found["versions"].items() if v)
+    """Provenance of the results: versions, commit, platform, hashes and time taken."""
+    found, wall = results.record.provenance, results.record.study_wall_s
+    versions = ", ".join(f"{name} {v}" for name, v in found.versions.items() if v)
     rows = [["versions", versions]]
     for key in ("commit", "platform", "processor", "seed", "scene_sha256", "mesh_sha256"):
-        value = found.get(key)
+        value = getattr(found, key)
         rows.append([key.replace("_", " "), DASH if value is None else words(str(value))])
-    wall = results.numbers.get("study_wall_s")
     return [*rows, ["whole study", DASH if wall is None else f"{significant(wall)} s"]]

@@ -1,14 +1,14 @@
-"""How the finite-element reference was verified and what it costs, measured beforehand."""
+"""Verification and cost of the finite-element reference, as the tables of the program have it."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from itertools import groupby
-from typing import Any
 
-from reports.beforehand import Line, read
-from reports.digits import DASH, Table, count, fixed, significant, words
+from reports.benchmarks import Line, read
+from reports.differences import finite_elements
+from reports.digits import DASH, Group, Table, count, fixed, significant, words
 from study.results.folder import Results
 
 GROWTH = "growth: "
@@ -16,14 +16,14 @@ PARTS = ("mesh", "assembly", "solution")
 JUDGED = {"True": "passed", "False": "FAILED"}
 
 
-def verification(results: Results) -> dict[str, Any] | None:
-    """Tables by name, None for a scene without the reference or where none was delivered.
+def verification(results: Results) -> dict[str, object] | None:
+    """Verification and cost of the finite elements as tables by name.
 
-    A table that is missing is left out.
+    None for a scene without them or where no table was delivered; one that is missing is left out.
     """
-    if not any(record["name"] == "fem" for record in results.numbers["models"]):
+    if finite_elements(results) is None:
         return None
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     if lines := read("verification"):
         found |= {"problems": problems(lines), "outcomes": outcomes(lines)}
     if lines := read("fem_cost"):
@@ -32,8 +32,8 @@ def verification(results: Results) -> dict[str, Any] | None:
     return found or None
 
 
-def problems(lines: list[Line]) -> list[dict[str, Any]]:
-    """Findings by problem."""
+def problems(lines: list[Line]) -> list[Group]:
+    """Findings of the verification by problem."""
     return [
         {"name": words(name), "rows": [_finding(line) for line in group]}
         for name, group in groupby(lines, lambda line: line["problem"])
@@ -41,7 +41,7 @@ def problems(lines: list[Line]) -> list[dict[str, Any]]:
 
 
 def outcomes(lines: list[Line]) -> str:
-    """How many findings came out how."""
+    """How many findings passed, failed or were noted, in words."""
     counts = Counter(_outcome(line) for line in lines)
     return ", ".join(f"{number} {outcome}" for outcome, number in counts.most_common())
 
@@ -64,7 +64,7 @@ def _outcome(line: Line) -> str:
 
 
 def contest(lines: list[Line]) -> Table:
-    """Task, program, version, unknowns, seconds, and how many times ours, the first of its task."""
+    """Cost beside other codes: task, program, version, unknowns, seconds, times that of ours."""
     rows: Table = []
     tasks = groupby(lines, lambda line: line["task"])
     for task, group in ((task, list(group)) for task, group in tasks):
@@ -88,7 +88,7 @@ def _contest_row(line: Line, times: float) -> list[str]:
 
 
 def growth(lines: list[Line]) -> Table:
-    """Unknowns, seconds of each part of a static job, largest memory."""
+    """Cost as the mesh is refined: unknowns, seconds of each part of a static job, memory."""
     sizes: dict[str, dict[str, Line]] = {}
     for line in lines:
         if line["task"].startswith(GROWTH):

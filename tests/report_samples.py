@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,38 +14,49 @@ import typst
 
 from reports import report
 from reports.content import document
-from study.results.folder import Results, Row
+from study.results.folder import Results
+from study.results.records import (
+    Check,
+    CurveErrors,
+    CurveOrders,
+    Dimensionless,
+    DiscretisationError,
+    ElementsRecord,
+    FuzzyRecord,
+    LatticeLimits,
+    LatticeRecord,
+    MeshLevel,
+    ModelRecord,
+    Provenance,
+    StudyRecord,
+    SystemEstimate,
+)
+from study.results.tables import BandSample, CurveSample, FieldDifference, SimilarityScore
+from study.scene.schema import Place, Scene, Tissue
 from study.similarity.score import MEASURES
 
 TITLE = "An octahedron under a tool"
 FUZZY = ["msm-mamdani", "msm-sugeno", "msm-interval-type-2"]
 MODELS = ["fem", "basafa", *FUZZY]
+LABELS = ["Finite elements", "Basafa benchmark", "MSM Mamdani", "MSM Sugeno", "MSM type-2"]
 SOFTNESS = dict(zip(MODELS, (1.0, 2.0, 0.70, 0.80, 0.69), strict=True))
 ESTIMATES = {"mamdani": 13.9e3, "sugeno": 12e3, "interval-type-2": 14e3}
 PROBES = ["tool", "far"]
 SAMPLES = 20
-# The record of a reference whose error is known by three meshes; `_record` has that of older runs.
-THREE_MESHES: dict[str, Any] = {
-    "element": "p2",
-    "unknowns": 7803,
-    "method": "ritz-vectors",
-    "subspace_vectors": 57,
-    "truncation_error": 0.0004,
-    "mesh_levels": [
-        {"size": 2.0, "elements": 100, "unknowns": 1215, "wall_s": 0.9},
-        {"size": 1.5, "elements": 300, "unknowns": 3549, "wall_s": 1.3},
-        {"size": 1.0, "elements": 800, "unknowns": 7803, "wall_s": 3.5},
-    ],
-    "mesh_error_by_probe": {
-        "tool": {"displacement": 0.01, "velocity": 0.012},
-        "far": {"displacement": 0.02, "velocity": 0.05},
-    },
-    "mesh_order": {"field_peak": 1.6},
-    "mesh_order_by_probe": {
-        "tool": {"displacement": 0.8, "velocity": 3.4},
-        "far": {"displacement": 2.5, "velocity": None},
-    },
-}
+LEVELS = (
+    MeshLevel(size=2.0, elements=100, unknowns=1215, wall_s=0.9),
+    MeshLevel(size=1.5, elements=300, unknowns=3549, wall_s=1.3),
+    MeshLevel(size=1.0, elements=800, unknowns=7803, wall_s=3.5),
+)
+# By their place among the control points; the last stands for all that follow.
+MESH_ERRORS = (
+    CurveErrors(displacement=0.01, velocity=0.012),
+    CurveErrors(displacement=0.02, velocity=0.05),
+)
+MESH_ORDERS = (
+    CurveOrders(displacement=0.8, velocity=3.4),
+    CurveOrders(displacement=2.5, velocity=None),
+)
 TEXT = re.compile(r'"text": ?("(?:[^"\\]|\\.)*")')
 POINTS = 0.05 * np.array(
     [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
@@ -59,27 +71,51 @@ def results_of(
 ) -> Results:
     """Results of these models and control points."""
     models, probes = models or MODELS, probes or PROBES
-    tables = {
-        "curves": [row for m in models for p in probes for row in _curve(m, p)],
-        "bands": [row for p in probes for row in _band(p)] if FUZZY[2] in models else [],
-        "similarity": [row for pair in _pairs(models) for p in probes for row in _scores(pair, p)],
-        "errors": [row for pair in _pairs(models) for row in _errors(pair)],
-    }
-    arrays = {"fields": _fields(models, len(probes)), "fuzzy": _fuzzy_arrays()}
-    return Results("", _numbers(models, probes, title), tables, arrays)
+    return Results(
+        _scene(probes, title),
+        _record(models, probes, title),
+        curves=tuple(row for m in models for p in probes for row in _curve(m, p)),
+        bands=tuple(row for p in probes if FUZZY[2] in models for row in _band(p)),
+        scores=tuple(row for pair in _pairs(models) for p in probes for row in _scores(pair, p)),
+        field_differences=tuple(row for pair in _pairs(models) for row in _differences(pair)),
+        fields=_fields(models, len(probes)),
+        fuzzy=_fuzzy_arrays(),
+    )
 
 
-def with_meshes(models: list[str] | None = None, **changes: Any) -> Results:
-    """Results whose reference has three meshes, with some of its record changed."""
-    results = results_of(models)
-    results.numbers["models"][0] |= THREE_MESHES | changes
-    return results
+def with_record(results: Results, **changes: Any) -> Results:
+    """The same with some of the record changed."""
+    return replace(results, record=replace(results.record, **changes))
+
+
+def with_model(results: Results, name: str, **changes: Any) -> Results:
+    """The same with some of one model's record changed."""
+    models = [replace(m, **changes) if m.name == name else m for m in results.record.models]
+    return with_record(results, models=tuple(models))
+
+
+def with_elements(results: Results | None = None, **changes: Any) -> Results:
+    """The same with some of what only the finite elements have changed."""
+    results = results or results_of()
+    elements = results.model("fem").elements
+    return with_model(results, "fem", elements=replace(elements, **changes))
+
+
+def with_mesh_error(results: Results | None = None, **changes: Any) -> Results:
+    """The same with some of the error of the finite elements by their mesh changed."""
+    results = results or results_of()
+    return with_elements(results, mesh_error=replace(results.model("fem").mesh_error, **changes))
+
+
+def without_arrays(results: Results | None = None) -> Results:
+    """The same without fields and fuzzy sets to draw."""
+    return replace(results or results_of(), fields={}, fuzzy={})
 
 
 def bare(results: Results | None = None) -> dict[str, Any]:
     """Content of a report without figures."""
-    results = replace(results or results_of(), arrays={})
-    results.numbers.pop("lattice_limits", None)  # the text on them refers to a figure
+    results = without_arrays(results)
+    results = with_record(results, lattice_limits=None)  # the text on them refers to a figure
     return document(results) | {"drawing": None}
 
 
@@ -96,101 +132,136 @@ def printed(content: dict[str, Any]) -> list[str]:
     return [json.loads(piece) for piece in TEXT.findall(text)]
 
 
-def _numbers(models: list[str], probes: list[str], title: str) -> dict[str, Any]:
-    place = {"side": "anterior", "at": [0.5, 0.5], "snap": True}
-    return {
-        "schema_version": 1,
-        "title": title,
-        "scene": {
-            "title": title,
-            "models": ["fem", "basafa", "msm"],
-            "organ": {"shape": "liver"},
-            "tool": {"place": place, "force": "0.5 N"},
-            "tissue": {"youngs_modulus": "10000.0 Pa", "poisson_ratio": 0.45},
-            "control_points": dict.fromkeys(probes, place),
-            "renders": True,
-        },
-        "stiffness": {m[4:]: _stiffness(m[4:]) for m in models if m in FUZZY},
-        "rule_count": 247,
-        "probes": probes,
-        "models": [_record(model) for model in models],
-        "checks": [
-            {
-                "name": "mass",
-                "value": 0.01,
-                "limit": 0.05,
-                "passed": True,
-                "meaning": "of the organ",
-            },
-            {"name": "step", "value": 0.02, "limit": 0.01, "passed": False, "meaning": "of time"},
-        ],
-        "strain_limit": 0.05,
-        "warnings": [],
-        "assumptions": ["The shape is an octahedron.", "There is no gravity."],
-        "notes": ["Made up by hand."],
-        "study_wall_s": 12.0,
-        "provenance": {
-            "versions": {"python": "3.11.7", "numpy": "2.4.6"},
-            "commit": None,
-            "platform": "Linux",
-            "scene_sha256": 64 * "a",
-        },
-        "dimensionless": {"extent_m": 0.1, "volume_m3": 1.667e-4},
-        "lattice_limits": {
-            "spacing_m": 0.01,
-            "poisson_ratio": 0.45,
-            "relative_l2_at_quarter": 0.05,
-            "relative_l2": 0.24,
-            "best_factor": 0.95,
-            "relative_l2_at_best_factor": 0.23,
-        },
-    }
+def _scene(probes: list[str], title: str) -> Scene:
+    return Scene(
+        title=title,
+        tissue=Tissue(youngs_modulus=10e3),
+        control_points=dict.fromkeys(probes, Place(side="anterior", at=(0.5, 0.5))),
+    )
 
 
-def _stiffness(system: str) -> dict[str, Any]:
-    found = {
-        "estimate_pa": ESTIMATES[system],
-        "relative_to_reference": ESTIMATES[system] / 10e3,
-        "quadrature_error_pa": 38.0,
-        "notes": ["hbv: no reading"],
-    }
-    return found | ({"interval_pa": [12.5e3, 16e3]} if system == "interval-type-2" else {})
+def _record(models: list[str], probes: list[str], title: str) -> StudyRecord:
+    return StudyRecord(
+        title=title,
+        probes=tuple(probes),
+        fuzzy=FuzzyRecord(
+            systems={m[4:]: _estimate(m[4:]) for m in models if m in FUZZY}, rule_count=247
+        ),
+        models=tuple(model_record(model, probes) for model in models),
+        checks=(
+            Check(name="mass", value=0.01, limit=0.05, meaning="of the organ"),
+            Check(name="step", value=0.02, limit=0.01, meaning="of time"),
+        ),
+        warnings=(),
+        assumptions=("The shape is an octahedron.", "There is no gravity."),
+        notes=("Made up by hand.",),
+        strain_limit=0.05,
+        study_wall_s=12.0,
+        provenance=Provenance(
+            versions={"python": "3.11.7", "numpy": "2.4.6"},
+            commit=None,
+            platform="Linux",
+            processor=None,
+            seed=None,
+            scene_sha256=64 * "a",
+            mesh_sha256=None,
+        ),
+        dimensionless=Dimensionless(
+            extent_m=0.1,
+            volume_m3=1.667e-4,
+            sag_rho_g_l_over_e=0.1,
+            tool_pressure_over_e=0.02,
+            tool_radius_over_spacing=2.5,
+            tool_radius_over_element_size=1.5,
+        ),
+        lattice_limits=LatticeLimits(
+            spacing_m=0.01,
+            poisson_ratio=0.45,
+            relative_l2_at_quarter=0.05,
+            relative_l2=0.24,
+            best_factor=0.95,
+            relative_l2_at_best_factor=0.23,
+            relative_l2_with_volume_term=None,
+        ),
+    )
 
 
-def _record(model: str) -> dict[str, Any]:
-    record: dict[str, Any] = {
-        "name": model,
-        "simulated_s": 1.0,
-        "status": "finished",
-        "diverged_at_s": None,
-        "diverged_near_m": None,
-        "nodes": 1000,
-        "time_step_s": 1e-3,
-        "critical_time_step_s": 2e-3,
-        "steps": 1000,
-        "wall_s": 0.5,
-        "time_step_error": 0.001,
-        "time_step_error_velocity": 0.01,
-    }
-    if model == "fem":
-        mesh = {"field_peak": 0.03, "displacement": 0.02, "velocity": 0.05}
-        return record | {"elements": 800, "mesh_error": mesh, "largest_strain": 0.04}
-    return record | {"springs": 9000}
+def _estimate(system: str) -> SystemEstimate:
+    return SystemEstimate(
+        estimate_pa=ESTIMATES[system],
+        relative_to_reference=ESTIMATES[system] / 10e3,
+        quadrature_error_pa=38.0,
+        method="made up",
+        notes=("hbv: no reading",),
+        interval_pa=(12.5e3, 16e3) if system == "interval-type-2" else None,
+    )
 
 
-def _curve(model: str, probe: str) -> list[Row]:
+def model_record(name: str, probes: list[str]) -> ModelRecord:
+    """Record of a model that finished, a lattice unless it is the finite elements."""
+    by_step = CurveErrors(displacement=0.001, velocity=0.01)
+    is_fem = name == "fem"
+    return ModelRecord(
+        name=name,
+        label=dict(zip(MODELS, LABELS, strict=True))[name],
+        simulated_s=1.0,
+        status="finished",
+        system=name[4:] if name in FUZZY else None,
+        nodes=1000,
+        time_step_s=1e-3,
+        critical_time_step_s=2e-3,
+        steps=1000,
+        wall_s=0.5,
+        largest_strain=0.04 if is_fem else None,
+        time_step_errors=dict.fromkeys(probes, by_step),
+        elements=_elements(probes) if is_fem else None,
+        lattice=None if is_fem else LATTICE,
+    )
+
+
+LATTICE = LatticeRecord(
+    springs=9000,
+    integrator="symplectic-euler",
+    poisson_ratio=0.25,
+    smallest_time_step_s=1e-3,
+    smallest_step_margin=2.0,
+    repeated_steps=0,
+    node_mass_kg=1e-3,
+    inverted_cells=0,
+)
+
+
+def _elements(probes: list[str]) -> ElementsRecord:
+    place = {probe: min(k, 1) for k, probe in enumerate(probes)}
+    return ElementsRecord(
+        element="p2",
+        elements=800,
+        unknowns=7803,
+        method="ritz-vectors",
+        subspace_vectors=57,
+        truncation_error=0.0004,
+        levels=LEVELS,
+        mesh_error=DiscretisationError(
+            field_peak=0.03,
+            field_order=1.6,
+            formal_order=3.0,
+            by_probe={probe: MESH_ERRORS[k] for probe, k in place.items()},
+            order_by_probe={probe: MESH_ORDERS[k] for probe, k in place.items()},
+        ),
+    )
+
+
+def _curve(model: str, probe: str) -> Iterator[CurveSample]:
     times = np.linspace(0.0, 1.0, SAMPLES)
     u = 1e-3 * SOFTNESS[model] * np.sin(np.pi * times)
     v = 1e-3 * SOFTNESS[model] * np.pi * np.cos(np.pi * times)
-    return [(model, probe, *map(float, row)) for row in zip(times, u, v, strict=True)]
+    for row in zip(times, u, v, strict=True):
+        yield CurveSample(model, probe, *map(float, row))
 
 
-def _band(probe: str) -> list[Row]:
-    rows = _curve(FUZZY[2], probe)
-    return [
-        (m, p, t, 1.1 * float(u), 0.9 * float(u), 1.1 * float(v), 0.9 * float(v))
-        for m, p, t, u, v in rows
-    ]
+def _band(probe: str) -> Iterator[BandSample]:
+    for model, _, t, u, v in _curve(FUZZY[2], probe):
+        yield BandSample(model, probe, t, 1.1 * u, 0.9 * u, 1.1 * v, 0.9 * v)
 
 
 def _pairs(models: list[str]) -> list[tuple[str, str]]:
@@ -203,15 +274,15 @@ def score_of(model: str, reference: str) -> float:
     return max(0.0, 1.0 - abs(SOFTNESS[model] / SOFTNESS[reference] - 1.0))
 
 
-def _scores(pair: tuple[str, str], probe: str) -> list[Row]:
+def _scores(pair: tuple[str, str], probe: str) -> list[SimilarityScore]:
     return [
-        (*pair, probe, curve, measure.name, score_of(*pair))
+        SimilarityScore(*pair, probe, curve, measure.name, score_of(*pair))
         for curve, measures in MEASURES.items()
         for measure in measures
     ]
 
 
-def _errors(pair: tuple[str, str]) -> list[Row]:
+def _differences(pair: tuple[str, str]) -> list[FieldDifference]:
     values = {
         "field-relative-l2-peak": 0.4,
         "field-relative-l2-final": 0.5,
@@ -219,7 +290,7 @@ def _errors(pair: tuple[str, str]) -> list[Row]:
         "field-best-factor-peak": 1.3,
         "field-relative-l2-peak-at-best-factor": 0.25,
     }
-    return [(*pair, name, value) for name, value in values.items()]
+    return [FieldDifference(*pair, name, value) for name, value in values.items()]
 
 
 def _fields(models: list[str], probe_count: int) -> dict[str, np.ndarray]:

@@ -5,13 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from study.run.whole import run_study
 
 from msm.integrators import INTEGRATORS
 from study.folders import FolderError
 from study.progress import Silent
 from study.results.folder import TABLES, Results, ResultsError, read, replacing
 from study.results.folder import write as write_files
-from study.run.whole import run_study
 from study.similarity.fields import best_factor, relative_l2
 
 MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2"]

@@ -12,6 +12,8 @@ import pytest
 
 from msm.integrators import INTEGRATORS
 from msm.laws import LAWS
+from reports.content import document
+from reports.report import make_report
 from study.known.stability.cases import own_scene
 from study.models.table import MODELS
 from study.progress import Silent
@@ -200,12 +202,8 @@ def test_a_toy_model_and_measure_are_in_the_tables(folder):
 
 
 def test_they_are_in_the_pdf(folder):
-    from reports.report import make_report
-
     make_report(folder)
     assert (folder / "report.pdf").stat().st_size > 10_000
-    from reports.content import document
-
     text = str(document(Results.load(folder)))
     assert "Toy without inertia" in text
     assert "toy-peak" in text

@@ -7,12 +7,12 @@ from contextlib import suppress
 import numpy as np
 import pytest
 import pyvista
+from study.run.lattices import assemble, elastic
 
 from msm import model
 from study.organ.block import block_mesh
 from study.results import vtkhdf
 from study.results.fields import Frames, Mesh, recording
-from study.run.lattices import assemble, elastic
 
 pytestmark = pytest.mark.filterwarnings("ignore::pyvista.PyVistaDeprecationWarning")
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.linalg import eigvals, eigvalsh, norm
 from scipy.sparse import csr_array, eye_array, kron
+from study.run.lattices import assemble
 
 from msm import springs as lattice_springs
 from msm import volume as volumes
@@ -19,7 +20,6 @@ from msm.relaxation import relax
 from msm.tangent import add_diagonal, add_product, empty_tangent, linearise, make_definite
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
-from study.run.lattices import assemble
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
 from tests.conftest import SMALL

@@ -4,16 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-
-from msm import model
-from msm.checkpoint import Checkpoint
-from msm.damping import NodalDamping
-from msm.laws import Hooke, Piecewise, initial_stiffness
-from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
-from study.check import describe_scene
-from study.mesh.tetrahedra import edges, mean_edge
-from study.progress import Silent
-from study.run.assumptions import assumptions
 from study.run.estimates import estimates
 from study.run.lattices import (
     assemble,
@@ -25,6 +15,16 @@ from study.run.lattices import (
 )
 from study.run.organ import run_organ, spacing
 from study.run.outcome import Outcome
+
+from msm import model
+from msm.checkpoint import Checkpoint
+from msm.damping import NodalDamping
+from msm.laws import Hooke, Piecewise, initial_stiffness
+from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
+from study.check import describe_scene
+from study.mesh.tetrahedra import edges, mean_edge
+from study.progress import Silent
+from study.run.assumptions import assumptions
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
 from tests.conftest import SMALL

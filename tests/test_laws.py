@@ -10,6 +10,8 @@ import numba
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from study.run.lattices import spring_law
+from study.run.outcome import Outcome
 
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED
@@ -33,8 +35,6 @@ from msm.volume import none
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
 from study.run.assumptions import assumptions
-from study.run.lattices import spring_law
-from study.run.outcome import Outcome
 from study.scene.file import SceneError, read_scene, write_scene
 
 HOOKE = Hooke(16.0)

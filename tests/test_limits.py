@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 import pytest
+from study.run.whole import run_study
 
 from study.progress import Silent
-from study.run.whole import run_study
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from study.run.outcome import Outcome
 
 from fem_reference import iterative as module
 from fem_reference import memory
@@ -30,7 +31,6 @@ from study.organ.block import block_mesh
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.run import reference
-from study.run.outcome import Outcome
 from study.scene import Organ, Reference, Tissue
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import geometry_of, problem_of

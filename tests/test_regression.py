@@ -10,9 +10,9 @@ import json
 from pathlib import Path
 
 import pytest
+from study.run.whole import run_study
 
 from study.progress import Silent
-from study.run.whole import run_study
 from study.scene.file import read_scene
 
 STORE = Path(__file__).parent / "data" / "scores.json"

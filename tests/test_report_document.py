@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,17 +13,44 @@ import pytest
 import typst
 
 from reports import motion_figures, renders, report
+from reports.appearance import LOOKS, looks, other_look
+from reports.benchmarks import has_lattice
 from reports.content import document
+from reports.difference_figure import bars
+from reports.field_figures import views
+from reports.ranking import leads
+from reports.tables import lead_rows
+from study import commands
 from study.results.folder import Results, ResultsError, write
-from tests.report_samples import FUZZY, MODELS, TITLE, results_of
+from study.results.records import SCHEMA_VERSION
+from tests.report_samples import (
+    FUZZY,
+    LABELS,
+    MODELS,
+    TITLE,
+    results_of,
+    with_elements,
+    with_model,
+    with_record,
+    without_arrays,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
+@pytest.fixture(scope="module")
+def of_no_run():
+    """Figures of the appendices, which are the same in every report."""
+    return report.robustness_figures(results_of())
+
+
 @pytest.fixture(autouse=True)
-def _flat(monkeypatch):
-    """Pictures by matplotlib: VTK has its own tests."""
+def _quick(monkeypatch, of_no_run):
+    """Pictures by matplotlib, as VTK has its own tests; figures of the appendices drawn once."""
     monkeypatch.setattr(renders, "WINDOWS", ())
+    monkeypatch.setattr(
+        report, "robustness_figures", lambda results: of_no_run if has_lattice(results) else {}
+    )
 
 
 def pdf_of(results: Results, folder: Path) -> bytes:
@@ -40,8 +68,7 @@ def test_a_second_report_is_the_same_byte_by_byte(tmp_path):
 
 
 def test_another_process_makes_the_same_bytes(tmp_path):
-    results = replace(results_of(), arrays={})
-    first = pdf_of(results, tmp_path / "a")
+    first = pdf_of(without_arrays(), tmp_path / "a")
     code = "import sys, pathlib; from reports.report import make_report; "
     code += "make_report(pathlib.Path(sys.argv[1]))"
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "a")], check=True, cwd=ROOT)
@@ -50,10 +77,12 @@ def test_another_process_makes_the_same_bytes(tmp_path):
 
 def test_other_numbers_make_other_bytes(tmp_path):
     """Negative control of the two tests above."""
-    other = results_of()
-    other.numbers["stiffness"]["sugeno"]["estimate_pa"] *= 1.01
-    bare = [replace(results, arrays={}) for results in (results_of(), other)]
-    assert pdf_of(bare[0], tmp_path / "a") != pdf_of(bare[1], tmp_path / "b")
+    results = without_arrays()
+    fuzzy = results.record.fuzzy
+    sugeno = replace(fuzzy.systems["sugeno"], estimate_pa=1.01 * 12e3)
+    fuzzy = replace(fuzzy, systems=fuzzy.systems | {"sugeno": sugeno})
+    other = with_record(results, fuzzy=fuzzy)
+    assert pdf_of(results, tmp_path / "a") != pdf_of(other, tmp_path / "b")
 
 
 def test_a_folder_without_results_is_refused(tmp_path):
@@ -62,9 +91,18 @@ def test_a_folder_without_results_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_results_of_an_older_schema_are_refused_with_their_version_and_the_remedy(tmp_path):
+    old = {"schema_version": 1, "title": TITLE, "stiffness": {}, "models": []}
+    (tmp_path / "results.json").write_text(json.dumps(old))
+    said = f"results of schema 1, this program reads {SCHEMA_VERSION}; run the scene again"
+    with pytest.raises(ResultsError, match=said):
+        commands.report(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["results.json"]
+
+
 def test_a_report_that_fails_leaves_the_earlier_one(tmp_path, monkeypatch):
     folder = tmp_path / "a"
-    first = pdf_of(replace(results_of(), arrays={}), folder)
+    first = pdf_of(without_arrays(), folder)
     names = sorted(path.name for path in folder.iterdir())
     broken = report.template() + b"\nSee @nowhere.\n"
     monkeypatch.setattr(report, "template", lambda: broken)
@@ -79,7 +117,7 @@ def test_a_folder_that_cannot_be_written_is_said_so(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / "a").mkdir()
-    write(replace(results_of(), arrays={}), tmp_path / "a")
+    write(without_arrays(), tmp_path / "a")
     monkeypatch.setattr(report.tempfile, "mkstemp", refuse)
     with pytest.raises(ResultsError, match=r"report.pdf: cannot be written \(Permission denied\)"):
         report.make_report(tmp_path / "a")
@@ -87,25 +125,21 @@ def test_a_folder_that_cannot_be_written_is_said_so(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("models", [["fem"], ["basafa"], ["fem", "basafa"], FUZZY, FUZZY[:1]])
 def test_models_may_be_missing(models, tmp_path):
-    assert pdf_of(replace(results_of(models), arrays={}), tmp_path / "a")
+    assert pdf_of(without_arrays(results_of(models)), tmp_path / "a")
 
 
 @pytest.mark.parametrize("models", [["fem"], ["basafa", "msm-sugeno"]])
 def test_fields_of_some_models_are_drawn(models, tmp_path):
-    results = results_of(models)
-    del results.arrays["fuzzy"]
-    assert pdf_of(results, tmp_path / "a")
+    assert pdf_of(replace(results_of(models), fuzzy={}), tmp_path / "a")
 
 
 def test_what_only_some_scenes_have_may_be_missing(tmp_path):
-    results = replace(results_of(), arrays={})
-    for key in ("lattice_limits", "dimensionless"):
-        del results.numbers[key]
-    for record in results.numbers["models"]:
-        for key in ("mesh_error", "time_step_error", "time_step_error_velocity"):
-            record.pop(key, None)
-        record |= {"time_step_s": None, "critical_time_step_s": None, "steps": None}
-    results.numbers.update(checks=[], notes=[], assumptions=[])
+    results = without_arrays(with_elements(mesh_error=None))
+    nothing = {"time_step_s": None, "critical_time_step_s": None, "steps": None, "wall_s": None}
+    for name in MODELS:
+        results = with_model(results, name, time_step_errors={}, **nothing)
+    results = with_record(results, lattice_limits=None, dimensionless=None)
+    results = with_record(results, checks=(), notes=(), assumptions=())
     assert pdf_of(results, tmp_path / "a")
 
 
@@ -113,7 +147,7 @@ def test_what_only_some_scenes_have_may_be_missing(tmp_path):
 def test_control_points_may_be_few_or_many(count, left_out, tmp_path, monkeypatch):
     monkeypatch.setattr(motion_figures, "PROBES_PER_FIGURE", 1)
     monkeypatch.setattr(motion_figures, "MOST_PROBES", 2)
-    results = replace(results_of(probes=[f"point-{i}" for i in range(count)]), arrays={})
+    results = without_arrays(results_of(probes=[f"point-{i}" for i in range(count)]))
     assert pdf_of(results, tmp_path / "a")
     assert document(results)["probes_left_out"] == left_out
 
@@ -121,30 +155,32 @@ def test_control_points_may_be_few_or_many(count, left_out, tmp_path, monkeypatc
 def test_names_and_titles_are_inert_whatever_they_hold(tmp_path):
     """Typst's and matplotlib's markup, scripts without a glyph, a word longer than the page."""
     nasty = '#import "x" $ * _ @nowhere <b> & \\frac{ $x_{ 肝臓 \x07 --> ' + 400 * "w"
-    results = results_of(probes=[nasty], title=nasty)
-    results.numbers["warnings"].append(nasty)
-    del results.arrays["fuzzy"]
-    assert pdf_of(results, tmp_path / "a")
+    results = with_record(results_of(probes=[nasty], title=nasty), warnings=(nasty,))
+    assert pdf_of(replace(results, fuzzy={}), tmp_path / "a")
 
 
 def diverged(late: bool) -> Results:
     """One fuzzy model diverged, before the peak or after it."""
-    results = results_of()
-    name = "msm-mamdani"
-    record = next(r for r in results.numbers["models"] if r["name"] == name)
-    record |= {"status": "diverged", "diverged_at_s": 0.31, "diverged_near_m": [0.0, 0.0, 0.01]}
-    record |= {"time_step_error": None}
-    results.numbers["warnings"].append(f"{name} diverged at 0.31 s")
-    results.tables["curves"] = [
-        (*row[:3], 1e9 * float(row[3]), row[4]) if row[0] == name else row
-        for row in results.tables["curves"]
-        if row[0] != name or float(row[2]) < 0.31
-    ]
-    for table in ("similarity", "errors"):
-        results.tables[table] = [row for row in results.tables[table] if row[0] != name]
-    results.arrays["fields"][name][1 if late else 0 :] = np.nan
-    del results.arrays["fuzzy"]
-    return results
+    name, found = "msm-mamdani", results_of()
+    found = with_model(
+        found, name, status="diverged", diverged_at_s=0.31, diverged_near_m=(0.0, 0.0, 0.01)
+    )
+    found = with_model(found, name, time_step_errors={})
+    found = with_record(found, warnings=(f"{name} diverged at 0.31 s",))
+    field = found.fields[name].copy()
+    field[1 if late else 0 :] = np.nan
+    return replace(
+        found,
+        curves=tuple(
+            row._replace(displacement_m=1e9 * row.displacement_m) if row.model == name else row
+            for row in found.curves
+            if row.model != name or row.time_s < 0.31
+        ),
+        scores=tuple(row for row in found.scores if row.model != name),
+        field_differences=tuple(row for row in found.field_differences if row.model != name),
+        fields=found.fields | {name: field},
+        fuzzy={},
+    )
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -162,16 +198,14 @@ def test_a_model_that_diverged_is_shown_so_and_has_no_score(late, tmp_path):
 
 
 def test_no_curve_at_all_still_makes_a_report(tmp_path):
-    results = results_of()
-    del results.arrays["fields"]
-    results.tables.update({name: [] for name in results.tables})
-    assert pdf_of(results, tmp_path / "a")
+    bare = replace(results_of(), fields={}, curves=(), bands=(), scores=(), field_differences=())
+    assert pdf_of(bare, tmp_path / "a")
 
 
 def test_a_number_that_is_not_finite_is_refused(tmp_path):
-    results = replace(results_of(), arrays={})
-    row = results.tables["similarity"][0]
-    results.tables["similarity"][0] = (*row[:-1], float("nan"))
+    results = without_arrays()
+    first, *others = results.scores
+    results = replace(results, scores=(first._replace(score=float("nan")), *others))
     (tmp_path / "a").mkdir()
     write(results, tmp_path / "a")
     with pytest.raises(ValueError, match="nan is not a number that a report can print"):
@@ -183,14 +217,8 @@ def test_a_number_that_is_not_finite_is_refused(tmp_path):
 def test_the_document_holds_the_numbers_of_the_run():
     content = document(results_of())
     assert content["title"] == TITLE
-    assert [row[0] for row in content["glance"]["rows"]] == [
-        "Finite elements",
-        "Basafa benchmark",
-        "MSM Mamdani",
-        "MSM Sugeno",
-        "MSM type-2",
-    ]
-    assert len(content["models"]) == len(MODELS)
+    assert [row[0] for row in content["glance"]["rows"]] == LABELS
+    assert [row[0] for row in content["models"]] == LABELS
     said = " ".join(content["summary"])
     assert "12.00 to 14.00 kPa, 1.20 to 1.40 times the reference modulus of 10 kPa" in said
     assert "does not contain the reference modulus" in said
@@ -198,6 +226,59 @@ def test_the_document_holds_the_numbers_of_the_run():
 
 
 def test_a_larger_strain_is_said_to_be_too_large():
-    results = results_of()
-    results.numbers["models"][0]["largest_strain"] = 0.06
+    results = with_model(results_of(), "fem", largest_strain=0.06)
     assert "6.0 %, not below the 5.0 %" in " ".join(document(results)["summary"])
+
+
+TOY = "toy"
+
+
+def with_toy(results: Results, **changes) -> Results:
+    """A model that the report knows nothing of, otherwise as Sugeno's, and scored as it."""
+    sugeno = results.model("msm-sugeno")
+    toy = replace(sugeno, name=TOY, label="Toy model", **changes)
+    like = {
+        table: (
+            *(rows := getattr(results, table)),
+            *(row._replace(model=TOY) for row in rows if row.model == sugeno.name),
+        )
+        for table in ("curves", "scores", "field_differences")
+    }
+    fields = results.fields | {TOY: results.fields[sugeno.name]}
+    results = with_record(results, models=(*results.record.models, toy))
+    return replace(results, fields=fields, fuzzy={}, **like)
+
+
+def test_a_model_that_the_report_does_not_know_is_legible_everywhere(tmp_path):
+    """Under its label and in a look of its own."""
+    results = with_toy(results_of(), system=None)
+    content, seen = document(results), looks(results)
+    for rows in (content["glance"]["rows"], content["models"], content["numerics"]):
+        assert [row[0] for row in rows] == [*LABELS, "Toy model"]
+    assert ["Finite elements", "Toy model"] in [row[:2] for row in content["errors"]]
+    scored = {row[0] for t in content["similarity"] for g in t["groups"] for row in g["rows"]}
+    assert "Toy model" in scored
+    assert any("Toy model 40.0 %" in sentence for sentence in content["summary"])
+    assert not any(TOY in sentence for sentence in content["summary"])
+    others = [look for name, look in seen.items() if name != TOY]
+    assert seen[TOY].colour not in {look.colour for look in others}
+    assert "Toy model" in [one.look.label for one in motion_figures.motions(results, "tool")]
+    assert "Toy model" in [panel.title for panel in views(results).sheets[0].panels]
+    assert "Toy model, at the peak" in [bar.name for bar in bars(results)]
+    assert pdf_of(results, tmp_path / "a")
+
+
+def test_a_model_that_the_report_does_not_know_is_ranked_where_it_has_a_fuzzy_system():
+    """It scores as Sugeno's, which was the highest, so no lead is left."""
+    ranked = next(leads(with_toy(results_of()), "fem", "tool"))
+    assert (ranked.best, ranked.runner_up, ranked.margin) == (TOY, "msm-sugeno", 0.0)
+    assert "Toy model" in lead_rows(with_toy(results_of()))[0]
+    benchmark = next(leads(with_toy(results_of(), system=None), "fem", "tool"))
+    assert benchmark.best == "msm-sugeno"
+
+
+def test_models_that_the_report_does_not_know_differ_from_each_other():
+    seen = [other_look(k) for k in range(20)]
+    assert len({(look.colour, look.dashes) for look in seen}) == 20
+    assert len({look.colour for look in seen[:5]}) == 5
+    assert not {look.colour for look in seen} & {look.colour for look in LOOKS.values()}

@@ -17,54 +17,57 @@ from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
 from fuzzy.systems.kinds import SYSTEMS
 from reports import canvas
-from reports.fuzzy_figures import (
-    draw_sets,
-    draw_surfaces,
-    sets_figure,
-    surface_inputs,
-    surfaces_figure,
-)
+from reports.fuzzy_figures import draw_sets, draw_surfaces, sets_figure, surfaces_figure
 from reports.fuzzy_tables import (
-    Change,
     between_systems,
-    changes,
     sensitivity_sentences,
     sensitivity_table,
     set_rows,
     unsourced_count,
+    within_systems,
 )
 from reports.rule_view import draw_rules, kinds, rule_figures, view_names
-from reports.sensitivity_figure import draw_sensitivity, layout, sensitivity_figure
+from reports.sensitivity_figure import layout, sensitivity_figure
 from study.results.folder import Results
-from tests.report_samples import results_of
+from study.results.records import StiffnessSet
+from study.results.tables import SensitivityEntry
+from tests.report_samples import results_of, with_record
 
-NAN = float("nan")
 T2 = "interval-type-2"
-ROWS = [
-    ("reading", "R1", "R2", "mamdani", -500.0, 400.0, 2000.0, 256.0, NAN, NAN),
-    ("reading", "R1", "R2", T2, -700.0, 600.0, 2200.0, 256.0, 7600.0, 7300.0),
-    ("reading", "R1", "R4-drop", "mamdani", 0.0, 0.0, 0.0, 256.0, NAN, NAN),
-    ("reading", "R1", "R4-drop", T2, -90.0, 60.0, 250.0, 256.0, 7600.0, 6900.0),
-    ("sugeno_aggregation", "sum", "max", "sugeno", -3200.0, 4050.0, 5800.0, 256.0, NAN, NAN),
-    ("sampling", "matlab", "exact", "mamdani", 40.0, 29.0, 44.0, 24.0, NAN, NAN),
-    ("system", "mamdani", "sugeno", "mamdani", -1190.0, 1130.0, 2940.0, 256.0, NAN, NAN),
-    ("system", "mamdani", T2, "mamdani", 300.0, 350.0, 1090.0, 256.0, NAN, NAN),
-    ("system", "sugeno", T2, "sugeno", 1490.0, 1110.0, 3450.0, 256.0, NAN, NAN),
-]
-SET = {
-    "aetiology": "hcv",
-    "stage": "F2",
-    "severity": "mild",
-    "placement": "stage-mean",
-    "centre": 6.9,
-    "centre_source": "sporea2010",
-    "within_stage_sd": 2.5,
-    "sd_kind": "published",
-    "between_study": 0.198,
-    "between_operator": 0.0798,
-    "n": 146,
-    "sourced": "yes",
-}
+ROWS = tuple(
+    SensitivityEntry(*row)
+    for row in (
+        ("reading", "R1", "R2", "mamdani", -500.0, 400.0, 2000.0, 256.0),
+        ("reading", "R1", "R2", T2, -700.0, 600.0, 2200.0, 256.0),
+        ("reading", "R1", "R4-drop", "mamdani", 0.0, 0.0, 0.0, 256.0),
+        ("reading", "R1", "R4-drop", T2, -90.0, 60.0, 250.0, 256.0),
+        ("sugeno_aggregation", "sum", "max", "sugeno", -3200.0, 4050.0, 5800.0, 256.0),
+        ("sampling", "matlab", "exact", "mamdani", 40.0, 29.0, 44.0, 24.0),
+        ("system", "mamdani", "sugeno", "mamdani", -1190.0, 1130.0, 2940.0, 256.0),
+        ("system", "mamdani", T2, "mamdani", 300.0, 350.0, 1090.0, 256.0),
+        ("system", "sugeno", T2, "sugeno", 1490.0, 1110.0, 3450.0, 256.0),
+    )
+)
+SET = StiffnessSet(
+    aetiology="hcv",
+    stage="F2",
+    severity="mild",
+    placement="stage-mean",
+    centre=6.9,
+    centre_source="sporea2010",
+    within_stage_sd=2.5,
+    sd_kind="published",
+    sd_source="sporea2010",
+    between_study=0.198,
+    between_study_kind="transferred",
+    between_study_source="chon2012",
+    between_operator=0.0798,
+    between_operator_kind="published",
+    between_operator_source="liv12551",
+    n=146,
+    sourced="yes",
+    note="",
+)
 
 
 @pytest.fixture(scope="module")
@@ -78,16 +81,14 @@ def view_arrays() -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def results(view_arrays) -> Results:
     base = results_of()
-    records = [
+    sets = (
         SET,
-        SET | {"aetiology": "ald", "stage": "F4", "sourced": "partly", "n": None},
-        SET | {"aetiology": "nafld", "sourced": "weak", "sd_kind": "ratio"},
-        SET | {"aetiology": "nafld", "stage": "F3", "sourced": "no"},
-    ]
-    numbers = base.numbers | {"stiffness_sets": records}
-    arrays = base.arrays | {"fuzzy": base.arrays["fuzzy"] | view_arrays}
-    tables = base.tables | {"sensitivity": ROWS}
-    return replace(base, numbers=numbers, arrays=arrays, tables=tables)
+        replace(SET, aetiology="ald", stage="F4", sourced="partly", n=None),
+        replace(SET, aetiology="nafld", sourced="weak", sd_kind="ratio"),
+        replace(SET, aetiology="nafld", stage="F3", sourced="no"),
+    )
+    base = with_record(base, fuzzy=replace(base.record.fuzzy, stiffness_sets=sets))
+    return replace(base, fuzzy=base.fuzzy | view_arrays, sensitivity=ROWS)
 
 
 @pytest.fixture
@@ -103,7 +104,7 @@ def figures(results, view_arrays) -> dict[str, Figure]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(canvas, "svg", lambda figure: figure)
         found = {kind: draw_rules(view_arrays, kind) for kind in SYSTEMS}
-        found["sensitivity"] = sensitivity_figure(results)
+        found["sensitivity"] = sensitivity_figure(ROWS)
         found["sets"] = sets_figure(results)
         found["surfaces"] = surfaces_figure(results)
     for figure in found.values():
@@ -132,8 +133,8 @@ def words_of(figure) -> str:
     return " | ".join(t.get_text() for t in figure.findobj(Text))
 
 
-def test_figures_are_svg_and_the_same_twice(results, view_arrays):
-    for draw in (lambda: draw_rules(view_arrays, "sugeno"), lambda: sensitivity_figure(results)):
+def test_figures_are_svg_and_the_same_twice(view_arrays):
+    for draw in (lambda: draw_rules(view_arrays, "sugeno"), lambda: sensitivity_figure(ROWS)):
         svg = draw()
         assert svg == draw()
         assert ET.fromstring(svg).tag.endswith("svg")  # noqa: S314 our own
@@ -185,11 +186,11 @@ def test_rule_views_are_made_for_the_systems_there_are(results, view_arrays):
     assert view_names(results) == ["Mamdani", "Sugeno", "Interval type-2"]
     assert rule_figures(results_of()) == []
     one = {name: a for name, a in view_arrays.items() if name.startswith("view.sugeno.")}
-    assert len(rule_figures(replace(results, arrays={"fuzzy": one}))) == 1
+    assert len(rule_figures(replace(results, fuzzy=one))) == 1
 
 
 def test_sets_of_one_stage_look_alike_and_estimates_are_named(drawn, results):
-    arrays = dict(results.arrays["fuzzy"])
+    arrays = dict(results.fuzzy)
     arrays["hbv.sets"], arrays["hcv.sets"] = np.array(["F2", "F4"]), np.array(["F1", "F4"])
     figure = drawn(draw_sets, arrays, {"mamdani": 14e3})
     lines = {
@@ -203,8 +204,8 @@ def test_sets_of_one_stage_look_alike_and_estimates_are_named(drawn, results):
 
 
 def test_surfaces_are_labelled_with_their_inputs_and_end_where_they_come_to_rest(drawn, results):
-    named = replace(results, numbers=results.numbers | {"surface_inputs": ["ald", "nafld"]})
-    assert surface_inputs(results) == ("hcv", "hbv")
+    over = replace(results.scene.fuzzy, surface=("ald", "nafld"))
+    named = replace(results, scene=replace(results.scene, fuzzy=over))
     text = words_of(drawn(surfaces_figure, named))
     assert "ALD [kPa]" in text
     assert "NAFLD [kPa]" in text
@@ -225,29 +226,28 @@ def test_a_constant_surface_is_drawn_whole(drawn, height):
 
 
 def test_the_sensitivity_figure_has_a_line_per_alternative_and_the_band(drawn):
-    found = [Change(*row) for row in ROWS]
-    lines, heads = layout([change for change in found if change.choice != "system"])
+    lines, heads = layout(within_systems(ROWS))
     assert [label for _, label, _ in lines] == ["R2", "R4-drop", "max", "exact"]
     assert heads[0][1] == "reading of Table I: R1 →"
     places = sorted([y for y, _, _ in lines] + [y for y, _ in heads])
     assert min(np.diff(places)) >= 1.0
-    figure = drawn(draw_sensitivity, found)
+    figure = drawn(sensitivity_figure, ROWS)
     (band,) = figure.axes[0].patches
     assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((0.35, 1.13))
 
 
 def test_marks_stand_at_the_rms_and_whiskers_end_at_the_largest(drawn):
-    figure = drawn(draw_sensitivity, [Change(*row) for row in ROWS])
+    figure = drawn(sensitivity_figure, ROWS)
     drawn_at = {round(float(x), 6) for line in figure.axes[0].lines for x in line.get_xdata()}
-    changed = [row for row in ROWS if row[0] != "system" and row[5] > 0]
-    assert drawn_at >= {row[5] / 1e3 for row in changed} | {row[6] / 1e3 for row in changed}
+    changed = [row for row in within_systems(ROWS) if row.rms_change_pa > 0]
+    assert drawn_at >= {row.rms_change_pa / 1e3 for row in changed}
+    assert drawn_at >= {row.largest_change_pa / 1e3 for row in changed}
     assert min(drawn_at) == 1e-3  # no change at all is drawn at the foot of the scale
 
 
 def test_without_rows_there_is_no_sensitivity():
     bare = results_of()
-    assert changes(bare) == []
-    assert sensitivity_figure(bare) is None
+    assert sensitivity_figure(bare.sensitivity) is None
     assert sensitivity_table(bare) is None
     assert sensitivity_sentences(bare) == []
     assert between_systems([]) is None
@@ -261,19 +261,11 @@ def test_the_table_has_three_cells_per_system_in_kilopascal(results):
     assert first["name"] == "reading of Table I: R1 →"
     assert first["rows"][0] == [
         *("R2", "−0.50", "0.40", "2.00", "−0.70", "0.60", "2.20", "–", "–", "–"),
-        *("7.6 → 7.3", "256"),
+        "256",
     ]
     widths = {len(row) for group in table["groups"] for row in group["rows"]}
-    assert widths == {1 + 3 * 3 + 2}
+    assert widths == {1 + 3 * 3 + 1}
     assert table["between"][0] == ["Mamdani → Sugeno", "−1.19", "1.13", "2.94", "256"]
-    assert table["has_widths"]
-
-
-def test_without_widths_the_table_has_no_column_for_them(results):
-    short = replace(results, tables={"sensitivity": [row[:8] for row in ROWS]})
-    table = sensitivity_table(short)
-    assert not table["has_widths"]
-    assert {len(row) for group in table["groups"] for row in group["rows"]} == {1 + 3 * 3 + 1}
 
 
 def test_the_summary_names_what_moves_the_estimate_more_than_the_system(results):
@@ -282,8 +274,8 @@ def test_the_summary_names_what_moves_the_estimate_more_than_the_system(results)
     assert "Sugeno's weights: sum → max (Sugeno by 4.05 kPa)" in sentence
     assert "Between the two lie: reading of Table I." in sentence
     assert "integration" not in sentence
-    calm = [row for row in ROWS if row[0] in ("system", "sampling")]
-    (sentence,) = sensitivity_sentences(replace(results, tables={"sensitivity": calm}))
+    calm = tuple(row for row in ROWS if row.choice in ("system", "sampling"))
+    (sentence,) = sensitivity_sentences(replace(results, sensitivity=calm))
     assert "No choice within a system moves its estimate further." in sentence
 
 

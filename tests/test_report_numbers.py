@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from reports.appearance import LOOKS
+from reports.appearance import LOOKS, looks
 from reports.content import document
 from reports.difference_figure import bars, label
 from reports.digits import (
@@ -22,20 +23,31 @@ from reports.digits import (
     words,
 )
 from reports.fuzzy_figures import SET_LOOKS
-from reports.motion_figures import peak
+from reports.motion_figures import motions, peak
 from reports.paper import TABLE_III, TABLE_III_SPREAD
-from reports.ranking import tool_probe, verdicts
+from reports.ranking import leads, tool_probe
 from reports.summary import glance, sentences
 from reports.tables import (
     balanced,
     error_rows,
     formula_rows,
+    lead_rows,
     paper_rows,
     similarity_tables,
-    verdict_rows,
 )
+from study.results.records import CurveErrors
 from study.similarity.score import FORMULAS
-from tests.report_samples import FUZZY, SOFTNESS, results_of, score_of
+from tests.report_samples import (
+    FUZZY,
+    MODELS,
+    SOFTNESS,
+    results_of,
+    score_of,
+    with_elements,
+    with_mesh_error,
+    with_model,
+    without_arrays,
+)
 
 
 @pytest.mark.parametrize(
@@ -123,61 +135,67 @@ def test_long_words_may_break_and_nothing_else_changes():
 
 
 def test_a_lead_above_the_numerical_error_is_resolved():
-    """Displacement: 0.02 of the mesh and three times 0.001 of the time step; the lead is 0.1."""
-    first = next(verdicts(results_of(), "fem", "tool"))
+    """Displacement: 0.01 of the mesh, 0.0004 of the subspace and three times 0.001 of the step."""
+    first = next(leads(results_of(), "fem", "tool"))
     assert first.column == ("displacement", "relative-l2")
     assert (first.best, first.runner_up) == ("msm-sugeno", "msm-mamdani")
-    assert first.lead == pytest.approx(
+    assert first.margin == pytest.approx(
         score_of("msm-sugeno", "fem") - score_of("msm-mamdani", "fem")
     )
-    assert first.error == pytest.approx(0.023)
+    assert first.error == pytest.approx(0.0134)
     assert first.is_resolved is True
 
 
 def test_a_lead_below_the_numerical_error_is_not_resolved():
     """The same scores with a reference that is wrong by 20 %."""
-    results = results_of()
-    results.numbers["models"][0]["mesh_error"]["displacement"] = 0.20
-    first = next(verdicts(results, "fem", "tool"))
+    results = with_errors(0.20, 0.012)
+    first = next(leads(results, "fem", "tool"))
     assert first.is_resolved is False
-    assert "not resolved" in verdict_rows(results)[0]
+    assert "not resolved" in lead_rows(results)[0]
 
 
-def test_the_error_at_the_control_point_itself_goes_before_that_over_all():
-    results = results_of()
-    record = results.numbers["models"][0]
-    record["mesh_error_by_probe"] = {"far": {"displacement": 0.3, "velocity": 0.0}}
-    record["time_step_error_by_probe"] = {"far": {"displacement": 0.01, "velocity": 0.0}}
-    found = {probe: next(verdicts(results, "fem", probe)).error for probe in ("tool", "far")}
-    assert found == pytest.approx({"tool": 0.023, "far": 0.3 + 0.01 + 2 * 0.001})
+def with_errors(displacement: float, velocity: float):
+    """Both control points have these errors by the mesh."""
+    there = CurveErrors(displacement=displacement, velocity=velocity)
+    return with_mesh_error(by_probe={"tool": there, "far": there})
 
 
-def test_velocity_and_loops_have_the_errors_of_velocity():
-    found = {v.column: v.error for v in verdicts(results_of(), "fem", "tool")}
-    assert found["velocity", "relative-l2"] == pytest.approx(0.05 + 3 * 0.01)
-    assert found["phase-plane", "area"] == pytest.approx(0.05 + 3 * 0.01)
+def test_each_control_point_has_its_own_error():
+    by_step = {p: CurveErrors(displacement=d, velocity=0.0) for p, d in (("tool", 2), ("far", 1))}
+    results = with_model(results_of(), "fem", time_step_errors=by_step)
+    found = {probe: next(leads(results, "fem", probe)).error for probe in ("tool", "far")}
+    rest = 0.0004 + 2 * 0.001
+    assert found == pytest.approx({"tool": 0.01 + 2 + rest, "far": 0.02 + 1 + rest})
+
+
+def test_velocity_has_its_own_error_and_loops_the_larger_of_the_two():
+    found = {lead.column: lead.error for lead in leads(results_of(), "fem", "tool")}
+    assert found["velocity", "relative-l2"] == pytest.approx(0.012 + 0.0004 + 3 * 0.01)
+    assert found["phase-plane", "area"] == pytest.approx(0.012 + 0.0004 + 3 * 0.01)
+    found = {lead.column: lead.error for lead in leads(with_errors(0.5, 0.1), "fem", "tool")}
+    assert found["phase-plane", "area"] == pytest.approx(0.5 + 0.0004 + 3 * 0.01)
 
 
 def test_without_a_mesh_error_a_lead_is_at_best_unknown():
-    results = results_of()
-    del results.numbers["models"][0]["mesh_error"]
-    first = next(verdicts(results, "fem", "tool"))
+    results = with_elements(mesh_error=None, truncation_error=None)
+    first = next(leads(results, "fem", "tool"))
     assert first.is_resolved is None
-    assert "≥ 0.0030" in verdict_rows(results)[0]
-    results.numbers["models"][0]["time_step_error"] = 0.5
-    assert next(verdicts(results, "fem", "tool")).is_resolved is False
+    assert "≥ 0.0030" in lead_rows(results)[0]
+    coarse = dict.fromkeys(("tool", "far"), CurveErrors(displacement=0.5, velocity=0.5))
+    results = with_model(results, "fem", time_step_errors=coarse)
+    assert next(leads(results, "fem", "tool")).is_resolved is False
 
 
 def test_the_benchmark_has_no_mesh_error_of_its_own():
-    first = next(verdicts(results_of(), "basafa", "tool"))
+    first = next(leads(results_of(), "basafa", "tool"))
     assert first.error == pytest.approx(0.003)
     assert first.is_resolved is True
 
 
 def test_equal_scores_have_no_winner():
     results = results_of([*FUZZY[:2], "fem"])
-    results.tables["similarity"] = [(*row[:-1], 0.5) for row in results.tables["similarity"]]
-    assert all(verdict.is_resolved is False for verdict in verdicts(results, "fem", "tool"))
+    results = replace(results, scores=tuple(row._replace(score=0.5) for row in results.scores))
+    assert all(lead.is_resolved is False for lead in leads(results, "fem", "tool"))
     assert "the two highest scores are equal on all 7 measures" in " ".join(sentences(results))
     cells = [
         c for t in similarity_tables(results) for g in t["groups"] for r in g["rows"] for c in r
@@ -194,9 +212,7 @@ def test_the_highest_fuzzy_score_of_a_column_is_marked_and_no_other():
 
 def test_a_highest_score_whose_lead_is_not_resolved_is_not_marked():
     """The same scores with a reference that is wrong by 20 % in displacement alone."""
-    results = results_of()
-    results.numbers["models"][0]["mesh_error"]["displacement"] = 0.20
-    table = similarity_tables(results)[0]
+    table = similarity_tables(with_errors(0.20, 0.012))[0]
     row = next(row[1:] for row in table["groups"][0]["rows"] if row[0] == "MSM Sugeno")
     marked = [cell.endswith("*") for cell in row]
     counts = {curve["name"]: curve["count"] for curve in table["curves"]}
@@ -208,10 +224,7 @@ def test_a_highest_score_whose_lead_is_not_resolved_is_not_marked():
 
 def differences(own: float | None):
     """What is printed where differences are 0.4, and 0.25 at best factor, if `own` is the error."""
-    results = results_of()
-    record = results.numbers["models"][0]
-    record["mesh_error"] = None if own is None else record["mesh_error"] | {"field_peak": own}
-    return results
+    return with_elements(mesh_error=None) if own is None else with_mesh_error(field_peak=own)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +246,7 @@ def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own
     assert f"MSM Sugeno {whole}" in " ".join(sentences(results))
     row = next(row for row in error_rows(results) if row[:2] == ["Finite elements", "MSM Sugeno"])
     assert row[2:] == [whole, "50.0 %", "10.0 %", at_best, "1.300"]
-    bar = next(bar for bar in bars(results) if bar[0] == "MSM Sugeno, at the peak")
+    bar = next(bar for bar in bars(results) if bar.name == "MSM Sugeno, at the peak")
     assert label(bar, own) == f"{whole}   (at best factor {at_best})"
 
 
@@ -241,9 +254,9 @@ def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
     said = " ".join(sentences(results_of(["fem", *FUZZY])))
     assert said.count("Of these leads 7 above the numerical error of the curves.") == 2
     results = results_of(["fem", *FUZZY])
-    results.numbers["models"][0]["mesh_error_by_probe"] = {
-        "far": {"displacement": 0.2, "velocity": 0.2}
-    }
+    by_probe = results.model("fem").mesh_error.by_probe
+    by_probe = by_probe | {"far": CurveErrors(displacement=0.2, velocity=0.2)}
+    results = with_mesh_error(results, by_probe=by_probe)
     said = " ".join(sentences(results))
     assert said.count("Of these leads 7 above the numerical error of the curves.") == 1
     assert said.count("Of these leads 7 not resolved.") == 1
@@ -273,13 +286,11 @@ def test_the_reference_shows_its_own_error_in_place_of_a_difference():
 
 def test_a_peak_has_its_error_where_that_is_known_at_the_control_point():
     """The reference peaks near 1 mm; its curve is wrong by 2 % at the tool."""
-    results = results_of()
-    record = results.numbers["models"][0]
+    results = with_elements(mesh_error=None)
     column = glance(results)["header"].index("peak at tool [mm]")
     largest = 1e3 * peak(results, "fem", "tool")
     assert glance(results)["rows"][0][column] == significant(largest)
-    record["mesh_error_by_probe"] = {"tool": {"displacement": 0.02, "velocity": 0.5}}
-    shown = [row[column] for row in glance(results)["rows"]]
+    shown = [row[column] for row in glance(with_errors(0.02, 0.5))["rows"]]
     assert shown[0] == f"{fixed(largest, 2)} ± 0.02"
     assert not any("±" in cell for cell in shown[1:])
 
@@ -287,15 +298,28 @@ def test_a_peak_has_its_error_where_that_is_known_at_the_control_point():
 def test_the_tools_control_point_is_the_nearest_not_the_first():
     results = results_of(probes=["far", "near"])
     assert tool_probe(results) == "far"  # the samples put the first one under the tool
-    results.arrays["fields"]["probes"] = results.arrays["fields"]["probes"][::-1]
-    assert tool_probe(results) == "near"
-    assert tool_probe(replace(results, arrays={})) == "far"
+    turned = results.fields | {"probes": results.fields["probes"][::-1]}
+    assert tool_probe(replace(results, fields=turned)) == "near"
+    assert tool_probe(without_arrays(results)) == "far"
 
 
 def test_the_peak_is_that_of_the_curve():
-    samples = [float(row[3]) for row in results_of().tables["curves"] if row[:2] == ("fem", "tool")]
-    assert peak(results_of(), "fem", "tool") == max(samples)
-    assert peak(results_of(), "fem", "elsewhere") is None
+    results = results_of()
+    samples = [row.displacement_m for row in results.curves if row[:2] == ("fem", "tool")]
+    assert peak(results, "fem", "tool") == max(samples)
+    assert peak(replace(results, curves=()), "fem", "tool") is None
+
+
+def test_curves_are_drawn_in_millimetres_between_the_bounds_of_an_interval():
+    """The samples' softer bound moves 1.1 times as far, the stiffer 0.9 times."""
+    results = results_of()
+    drawn = {one.look.label: one for one in motions(results, "far")}
+    curve, type_2 = results.curve("msm-interval-type-2", "far"), drawn["MSM type-2"]
+    whole = np.stack([curve.time, 1e3 * curve.displacement, 1e3 * curve.velocity])
+    np.testing.assert_allclose(type_2.motion, whole)
+    softer, stiffer = (whole * [[1.0], [share], [share]] for share in (1.1, 0.9))
+    np.testing.assert_allclose(type_2.bounds, [softer, stiffer])
+    assert [len(one.bounds) for one in drawn.values()] == [0, 0, 0, 0, 2]
 
 
 def test_a_column_that_no_model_fills_is_left_out():
@@ -315,6 +339,12 @@ def test_table_iii_stands_beside_the_range_of_all_measures():
 def test_no_stage_has_the_colour_of_a_model():
     """The output's panel shows both."""
     assert not {colour for colour, _ in SET_LOOKS} & {look.colour for look in LOOKS.values()}
+
+
+def test_no_model_looks_like_another():
+    seen = looks(results_of())
+    assert list(seen) == MODELS
+    assert len({(look.colour, look.dashes) for look in seen.values()}) == len(MODELS)
 
 
 def test_every_measure_has_its_formula():

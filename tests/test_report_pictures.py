@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,14 +51,14 @@ def test_one_colour_scale_serves_all_models():
 
 def test_a_model_far_beyond_the_first_does_not_flatten_the_scale():
     results = results_of()
-    results.arrays["fields"]["basafa"] *= 1e3
+    results.fields["basafa"] *= 1e3
     sheet = views(results).sheets[0]
     assert sheet.limit == pytest.approx(3.0 * float(sheet.panels[0].values.max()))
 
 
 def test_drawn_deformation_is_the_displacement_times_the_factor_said():
     seen = views(results_of())
-    fields = results_of().arrays["fields"]
+    fields = results_of().fields
     np.testing.assert_allclose(
         seen.sheets[0].panels[0].points, POINTS + seen.factor * fields["fem"][0], rtol=1e-12
     )
@@ -65,7 +67,7 @@ def test_drawn_deformation_is_the_displacement_times_the_factor_said():
 
 def test_a_model_without_a_finite_field_is_left_out():
     results = results_of()
-    results.arrays["fields"]["msm-sugeno"][:] = np.nan
+    results.fields["msm-sugeno"][:] = np.nan
     titles = [panel.title for panel in views(results).sheets[0].panels]
     assert len(titles) == 4
     assert "MSM Sugeno" not in titles
@@ -73,8 +75,7 @@ def test_a_model_without_a_finite_field_is_left_out():
 
 def test_a_scene_may_do_without_pictures():
     results = results_of()
-    results.numbers["scene"]["renders"] = False
-    assert views(results) is None
+    assert views(replace(results, scene=replace(results.scene, renders=False))) is None
 
 
 def child(folder, text):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from fem_reference import error_estimate as convergence
@@ -11,16 +13,24 @@ from reports import reference as section
 from reports import report
 from reports.content import document
 from reports.digits import fixed
-from reports.ranking import verdicts
+from reports.ranking import leads
 from reports.summary import sentences
 from reports.tables import numerics_rows
-from tests.report_samples import THREE_MESHES, bare, printed, results_of, with_meshes
-
-LEVELS = THREE_MESHES["mesh_levels"]
+from study.results.records import CurveErrors, LargeStrain
+from study.scene.schema import Organ
+from tests.report_samples import (
+    LEVELS,
+    bare,
+    printed,
+    results_of,
+    with_elements,
+    with_mesh_error,
+    with_model,
+)
 
 
 def found(**changes):
-    return section.reference(with_meshes(**changes))
+    return section.reference(with_elements(**changes))
 
 
 def test_each_control_point_has_its_peak_error_and_order():
@@ -33,9 +43,9 @@ def test_each_control_point_has_its_peak_error_and_order():
 
 
 def test_the_order_of_the_elements_bounds_that_of_the_error():
-    far = found(element="p1")["errors"][1]
-    assert far[3] == "2.5, 2 taken"
-    assert found(element="p1")["formal_order"] == "2"
+    section_of = section.reference(with_mesh_error(formal_order=2.0))
+    assert section_of["errors"][1][3] == "2.5, 2 taken"
+    assert section_of["formal_order"] == "2"
 
 
 def test_meshes_are_listed_from_coarse_to_fine():
@@ -44,21 +54,14 @@ def test_meshes_are_listed_from_coarse_to_fine():
 
 
 def test_with_two_meshes_the_order_is_assumed():
-    two = found(mesh_levels=LEVELS[1:])
+    two = found(levels=LEVELS[1:])
     assert (two["formal_order"], two["safety_assumed"]) == ("", "3")
     assert [row[3] for row in two["errors"]] == ["2 assumed"] * 3
 
 
 def test_the_estimate_is_described_as_the_run_makes_it():
-    for name in (
-        "SAFETY",
-        "SAFETY_ASSUMED",
-        "ASSUMED_ORDER",
-        "LEAST_ORDER",
-        "BEYOND",
-    ):
+    for name in ("SAFETY", "SAFETY_ASSUMED", "ASSUMED_ORDER", "LEAST_ORDER", "BEYOND"):
         assert getattr(section, name) == getattr(convergence, name)
-    assert {name: one.formal_order for name, one in ELEMENTS.items()} == section.FORMAL_ORDER
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -81,18 +84,18 @@ def test_element_and_method_are_said_in_words(element, method):
 @pytest.mark.parametrize(
     ("element", "organ", "curved"),
     [
-        ("p2", {"shape": "liver"}, True),
-        ("taylor-hood", {"shape": "liver", "mesh": None}, True),
-        ("p1", {"shape": "liver"}, False),
-        ("p2", {"shape": "block"}, False),
-        ("p2", {"shape": "liver", "mesh": "mine.stl"}, False),
+        ("p2", Organ(), True),
+        ("taylor-hood", Organ(), True),
+        ("p1", Organ(), False),
+        ("p2", Organ(shape="block"), False),
+        ("p2", Organ(mesh="mine.stl"), False),
     ],
 )
 def test_only_quadratic_elements_of_the_built_in_liver_are_said_to_be_curved(
     element, organ, curved
 ):
-    results = with_meshes(element=element)
-    results.numbers["scene"]["organ"] = organ
+    results = with_elements(element=element)
+    results = replace(results, scene=replace(results.scene, organ=organ))
     assert ("curved along the organ's surface" in section.reference(results)["how"]) is curved
 
 
@@ -101,8 +104,8 @@ def test_only_quadratic_elements_of_the_built_in_liver_are_said_to_be_curved(
     [(LEVELS, "the three finest"), (LEVELS[1:], "an assumed order"), (LEVELS[2:], None)],
 )
 def test_the_document_says_how_many_meshes_the_error_comes_from(levels, shown):
-    changes = {} if shown else {"mesh_error": None, "mesh_error_by_probe": {}}
-    content = bare(with_meshes(mesh_levels=levels, **changes))
+    changes = {} if shown else {"mesh_error": None}
+    content = bare(with_elements(levels=levels, **changes))
     said = " ".join(" ".join(printed(content)).split())
     assert "Meshes of the reference." in said
     for text in ("the three finest", "an assumed order"):
@@ -110,59 +113,59 @@ def test_the_document_says_how_many_meshes_the_error_comes_from(levels, shown):
     assert report.compile_pdf(content, {"motion": []}).startswith(b"%PDF")
 
 
-def test_an_older_run_has_no_section_of_it():
-    assert document(results_of())["reference"] is None
-    assert "Meshes of the reference." not in " ".join(printed(bare()))
+def test_a_run_without_the_reference_has_no_section_of_it():
     assert document(results_of(["basafa"]))["reference"] is None
+    assert "Meshes of the reference." not in " ".join(printed(bare(results_of(["basafa"]))))
 
 
 def test_the_first_page_says_how_many_meshes_the_error_comes_from():
-    assert "error is estimated from 3 meshes at 3.0 %" in " ".join(sentences(with_meshes()))
-    assert "error is estimated at 3.0 %" in " ".join(sentences(results_of()))
+    assert "error is estimated from 3 meshes at 3.0 %" in " ".join(sentences(results_of()))
+    two = with_elements(levels=LEVELS[1:])
+    assert "error is estimated from 2 meshes at 3.0 %" in " ".join(sentences(two))
 
 
-HYPERELASTIC = {
-    "law": "neo-hookean",
-    "field_difference": 0.034,
-    "largest_strain": 0.081,
-    "unknowns": 7803,
-}
+HYPERELASTIC = LargeStrain(
+    law="neo-hookean", field_difference=0.034, largest_strain=0.081, unknowns=7803
+)
 
 
 @pytest.mark.parametrize(
-    ("strain", "record", "said"),
+    ("strain", "found", "said"),
     [
-        (0.06, {"hyperelastic": HYPERELASTIC}, True),
-        (0.06, {"hyperelastic": None}, False),
-        (0.06, {}, False),
-        (0.05, {"hyperelastic": HYPERELASTIC}, False),  # the limit itself is trusted
+        (0.06, HYPERELASTIC, True),
+        (0.06, None, False),
+        (0.05, HYPERELASTIC, False),  # the limit itself is trusted
     ],
 )
-def test_large_deformation_is_said_where_linear_strain_is_not_trusted(strain, record, said):
-    text = " ".join(sentences(with_meshes(largest_strain=strain, **record)))
+def test_large_deformation_is_said_where_linear_strain_is_not_trusted(strain, found, said):
+    results = with_model(with_elements(large_strain=found), "fem", largest_strain=strain)
+    text = " ".join(sentences(results))
     whole = "A neo-Hookean solid on the same mesh moves otherwise by 3.4 % of the field at the peak"
     assert (whole in text) is said
     assert ("large deformation" in text) is said
 
 
 def test_what_a_subspace_leaves_out_counts_as_numerical_error():
-    curve = next(verdicts(with_meshes(), "fem", "tool"))
+    curve = next(leads(results_of(), "fem", "tool"))
     assert curve.error == pytest.approx(0.01 + 3 * 0.001 + 0.0004)
-    stepped = with_meshes(truncation_error=None)
-    assert next(verdicts(stepped, "fem", "tool")).error == pytest.approx(0.013)
-    assert next(verdicts(stepped, "fem", "tool")).is_whole
+    stepped = next(leads(with_elements(truncation_error=None), "fem", "tool"))
+    assert stepped.error == pytest.approx(0.013)
+    assert stepped.is_whole
 
 
 def test_an_error_of_rounding_is_not_printed_as_a_number():
-    exact = numerics_rows(with_meshes(time_step_error=9.2e-14))[0]
-    assert exact[1] == "< 1.0·10⁻⁶ %"
-    assert numerics_rows(with_meshes(time_step_error=2e-8))[0][1] == "2.0·10⁻⁶ %"
+    def shown(error):
+        by_probe = {"tool": CurveErrors(displacement=error, velocity=error)}
+        return numerics_rows(with_model(results_of(), "fem", time_step_errors=by_probe))[0][1]
+
+    assert shown(9.2e-14) == "< 1.0·10⁻⁶ %"
+    assert shown(2e-8) == "2.0·10⁻⁶ %"
 
 
 def test_a_planted_error_reaches_the_page():
     """Negative control of what is printed."""
-    planted = {"tool": {"displacement": 0.777, "velocity": 0.012}}
-    content = bare(with_meshes(mesh_error_by_probe=planted))
+    planted = CurveErrors(displacement=0.777, velocity=0.012)
+    content = bare(with_mesh_error(by_probe={"tool": planted}))
     assert "77.7 %" in printed(content)
-    assert "77.7 %" not in printed(bare(with_meshes()))
+    assert "77.7 %" not in printed(bare())
     assert fixed(77.7, 1) not in str(found())

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from reports import beforehand, report
+from reports import benchmarks, report
 from reports.digits import significant
 from reports.verification import verification
-from tests.report_samples import bare, printed, results_of
+from tests.report_samples import bare, printed, results_of, with_record
 
-DATA = Path(beforehand.__file__).parent / "data"
+DATA = Path(benchmarks.__file__).parent / "data"
 VERIFICATION = """\
 problem,quantity,exact,ours,error,order,limit,passed
 Sphere,"frequency, p2",2.50113,2.50121,3.2e-05,,0.001,True
@@ -37,7 +37,7 @@ def _folder(tmp_path, monkeypatch):
     """Tables made up by hand."""
     (tmp_path / "verification.csv").write_text(VERIFICATION)
     (tmp_path / "fem_cost.csv").write_text(COST)
-    monkeypatch.setattr(beforehand, "FOLDER", tmp_path)
+    monkeypatch.setattr(benchmarks, "FOLDER", tmp_path)
     return tmp_path
 
 
@@ -98,8 +98,7 @@ def test_a_problem_that_was_not_solved_has_no_error_to_print(folder):
 
 
 def test_a_finding_that_failed_is_printed_so(folder):
-    results = results_of()
-    results.numbers["checks"] = []  # one of them fails
+    results = with_record(results_of(), checks=())  # one of them fails
     assert "FAILED" not in printed(bare(results))
     failed = VERIFICATION.replace("0.001,True\nSphere", "1e-6,False\nSphere")
     (folder / "verification.csv").write_text(failed)

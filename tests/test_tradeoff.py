@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from study.run.lattices import assemble
+from study.tradeoff.body import build
+from study.tradeoff.contender import Ready
+from study.tradeoff.lattice import with_settings
 
 from fem_reference.observation import evaluation
 from fem_reference.subspace import transitions
 from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
-from study.run.lattices import assemble
 from study.scene.file import read_scene
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
@@ -21,11 +24,8 @@ from study.sweep.task import Task
 from study.tradeoff import problem as problem_module
 from study.tradeoff import recommend as advice
 from study.tradeoff import table, whole
-from study.tradeoff.body import build
-from study.tradeoff.contender import Ready
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lattice import with_settings
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations, contender
 from study.tradeoff.problem import SAMPLING, arguments, plain, sampled
 from study.tradeoff.rates import Frame, frame

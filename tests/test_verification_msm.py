@@ -244,6 +244,7 @@ def test_compiled_law_equals_the_plain_one(law):
 def test_benchmark_scaling_keeps_the_modulus_at_every_spacing():
     """K (h / h_0)^2 per length h: k_ref / h, and so E = 2.5 k_ref / h, does not change."""
     from study.run.lattices import benchmark
+
     from study.scene.file import read_scene
 
     for spacing in ("5 mm", "10 mm", "20 mm"):

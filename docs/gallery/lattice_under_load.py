@@ -1,4 +1,4 @@
-"""A block of springs of 4 kPa under a tool: how deep does it go in at the end of a second?"""
+"""How deep a tool goes into a block of springs of 4 kPa within a second."""
 
 import msm
 from study.scene.file import read_scene

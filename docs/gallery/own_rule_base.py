@@ -1,10 +1,11 @@
-"""A rule base of one's own, as MATLAB or Octave writes it: read, asked, and given to scikit-fuzzy."""
+"""A rule base of one's own, as MATLAB writes it: read, asked, and given to scikit-fuzzy."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import fuzzy
 import numpy as np
+
+import fuzzy
 
 STIFFNESS = """
 [System]
@@ -45,7 +46,8 @@ with TemporaryDirectory() as folder:
     system = fuzzy.read_rule_base(file)
 
 readings = np.array([[4.0], [8.0], [15.0]])
-for (reading,), modulus in zip(readings, fuzzy.infer(system, readings, "mamdani").value):
+moduli = fuzzy.infer(system, readings, "mamdani").value
+for (reading,), modulus in zip(readings, moduli, strict=True):
     print(f"a reading of {reading:4.1f} kPa gives {modulus:5.2f} kPa")
 
 from skfuzzy.control import ControlSystemSimulation  # noqa: E402 - its second half

@@ -51,11 +51,13 @@ def tradeoff(
     if dry_run:
         print("\n".join(asked.planned(request)))
         return
-    from reports import exchange, exchange_answers, exchange_figure
+    from reports.tradeoff import configurations
+    from reports.tradeoff_answers import sentences
+    from reports.tradeoff_figure import write_figures
 
     with on_stderr() as progress:
         lines = asked.measure(request, progress)
         with progress.stage("pictures"):
-            pictures = exchange_figure.write_figures(request.folder)
-    found = exchange_answers.sentences(exchange.configurations(request.folder))
+            pictures = write_figures(request.folder)
+    found = sentences(configurations(request.folder))
     print("\n".join([*lines, *found, *map(str, pictures)]))

@@ -306,8 +306,8 @@ def _mesh_springs_contradictions(lattice: Lattice, table: dict[str, Any]) -> Ite
 def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
     if not _OWN_LAW & set(scene.models):
         yield (
-            "lattice.law: only springs tuned by an estimate, or of the tissue, follow it; add msm or "
-            "tissue to models, or remove it"
+            "lattice.law: only springs tuned by an estimate, or of the tissue, follow it; add msm "
+            "or tissue to models, or remove it"
         )
     if scene.lattice.volume_term and not _is_unity_at_rest(law):
         yield (

@@ -29,7 +29,7 @@ from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns
 
 TABLE, RECORD = "tradeoff.csv", "tradeoff.json"
-PICTURES = ("exchange.svg", "exchange.pdf")
+PICTURES = ("tradeoff.svg", "tradeoff.pdf")
 """Drawn into the folder afterwards."""
 
 

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
+from study.run.lattices import node_damping
 
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import reference_stiffness
@@ -43,7 +44,6 @@ from msm.springs import connect
 from msm.stability import critical_time_step
 from msm.timestep import LOOK
 from msm.volume import volume_term
-from study.run.lattices import node_damping
 from study.scene.file import read_scene
 from tests.benchmarks import field_error
 

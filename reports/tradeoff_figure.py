@@ -1,20 +1,19 @@
-"""The exchange rate: error against the reference over cost, for all and for each rate of a loop."""
+"""Figure of the trade-off: error against the reference over cost, for all and for each rate."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import canvas
-from reports.appearance import series
+from reports.appearance import Style, series
 from reports.configuration_names import contender_name, mark_of
 from reports.digits import Table
-from reports.exchange import (
-    Configuration,
+from reports.tradeoff import (
+    MeasuredConfiguration,
     configurations,
-    front,
     is_in_time,
     left_out,
     rate_name,
@@ -26,8 +25,9 @@ from reports.exchange import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
-NAME = "exchange"
+NAME = "tradeoff"
 HEIGHT = 5.5
 HEIGHT_RATIOS = (1.6, 1.0)
 GRID = 12
@@ -39,27 +39,23 @@ COLUMN = 34
 """Letters in a line of the list beside."""
 PER_CENT = 100.0
 HOLLOW = {"markerfacecolor": "white"}
-FRONT: dict[str, Any] = {"color": "#555555", "linewidth": 0.9}
+FRONT: Style = {"color": "#555555", "linewidth": 0.9}
 TICKS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100]
 
-Styles = dict[str, dict[str, Any]]
+Styles = dict[str, Style]
 
 
 def write_figures(folder: Path) -> list[Path]:
-    """Draw the table of a folder as SVG and PDF into it; none where nothing was timed."""
-    with canvas.style():
-        figure = _figure(configurations(folder))
-        return [] if figure is None else canvas.write(figure, folder / NAME)
+    """Draw the trade-off of a folder as SVG and PDF into it; none where nothing was timed."""
+    return canvas.write({folder / NAME: lambda: _figure(configurations(folder))})
 
 
-def exchange_figure(found: Sequence[Configuration]) -> bytes | None:
-    """The figure as SVG, or None where nothing was timed."""
-    with canvas.style():
-        figure = _figure(found)
-        return None if figure is None else canvas.svg(figure)
+def tradeoff_figure(found: Sequence[MeasuredConfiguration]) -> bytes | None:
+    """Figure of error over cost as SVG, or None where nothing was timed."""
+    return canvas.picture(lambda: _figure(found))
 
 
-def _figure(found: Sequence[Configuration]) -> Figure | None:
+def _figure(found: Sequence[MeasuredConfiguration]) -> Figure | None:
     shown, without = timed(found), left_out(found)
     if not shown:
         return None
@@ -81,13 +77,13 @@ def _figure(found: Sequence[Configuration]) -> Figure | None:
     return figure
 
 
-def _draw_whole(axes: Axes, shown: Sequence[Configuration], looks: Styles) -> None:
+def _draw_whole(axes: Axes, shown: Sequence[MeasuredConfiguration], looks: Styles) -> None:
     """All over their cost, with the bars of both, and the fronts."""
     for one in shown:
         look = looks[one.contender] | ({} if one.any_load else HOLLOW)
         axes.errorbar(**_bars(one), **look, linestyle="", markersize=4.5, elinewidth=0.6, zorder=3)
-    for group, dashes in ((shown, ":"), ([one for one in shown if one.any_load], "-")):
-        _draw_front(axes, front(group), dashes)
+    _draw_front(axes, [one for one in shown if one.on_front], ":")
+    _draw_front(axes, [one for one in shown if one.on_any_load_front], "-")
     axes.axvline(1.0, color="black", linewidth=0.8)
     _note(axes, "real time", (1.0, 1.0), ("data", "axes fraction"))
     axes.set(xscale="log", yscale="log", xlabel="wall time per simulated second [s/s]")
@@ -96,25 +92,28 @@ def _draw_whole(axes: Axes, shown: Sequence[Configuration], looks: Styles) -> No
     _shade_unresolved(axes, shown)
 
 
-def _bars(one: Configuration) -> dict[str, Any]:
+def _bars(one: MeasuredConfiguration) -> Style:
     """Place of a mark with quartiles of its cost and, if it is resolved, the reference's error."""
     low, x, high = one.timing.quartiles
-    place = {"x": x, "y": _height(one), "xerr": [[x - low], [high - x]]}
+    place: Style = {"x": x, "y": _height(one), "xerr": [[x - low], [high - x]]}
     return place | ({} if one.error is None else {"yerr": PER_CENT * one.bar})
 
 
-def _draw_front(axes: Axes, chosen: Sequence[Configuration], dashes: str) -> None:
+def _draw_front(axes: Axes, chosen: Sequence[MeasuredConfiguration], dashes: str) -> None:
     """A step line; each new setting on the one that is drawn whole has its name."""
-    walls = [one.timing.quartiles[1] for one in chosen]
-    heights = [_height(one) for one in chosen]
+    by_cost = sorted(chosen, key=lambda one: one.timing.quartiles[1])
+    walls = [one.timing.quartiles[1] for one in by_cost]
+    heights = [_height(one) for one in by_cost]
     axes.plot(walls, heights, drawstyle="steps-post", linestyle=dashes, **FRONT)
-    labels = [mark_of(one.settings) for one in chosen]
+    labels = [mark_of(one.settings) for one in by_cost]
     for x, y, label, last in zip(walls, heights, labels, ["", *labels], strict=False):
         if dashes == "-" and label != last:
             axes.annotate(label, (x, y), (-4, -4), **_small(ha="right", va="top"))
 
 
-def _draw_rate(axes: Axes, shown: Sequence[Configuration], rate: str, looks: Styles) -> None:
+def _draw_rate(
+    axes: Axes, shown: Sequence[MeasuredConfiguration], rate: str, looks: Styles
+) -> None:
     """All over the share of a period that a frame takes; filled where it is ready in time."""
     for one in shown:
         look = looks[one.contender] | ({} if is_in_time(one, rate) else HOLLOW | {"alpha": 0.6})
@@ -132,12 +131,12 @@ def _plain(value: float, _: float) -> str:
     return f"{value:g}"
 
 
-def _height(one: Configuration) -> float:
+def _height(one: MeasuredConfiguration) -> float:
     """Error [%]; of one that is not resolved, the bound on it."""
     return PER_CENT * (one.bar if one.error is None else one.error)
 
 
-def _shade_unresolved(axes: Axes, shown: Sequence[Configuration]) -> None:
+def _shade_unresolved(axes: Axes, shown: Sequence[MeasuredConfiguration]) -> None:
     from matplotlib.ticker import FixedLocator, NullLocator
 
     bar = PER_CENT * max(one.bar for one in shown)
@@ -155,11 +154,11 @@ def _draw_list(axes: Axes, without: Table) -> None:
     """Those without an error, and why."""
     axes.set_axis_off()
     texts = [fill(f"{name}: {status} {message}", COLUMN) for name, status, message in without]
-    place: dict[str, Any] = {"va": "top", "fontsize": 5.6, "linespacing": 1.25}
+    place: Style = {"va": "top", "fontsize": 5.6, "linespacing": 1.25}
     axes.text(0.0, 1.0, "\n".join(["Without an error:", *texts]), in_layout=False, **place)
 
 
-def _legend(shown: Iterable[Configuration], looks: Styles) -> list[Any]:
+def _legend(shown: Iterable[MeasuredConfiguration], looks: Styles) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
     marks = {one.contender: one.any_load for one in shown}
@@ -178,5 +177,5 @@ def _note(axes: Axes, text: str, at: tuple[float, float], coords: tuple[str, str
     axes.annotate(text, at, (3, -3), xycoords=coords, **_small(va="top"))
 
 
-def _small(**more: str) -> dict[str, Any]:
+def _small(**more: str) -> Style:
     return {"textcoords": "offset points", "fontsize": 5.8, "color": "#444444"} | more

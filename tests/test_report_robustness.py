@@ -8,16 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from reports import beforehand, exchange_figure, report, stability_map
+from reports import benchmarks, canvas, report, stability_map, tradeoff_figure
 from reports.appearance import series
-from reports.exchange import configurations, front, left_out, record
-from reports.exchange_answers import answers, sentences
-from reports.extremes import extreme_figures, extremes
+from reports.robustness import robustness, robustness_figures
 from reports.stability import FAILED, boundaries, cases, matrix
 from reports.stability import sentences as told
+from reports.tradeoff import conditions, configurations, left_out
+from reports.tradeoff_answers import answers, sentences
+from study.tradeoff import table
 from tests.report_samples import bare, printed, results_of
 
-DATA = Path(beforehand.__file__).parent / "data"
+DATA = Path(benchmarks.__file__).parent / "data"
 RATES = {"60hz": 60.0, "1khz": 1000.0}
 BAR = 0.003
 CASES = """\
@@ -70,11 +71,13 @@ def sample():
     ]
 
 
-def write(lines, folder):
+def write(lines, folder, mark=table.with_fronts):
+    """The columns of the lines and the fronts that the study marks, as a folder's table."""
     with (folder / "tradeoff.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, lines[0].keys(), lineterminator="\n")
-        table.writeheader()
-        table.writerows(lines)
+        columns = [*lines[0], "pareto", "pareto_any_load"]
+        writer = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(mark(lines))
     return configurations(folder)
 
 
@@ -86,7 +89,7 @@ def _folder(tmp_path, monkeypatch):
     record_ = {"machine": {"processor": "Some processor"}, "reference": known, "repeats": 5}
     (tmp_path / "tradeoff.json").write_text(json.dumps(record_))
     (tmp_path / "stability.csv").write_text(CASES)
-    monkeypatch.setattr(beforehand, "FOLDER", tmp_path)
+    monkeypatch.setattr(benchmarks, "FOLDER", tmp_path)
     return tmp_path
 
 
@@ -131,24 +134,61 @@ def test_where_nothing_is_in_time_the_nearest_is_named(tmp_path):
     ]
 
 
-def test_a_planted_point_moves_the_front(tmp_path):
-    def settings(lines):
-        return [one.settings.split()[0] for one in front(write(lines, tmp_path))]
+@pytest.fixture(name="fronts")
+def _fronts(monkeypatch):
+    """Places [(wall, error in per cent)] of the two step lines that a table's figure draws."""
+    monkeypatch.setattr(canvas, "svg", lambda figure: figure)
 
-    before = ["spacing=0.02", "spacing=0.01", "spacing=0.005"]
-    assert settings(sample()) == before
-    assert settings([*sample(), row("spacing=0.03", 0.05, 0.5)]) == before  # beaten in both
-    planted = row("spacing=0.03", 0.03, 0.05)
-    assert settings([*sample(), planted]) == ["spacing=0.02", "spacing=0.03", "spacing=0.005"]
+    def drawn(found):
+        lines = tradeoff_figure.tradeoff_figure(found).axes[0].lines
+        steps = [line for line in lines if line.get_drawstyle() == "steps-post"]
+        return {line.get_linestyle(): list(map(tuple, line.get_xydata())) for line in steps}
+
+    return drawn
+
+
+def marked(lines, column):
+    """Places of the lines that a table marks, the cheapest first."""
+    chosen = [line for line in lines if line[column] in (True, "True")]
+    return sorted((float(o["wall_per_s"]), 100 * float(o["field_error"])) for o in chosen)
+
+
+def test_the_drawn_front_is_that_which_the_study_marks(fronts):
+    if not (found := configurations(DATA)):
+        pytest.skip("tradeoff.csv does not come with the program")
+    lines = list(csv.DictReader((DATA / "tradeoff.csv").read_text().splitlines()))
+    drawn = fronts(found)
+    assert drawn["-"] == marked(lines, "pareto_any_load") != []
+    assert drawn[":"] == marked(lines, "pareto") != []
+
+
+def test_a_planted_point_moves_the_drawn_front(fronts, tmp_path):
+    before = [(0.02, 11.0), (0.3, 4.0), (0.9, 2.0)]
+    assert fronts(write(sample(), tmp_path))["-"] == before
+    beaten = [*sample(), row("spacing=0.03", 0.05, 0.5)]
+    assert fronts(write(beaten, tmp_path))["-"] == before
+    hardly_better = [*sample(), row("spacing=0.03", 0.995 * 0.04, 0.5)]  # within 1 % of the error
+    assert fronts(write(hardly_better, tmp_path))["-"] == before
+    better = [*sample(), row("spacing=0.03", 0.03, 0.05)]
+    assert fronts(write(better, tmp_path))["-"] == [(0.02, 11.0), (0.05, 3.0), (0.9, 2.0)]
+
+
+def test_the_front_follows_the_marks_and_no_rule_of_its_own(fronts, tmp_path):
+    """Negative control: marks that no rule would set."""
+
+    def mark(lines):
+        return [line | {"pareto": k == 3} for k, line in enumerate(lines)]
+
+    assert fronts(write(sample(), tmp_path, mark))[":"] == [(0.1, 24.0)]
 
 
 def test_what_has_no_error_has_no_place_and_is_listed(folder):
     found = configurations(folder)
     assert left_out(found) == [["springs alone, 500 Hz steps", "diverged", "at 0.12 s"]]
-    svg = exchange_figure.exchange_figure(found)
+    svg = tradeoff_figure.tradeoff_figure(found)
     assert b"500 Hz" in svg
     assert b"diverged at 0.12 s" in svg
-    assert exchange_figure.exchange_figure(found[-1:]) is None
+    assert tradeoff_figure.tradeoff_figure(found[-1:]) is None
 
 
 def test_marks_tell_contenders_apart_without_colour():
@@ -157,21 +197,21 @@ def test_marks_tell_contenders_apart_without_colour():
 
 
 def test_the_figures_of_a_folder_are_drawn_into_it(folder):
-    drawn = [*exchange_figure.write_figures(folder), *stability_map.write_figures(folder)]
+    drawn = [*tradeoff_figure.write_figures(folder), *stability_map.write_figures(folder)]
     assert [path.name for path in drawn] == [
         f"{name}.{kind}"
-        for name in ("exchange", "stability", "critical_step")
+        for name in ("tradeoff", "stability", "critical_step")
         for kind in ("svg", "pdf")
     ]
     assert all(path.stat().st_size > 1000 for path in drawn)
     first = [path.read_bytes() for path in drawn]
-    exchange_figure.write_figures(folder)
+    tradeoff_figure.write_figures(folder)
     stability_map.write_figures(folder)
     assert [path.read_bytes() for path in drawn] == first
 
 
 def test_a_folder_without_tables_has_no_figures(tmp_path):
-    assert exchange_figure.write_figures(tmp_path) == []
+    assert tradeoff_figure.write_figures(tmp_path) == []
     assert stability_map.write_figures(tmp_path) == []
     assert list(tmp_path.iterdir()) == []
 
@@ -223,47 +263,31 @@ def test_the_document_prints_them_and_says_that_they_are_of_no_run():
     texts = printed(bare())
     assert "None of these figures are of this run." in texts
     assert {"springs and volume term, 10 mm", "4.0 ± 0.3 %", "60.0 %"} <= set(texts)
-    measured = extremes(results_of())["exchange"]["measured"]
+    measured = robustness(results_of())["tradeoff"]["measured"]
     assert measured == (
         "Measured on Some processor, in 5 turns, against finite elements of 12\u202f345 unknowns, "
         "whose own error is 0.3 %."
     )
-    figures = {"motion": []} | {k: [svg] for k, svg in extreme_figures(results_of()).items()}
+    figures = {"motion": []} | {k: [svg] for k, svg in robustness_figures(results_of()).items()}
     assert report.compile_pdf(bare(), figures).startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
-    ("missing", "left"), [("tradeoff", ["stability"]), ("stability", ["exchange"])]
+    ("missing", "left"), [("tradeoff", ["stability"]), ("stability", ["tradeoff"])]
 )
 def test_a_table_that_is_missing_is_left_out(missing, left, folder):
     (folder / f"{missing}.csv").unlink()
-    assert list(extremes(results_of())) == left
-    drawn = set(extreme_figures(results_of()))
-    assert drawn == ({"exchange"} if missing == "stability" else {"stability", "critical_step"})
+    assert list(robustness(results_of())) == left
+    drawn = {place for place, svg in robustness_figures(results_of()).items() if svg}
+    assert drawn == ({"tradeoff"} if missing == "stability" else {"stability", "critical_step"})
     assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
 
 
 def test_without_tables_or_without_a_lattice_there_is_no_appendix(folder):
-    assert extremes(results_of(["fem"])) is None
-    assert extreme_figures(results_of(["fem"])) == {}
+    assert robustness(results_of(["fem"])) is None
+    assert robustness_figures(results_of(["fem"])) == {}
     for path in folder.iterdir():
         path.unlink()
-    assert extremes(results_of()) is None
-    assert record() == {}
+    assert robustness(results_of()) is None
+    assert conditions() is None
     assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
-
-
-def test_the_front_is_that_which_the_study_marked():
-    """Of equals the study marks all; the figure steps over the first."""
-    found = configurations(DATA)
-    if not found:
-        pytest.skip("tradeoff.csv does not come with the program")
-    with (DATA / "tradeoff.csv").open(newline="") as file:
-        marked = {
-            f"{line['contender']} {line['configuration']}"
-            for line in csv.DictReader(file)
-            if line["pareto_any_load"] == "True"
-        }
-    ours = {f"{one.contender} {one.settings}" for one in front([o for o in found if o.any_load])}
-    assert ours
-    assert ours <= marked

@@ -1,4 +1,4 @@
-"""What the benchmarks measured of the lattice once, beforehand; none of it is of the run reported.
+"""Benchmarks of the lattice, measured once; none of the figures is of the run reported.
 
 The tables come with the program (`reports/data`), each a row per case under the names of its
 columns; the benchmark that writes a table says what they mean.
@@ -7,9 +7,9 @@ columns; the benchmark that writes a table says what they mean.
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from importlib import resources
 from importlib.resources.abc import Traversable
-from typing import Any
 
 from reports.differences import resolved
 from reports.digits import DASH, Table, count, fixed, percent, significant
@@ -22,14 +22,14 @@ MILLI = 1e3
 Line = dict[str, str]
 
 
-def beforehand(results: Results) -> dict[str, Any] | None:
-    """Tables by name, None for a scene without a lattice or where no table was delivered.
+def benchmarks(results: Results) -> dict[str, object] | None:
+    """Benchmarks of the lattice as tables by name.
 
-    A table that is missing is left out.
+    None for a scene without one or where no table was delivered; one that is missing is left out.
     """
     if not has_lattice(results):
         return None
-    shapes = {
+    shapes: dict[str, Callable[[list[Line]], object]] = {
         "field_error": field_error,
         "real_time": real_time,
         "large_strain": large_strain,
@@ -41,7 +41,7 @@ def beforehand(results: Results) -> dict[str, Any] | None:
 
 def has_lattice(results: Results) -> bool:
     """Whether a model of the run is a lattice and not a single mass point."""
-    return any(record.get("springs", 0) > 1 for record in results.numbers["models"])
+    return any(model.lattice is not None for model in results.record.models)
 
 
 def read(name: str, folder: Traversable | None = None) -> list[Line]:
@@ -55,8 +55,8 @@ def read(name: str, folder: Traversable | None = None) -> list[Line]:
     return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
 
 
-def field_error(lines: list[Line]) -> dict[str, Any]:
-    """Error over the spacing, a row per body, Poisson ratio and kind of lattice.
+def field_error(lines: list[Line]) -> dict[str, object]:
+    """Field error of the lattice over its spacing, a row per body, Poisson ratio and kind.
 
     Where the volume term changes nothing, as at Poisson ratio 1/4, one row stands for both.
     """
@@ -117,8 +117,8 @@ def large_strain(lines: list[Line]) -> Table:
     ]
 
 
-def peers(lines: list[Line]) -> dict[str, Any]:
-    """A row per engine and Poisson ratio: cost and error by count of nodes."""
+def peers(lines: list[Line]) -> dict[str, object]:
+    """Other engines beside the lattice: cost and error by count of nodes, engine, Poisson ratio."""
     groups: dict[tuple[str, ...], dict[str, Line]] = {}
     for line in lines:
         key = (line["engine"], line["version"], line["precision"], line["nu"])

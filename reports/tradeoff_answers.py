@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from reports.digits import DASH, Table, percent, significant
-from reports.exchange import (
-    Configuration,
+from reports.tradeoff import (
+    MeasuredConfiguration,
     best,
     is_better,
     next_better,
@@ -20,13 +20,15 @@ TOLD = ("60hz", "1khz")
 """Rates that have a sentence."""
 
 
-def sentences(found: Sequence[Configuration]) -> list[str]:
-    """What can be had at each of the rates told, by models that follow any load."""
+def sentences(found: Sequence[MeasuredConfiguration]) -> list[str]:
+    """Sentences on what models that follow any load reach at the rates told."""
     free = [one for one in timed(found) if one.any_load]
     return [_sentence(found, free, rate) for rate in TOLD if rate in rates_of(free)]
 
 
-def _sentence(found: Sequence[Configuration], free: list[Configuration], rate: str) -> str:
+def _sentence(
+    found: Sequence[MeasuredConfiguration], free: list[MeasuredConfiguration], rate: str
+) -> str:
     chosen = best(free, rate)
     if chosen is None:
         nearest = min(free, key=lambda one: share(one, rate))
@@ -39,7 +41,7 @@ def _sentence(found: Sequence[Configuration], free: list[Configuration], rate: s
     return f"At {rate_name(rate)} {told}{_known_load(found, rate, chosen)}."
 
 
-def _told(one: Configuration, rate: str) -> str:
+def _told(one: MeasuredConfiguration, rate: str) -> str:
     """A configuration, its error, and its share of a period."""
     taken = share(one, rate)
     part = f"{significant(taken, 2)} periods"
@@ -48,14 +50,16 @@ def _told(one: Configuration, rate: str) -> str:
     return f"{one.name} (error {one.stated_error}, {part})"
 
 
-def _next(free: list[Configuration], rate: str, chosen: Configuration) -> str:
+def _next(free: list[MeasuredConfiguration], rate: str, chosen: MeasuredConfiguration) -> str:
     better = next_better(free, rate, chosen)
     if better is None:
         return "none is more accurate by more than the reference's own error"
     return f"the next better is {_told(better, rate)}"
 
 
-def _known_load(found: Sequence[Configuration], rate: str, chosen: Configuration | None) -> str:
+def _known_load(
+    found: Sequence[MeasuredConfiguration], rate: str, chosen: MeasuredConfiguration | None
+) -> str:
     """What a load whose place is known beforehand allows beyond that."""
     bound = best([one for one in found if not one.any_load], rate)
     if bound is None or (chosen and not is_better(bound, chosen)):
@@ -66,8 +70,8 @@ def _known_load(found: Sequence[Configuration], rate: str, chosen: Configuration
     )
 
 
-def answers(found: Sequence[Configuration]) -> Table:
-    """Rate, load's place, the most accurate in time, its error, share of the period, set-up [s]."""
+def answers(found: Sequence[MeasuredConfiguration]) -> Table:
+    """Answers by rate and load's place: the most accurate in time, error, share, set-up [s]."""
     measured = timed(found)
     groups = (("any", True), ("known beforehand", False))
     return [
@@ -77,7 +81,7 @@ def answers(found: Sequence[Configuration]) -> Table:
     ]
 
 
-def _answer(group: list[Configuration], rate: str) -> list[str]:
+def _answer(group: list[MeasuredConfiguration], rate: str) -> list[str]:
     chosen = best(group, rate)
     if chosen is None:
         return ["none", DASH, DASH, DASH]

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from reports import beforehand, report
+from reports import benchmarks, report
 from reports.digits import percent, significant
-from tests.report_samples import FUZZY, bare, printed, results_of
+from study.results.records import PointRecord
+from tests.report_samples import FUZZY, bare, printed, results_of, with_model
 
-DATA = Path(beforehand.__file__).parent / "data"
+DATA = Path(benchmarks.__file__).parent / "data"
 NAMES = ["field_error", "real_time", "large_strain", "peers"]
 
 
@@ -21,12 +22,12 @@ def _folder(tmp_path, monkeypatch):
     """A copy of the tables that a test may spoil."""
     copy = tmp_path / "data"
     shutil.copytree(DATA, copy)
-    monkeypatch.setattr(beforehand, "FOLDER", copy)
+    monkeypatch.setattr(benchmarks, "FOLDER", copy)
     return copy
 
 
 def found(results=None):
-    return beforehand.beforehand(results or results_of())
+    return benchmarks.benchmarks(results or results_of())
 
 
 def plant(path, column, value, row=0):
@@ -65,7 +66,7 @@ def test_the_document_prints_the_figures_of_the_tables():
         ("peers", "relative_to_ours"),
     ):
         assert {significant(value, 2) for value in numbers(name, column)} <= texts
-    for line in beforehand.read("peers"):
+    for line in benchmarks.read("peers"):
         assert {line["engine"], line["version"], line["precision"]} <= texts
 
 
@@ -119,7 +120,8 @@ def test_without_tables_there_is_no_appendix(folder):
 def test_without_a_lattice_there_is_no_appendix():
     assert found(results_of(["fem"])) is None
     point = results_of(["basafa", *FUZZY])
-    for record in point.numbers["models"]:
-        record |= {"nodes": 1, "springs": 1}
+    own = PointRecord(stiffness_n_per_m=9.0, mass_kg=0.1, damping_ratio=0.9)
+    for name in ("basafa", *FUZZY):
+        point = with_model(point, name, nodes=1, lattice=None, point=own)
     assert found(point) is None
     assert found(results_of(["basafa"])) is not None
