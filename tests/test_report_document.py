@@ -20,7 +20,7 @@ from reports.difference_figure import bars
 from reports.field_figures import views
 from reports.ranking import leads
 from reports.tables import lead_rows
-from study import commands
+from study.commands.report import report as report_command
 from study.results.folder import Results, ResultsError, write
 from study.results.records import SCHEMA_VERSION
 from tests.report_samples import (
@@ -96,7 +96,7 @@ def test_results_of_an_older_schema_are_refused_with_their_version_and_the_remed
     (tmp_path / "results.json").write_text(json.dumps(old))
     said = f"results of schema 1, this program reads {SCHEMA_VERSION}; run the scene again"
     with pytest.raises(ResultsError, match=said):
-        commands.report(tmp_path)
+        report_command(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["results.json"]
 
 

@@ -71,7 +71,25 @@ def sample():
     ]
 
 
-def write(lines, folder, mark=table.with_fronts):
+def with_fronts(lines):
+    """The lines with the marks that the study's rule gives them."""
+
+    def place(line):
+        return float(line["field_error"]), float(line["wall_per_s"])
+
+    marked = []
+    known = [line for line in lines if line["field_error"] and line["wall_per_s"]]
+    groups = {"pareto": known, "pareto_any_load": [line for line in known if line["any_load"]]}
+    for line in lines:
+        marks = {
+            name: line in group and not table.is_beaten(place(line), [*map(place, group)])
+            for name, group in groups.items()
+        }
+        marked.append(line | marks)
+    return marked
+
+
+def write(lines, folder, mark=with_fronts):
     """The columns of the lines and the fronts that the study marks, as a folder's table."""
     with (folder / "tradeoff.csv").open("w", newline="") as file:
         columns = [*lines[0], "pareto", "pareto_any_load"]

@@ -92,21 +92,22 @@ class Entry:
         return self.errors.field, self.cost.per_second[1]
 
 
-def front(entries: Sequence[Entry]) -> list[Entry]:
-    """Entries for which no cheaper one is as accurate, and no more accurate one as cheap.
+def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]]) -> bool:
+    """Whether one of the places, each an error and a cost, leaves another no place on the front.
 
-    Errors that differ by less than SAME of themselves are the same: those of one lattice at two
-    steps do. An entry without error or cost has no place on it.
+    It does if it is cheaper and as accurate, or more accurate and as cheap. Errors that differ by
+    less than SAME of themselves are the same: those of one lattice at two steps do.
     """
+    error, wall = place
+    return any(
+        (w <= wall and e < error) or (w < wall and e <= (1.0 + SAME) * error) for e, w in places
+    )
+
+
+def front(entries: Sequence[Entry]) -> list[Entry]:
+    """Entries that no other beats; one without error or cost has no place among them."""
     places = [one.place for one in entries if one.place is not None]
-
-    def is_beaten(place: tuple[float, float]) -> bool:
-        error, wall = place
-        return any(
-            (w <= wall and e < error) or (w < wall and e <= (1.0 + SAME) * error) for e, w in places
-        )
-
-    return [one for one in entries if one.place is not None and not is_beaten(one.place)]
+    return [one for one in entries if one.place is not None and not is_beaten(one.place, places)]
 
 
 def fronts(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
