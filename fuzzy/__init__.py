@@ -97,7 +97,7 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    """The exported name, from its module."""
+    """Import an exported name from its module; AttributeError for any other."""
     if name not in _MODULES:
         raise AttributeError(f"module 'fuzzy' has no attribute {name!r}")
     return getattr(import_module(f"fuzzy.{_MODULES[name]}"), name)

@@ -32,7 +32,7 @@ PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What was asked on the command line.
+    """What the command line asked of `estimate`.
 
     `readings` [kPa] by aetiology; `systems` empty for all three; `settings` the given fields of
     LiverSettings and InferenceOptions by name; `row` of the table to explain, from 1.

@@ -151,6 +151,7 @@ def variables(points=1001):
     service["fine"] = skfuzzy.sigmf(x, 8.0, 2.0)
     food["bad"] = skfuzzy.zmf(x, 1.0, 6.0)
     food["fair"] = skfuzzy.pimf(x, 2.0, 4.5, 5.0, 8.0)
+    food["plain"] = skfuzzy.gbellmf(x, 2.0, 2.5, 4.0)
     food["nice"] = skfuzzy.smf(x, 5.0, 9.0)
     tip.automf(3, names=["low", "middle", "high"])
     return service, food, tip
@@ -167,7 +168,7 @@ MIXED = (
     lambda s, f, t: ((s["poor"] | f["bad"]) & ~s["fine"], t["low"]),
     lambda s, f, t: (~(s["poor"] & f["bad"]) & f["fair"], t["middle"] % 0.6),
     lambda s, f, t: (~(s["poor"] | ~s["fine"]) | ~~f["nice"], (t["high"] % 0.9, t["middle"] % 0.2)),
-    lambda s, _, t: (s["good"], t["middle"]),
+    lambda s, f, t: (s["good"] & f["plain"], t["middle"]),
 )
 
 
@@ -312,6 +313,9 @@ SETS = (
     ("gaussmf", (1.3, 4.444)),
     ("gaussmf", (3.0, -2.0)),
     ("gauss2mf", (1.3, 4.0, 2.0, 6.1)),
+    ("gbellmf", (2.0, 2.5, 4.444)),
+    ("gbellmf", (1.5, 4.0, 0.0)),
+    ("gbellmf", (3.0, 1.0, 11.0)),
     ("sigmf", (2.0, 3.0)),
     ("sigmf", (-1.5, 8.0)),
     ("zmf", (1.0, 7.3)),

@@ -74,7 +74,7 @@ SET = StiffnessSet(
 def view_arrays() -> dict[str, np.ndarray]:
     readings = {"hcv": 9.5e3, "nafld": 12e3}
     system, row = patient_system(readings, LiverSettings()), liver_row(readings)[0]
-    found = [drawing_arrays(explain(system, row, kind)) for kind in SYSTEMS]
+    found = [drawing_arrays(explain(system, row, kind), "kPa") for kind in SYSTEMS]
     return found[0] | found[1] | found[2]
 
 

@@ -21,7 +21,7 @@ MISSING_TRIPLE = ("ald", "cld", "nafld")
 
 @dataclass(frozen=True)
 class TableReading:
-    """One way of counting rules.
+    """One way of reading the rules off Table I.
 
     `counts`: fuzzy sets of each aetiology, in the order of AETIOLOGIES. `sizes`: the cells that
     count, by their number of diseases. `diagonal`: a cell of a disease with itself is one term, or
@@ -97,6 +97,6 @@ def _odd(cell: Cell, meaning: OddCell) -> Cell:
 
 
 def rule_count(reading: TableReading) -> int:
-    """Number of rules, by counting grids."""
+    """Number of rules that a reading of Table I gives, by counting grids."""
     counts = dict(zip(AETIOLOGIES, reading.counts, strict=True))
     return sum(prod(counts[disease] for disease in cell) for cell in disease_sets(reading))

@@ -21,7 +21,7 @@ from fuzzy.systems.system import FuzzySystem, Variable
 
 @cache
 def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES) -> FuzzySystem:
-    """Table I over the elastography sets.
+    """The fuzzy system of Table I over the elastography sets, in kPa.
 
     Only antecedents whose diseases are all `present` make rules; the inputs stay all five.
     ValueError for an unknown disease, or if no antecedent is left.
@@ -111,7 +111,7 @@ def _gaussian(record: SetRecord, name: str, settings: LiverSettings) -> FuzzySet
 
 
 def footprint(record: SetRecord, settings: LiverSettings) -> Footprint:
-    """Footprint of a set.
+    """Footprint of the set that a record describes, as the settings choose.
 
     That the width of the flanks, or the height, is as uncertain as the centre is a choice of this
     study: the sources only tell how far centres lie apart.

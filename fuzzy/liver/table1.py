@@ -32,5 +32,5 @@ def _cell(row: str, column: str) -> Cell:
 
 
 def is_odd(cell: Cell) -> bool:
-    """Whether the cell names a disease twice."""
+    """Whether a cell of Table I names a disease twice."""
     return len(set(cell)) < len(cell)

@@ -57,7 +57,7 @@ ONE_ROW: dict[str, Callable[..., kernel.Single]] = {
 
 
 class CompiledAnswer(NamedTuple):
-    """One answer, in the output's unit.
+    """A compiled system's answer to one row of readings, in the output's unit.
 
     `lower` and `upper` are the ends of the type-2 interval; for the other systems both are `value`.
     `clamped`: a reading was outside its universe and the nearest end was taken. `silent`: no rule

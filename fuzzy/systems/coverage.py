@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fuzzy.systems.policy import LEAST_STRENGTH
 from fuzzy.systems.sets import Array, corners, lower_membership, membership, upper_membership
 from fuzzy.systems.spread import spread
 from fuzzy.systems.system import FuzzySystem, Term, Variable, firing_strengths, memberships
-
-LEAST_STRENGTH = 1e-12
-"""A rule that stays below it at every reading is one that never fires."""
 
 POINTS = 1001
 MOST_INPUTS_WITH_CORNERS = 12

@@ -57,7 +57,7 @@ class Union(NamedTuple):
     membership: Membership
 
     def value(self, y: Array) -> Array:
-        """The curve at points of any shape."""
+        """Membership in the union at points y of any shape."""
         return np.asarray(self._implied(self._memberships(y)).max(axis=0))
 
     def with_distances(self, y: Array) -> tuple[Array, Array]:

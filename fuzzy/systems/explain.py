@@ -37,7 +37,7 @@ class Degree(NamedTuple):
 
 
 class Firing(NamedTuple):
-    """A rule that fires, `number` counted from 1.
+    """A rule that fires and what it sets, `number` counted from 1.
 
     `share` is its part of a Sugeno system's total weight, None for the others, where a rule counts
     only if it sets the lower or the upper height of its output set. Rules that are equally strong
@@ -91,7 +91,7 @@ class SwitchPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Explanation:
-    """One answer and all that led to it.
+    """One answer of a system and all that led to it.
 
     `readings` (inputs,) as evaluated, after clamping; `rules` strongest first, of equals the one
     with fewer terms; `curve` is None for Sugeno; `interval` and `switches` belong to type-2. With
@@ -283,7 +283,7 @@ def _switch(y: Array, samples: int) -> SwitchPoint:
 
 
 def shown_rules(explanation: Explanation, count: int) -> tuple[Firing, ...]:
-    """About `count` rules, strongest first.
+    """About `count` rules that tell most of an answer, strongest first.
 
     They are the first rule of each output set and of each height, then the strongest of those that
     name a set which none before them names, then the strongest of the others.

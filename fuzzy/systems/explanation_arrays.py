@@ -17,7 +17,7 @@ VIEW_POINTS = 301
 
 
 def drawing_arrays(
-    explanation: Explanation, unit: str = "kPa", rules: int = VIEW_RULES
+    explanation: Explanation, unit: str = "", rules: int = VIEW_RULES
 ) -> dict[str, NDArray[Any]]:
     """What a view of the rules draws, under names that begin with view.KIND.
 

@@ -6,7 +6,7 @@ from fuzzy.systems.explain import Explanation, Firing, OutputSet, shown_rules
 from fuzzy.systems.rule_text import rule_text
 
 
-def explanation_lines(explanation: Explanation, unit: str = "kPa", rules: int = 10) -> list[str]:
+def explanation_lines(explanation: Explanation, unit: str = "", rules: int = 10) -> list[str]:
     """The explanation as aligned lines of text, with about so many rules."""
     shown = shown_rules(explanation, rules)
     total = len(explanation.system.rules)

@@ -8,7 +8,7 @@ from fuzzy.systems.system import FuzzySystem
 
 
 def read_rule_base(path: Path) -> FuzzySystem:
-    """The system of a `.fis` or `.json` file.
+    """Read the fuzzy system of a `.fis` or `.json` file.
 
     ValueError naming file, line or place, and remedy.
     """

@@ -29,7 +29,7 @@ class Line(NamedTuple):
     text: str
 
     def fault(self, what: str) -> FisError:
-        """The error of something wrong on this line."""
+        """The FisError that blames this line, by file and number."""
         return FisError(f"{self.file}:{self.number}: {what}")
 
     @contextmanager
@@ -43,7 +43,7 @@ class Line(NamedTuple):
             raise self.fault(str(error)) from error
 
     def unquoted(self) -> str:
-        """The text without its quotes, which may be missing."""
+        """The text of the line without its single quotes, which may be missing."""
         text = re.fullmatch(r"'([^']*)'|[^']*", self.text)
         if not text:
             raise self.fault(f"{self.text}: put the text between one pair of single quotes")
@@ -57,7 +57,7 @@ class Line(NamedTuple):
         return tuple(self.parsed(word) for word in words(inside[1]))
 
     def parsed(self, word: str) -> float:
-        """A word of the line as a number."""
+        """A word of the line as a number; FisError if it is no finite one."""
         if not _NUMBER.fullmatch(word):
             raise self.fault(f"{word!r} is no finite number; correct it")
         return float(word)
@@ -95,7 +95,7 @@ class Values:
 
 
 class Section(NamedTuple):
-    """The `[header]` of a section and the lines under it."""
+    """One section of a `.fis` file: its `[header]` and the lines under it."""
 
     head: Line
     body: list[Line]
@@ -125,7 +125,7 @@ def _check_key(line: Line, key: str, keys: tuple[str, ...]) -> None:
 
 
 def words(text: str) -> list[str]:
-    """Words parted by blanks or commas."""
+    """Parts of a text between blanks or commas."""
     return [word for word in re.split(r"[\s,]+", text) if word]
 
 

@@ -54,7 +54,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how the answers are computed."""
+    """One sentence on how type-2 answers are computed."""
     reducer = REDUCERS[options.reducer]
     reduced = reducer.exact_words if is_exact(options.sampling) else reducer.words
     return f"Interval type-2: {joins(system.operators)}, {reduced}, {options.points}"

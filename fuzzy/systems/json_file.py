@@ -59,7 +59,7 @@ class Node:
     place: str = ""
 
     def fault(self, what: str) -> JsonError:
-        """The error of something wrong at this place."""
+        """The JsonError that blames this place of the document."""
         return JsonError(": ".join(part for part in (self.file, self.place, what) if part))
 
     @contextmanager
@@ -87,19 +87,19 @@ class Node:
         return {k: Node(v, self.file, f"{self.place}{dot}{k}") for k, v in self.value.items()}
 
     def items(self) -> list["Node"]:
-        """The values of an array."""
+        """The values of a JSON array; JsonError for anything else."""
         if not isinstance(self.value, list):
             raise self.fault("give an array, [...]")
         return [Node(v, self.file, f"{self.place}[{i}]") for i, v in enumerate(self.value)]
 
     def text(self) -> str:
-        """A string."""
+        """The value as a string; JsonError for anything else."""
         if not isinstance(self.value, str):
             raise self.fault(f"{json.dumps(self.value)} is no text; put it in quotes")
         return self.value
 
     def number(self) -> float:
-        """A number."""
+        """The value as a number; JsonError for anything else."""
         if not isinstance(self.value, float):
             raise self.fault(f"{json.dumps(self.value)} is no number; give one without quotes")
         return self.value
@@ -241,7 +241,7 @@ def _closest(name: str, known: Collection[str]) -> str:
 
 
 def write_json(system: FuzzySystem, path: Path) -> None:
-    """Write any system, of type 1 or 2."""
+    """Write any system, of type 1 or 2, as JSON; JsonError if the file cannot be written."""
     try:
         path.write_text(json_text(system), encoding="utf-8", newline="\n")
     except OSError as error:

@@ -39,7 +39,7 @@ MINIMUM, PRODUCT, MAXIMUM, PROBOR = range(4)
 
 
 class Sets(NamedTuple):
-    """The input sets, one row each.
+    """The input sets as the kernels take them, one row each.
 
     `kind` (S,), `column` (S,) of its input in X, `negated` (S,) if a rule asks for NOT,
     `shape` (S, 6): four parameters and both ends of the core, `footprint` (S, 4): mean, spread,
@@ -227,7 +227,7 @@ def unpacked(integers: Integers, floats: Floats) -> tuple[Floats, Sets, Rules, F
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def grid_of(integers: Integers, rest: Floats) -> Grid:
-    """The grid that was packed."""
+    """The grid of the output that `pack` packed."""
     rows = rest.reshape(-1, integers[3])
     upper = 1 + len(rows) // 2  # after y, weights and half of the others
     return Grid(rows[0], rows[1], rows[2:upper], rows[upper:], integers[SCALES] != 0)

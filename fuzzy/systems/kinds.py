@@ -11,7 +11,7 @@ from fuzzy.systems.system import FuzzySystem, Membership
 
 
 class Inference(NamedTuple):
-    """One kind of inference.
+    """One kind of inference on a fuzzy system.
 
     `evaluate` answers the readings X (N, inputs) as they are, `method` says how in a sentence, and
     `bounds` are the lower and the upper membership function it looks at, the same for type-1.

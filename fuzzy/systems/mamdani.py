@@ -28,5 +28,5 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how the answers are computed."""
+    """One sentence on how Mamdani answers are computed."""
     return f"Mamdani: {joins(system.operators)}, centroid by {options.points}"

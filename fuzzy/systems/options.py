@@ -46,7 +46,7 @@ def require_choices(chosen: object, choices: Mapping[str, Mapping[str, object]])
 
 @dataclass(frozen=True)
 class InferenceOptions:
-    """How a system is evaluated.
+    """How a fuzzy system is evaluated, whatever its subject.
 
     `samples` points carry the output's universe (101 is MATLAB's default); `exact` sampling takes
     none and finds the ends of type-2 intervals by itself, so that `eiasc` changes nothing there.

@@ -1,7 +1,8 @@
 """Membership functions recognised in their samples.
 
-Every flank of a kind is a straight line once its memberships are transformed, so that two samples
-on it tell its parameters. A kind counts as recognised if it gives all samples back.
+A flank of most kinds is a straight line once its memberships are transformed, so that two samples
+on it tell its parameters; one of a bell takes three. A kind counts as recognised if it gives all
+samples back.
 """
 
 from collections.abc import Callable, Iterator
@@ -9,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzy.systems.sets import FORMS, Array, FuzzySet, Kind, Parameters, membership
+from fuzzy.systems.sets import FORMS, Array, FuzzySet, Kind, Parameters, membership, root
 
 TOLERANCE = 1e-8
 """Largest distance between a sample and the function that is recognised in it."""
@@ -46,8 +47,8 @@ class _Samples(NamedTuple):
 def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
     """The set with memberships mu (M,) at the rising places x (M,).
 
-    Kinds tried: triangle, trapezoid, Gaussian, two-sided Gaussian, Z, S and pi spline, sigmoid;
-    flanks that leave the universe may end anywhere beyond. ValueError if it is none of them.
+    Kinds tried: triangle, trapezoid, Gaussian, two-sided Gaussian, Z, S and pi spline, sigmoid,
+    bell; flanks that leave the universe may end anywhere beyond. ValueError if it is none of them.
     """
     if not np.isfinite(mu).all():
         raise ValueError(f"set {name!r}: has samples that are not finite; correct them")
@@ -62,7 +63,7 @@ def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
             return one
     raise ValueError(
         f"set {name!r}: its samples are of no triangle, trapezoid, one- or two-sided Gaussian, "
-        "Z, S or pi spline and sigmoid; give it as one of these, or sample it more finely"
+        "bell, Z, S or pi spline and sigmoid; give it as one of these, or sample it more finely"
     )
 
 
@@ -74,6 +75,9 @@ def _candidates(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
         line = _line(samples, left, lambda mu: np.log(mu / (1.0 - mu)))
         if line is not None:
             yield "sigmf", (line.slope, line.at(0.0))
+        bell = _bell(samples, left)
+        if bell is not None:
+            yield "gbellmf", bell
 
 
 def _trapezoids(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
@@ -106,7 +110,7 @@ def _unsplined(mu: Array) -> Array:
 
 def _gaussians(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
     low, high = samples.x[0] - samples.width, samples.x[-1] + samples.width
-    left, right = (_bell(samples, side) for side in (True, False))
+    left, right = (_half(samples, side) for side in (True, False))
     for one in (left, right):
         if one is not None:
             yield "gaussmf", one
@@ -118,10 +122,37 @@ def _gaussians(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
         yield "gauss2mf", (right[0], low, *right)
 
 
-def _bell(samples: _Samples, left: bool) -> tuple[float, float] | None:
+def _half(samples: _Samples, left: bool) -> tuple[float, float] | None:
     """Width and centre of a Gaussian flank."""
     line = _line(samples, left, lambda mu: np.sqrt(-2.0 * np.log(mu)))
     return None if line is None else (1.0 / abs(line.slope), line.at(0.0))
+
+
+def _bell(samples: _Samples, left: bool) -> Parameters | None:
+    """Half-width, slope and centre of the bell with a flank.
+
+    log(1 / mu - 1) is 2 slope (log |x - centre| - log half-width): the ratio of its two steps
+    between three samples rises with the distance of the centre.
+    """
+    side = slice(0, samples.first) if left else slice(samples.last + 1, None)
+    mu = samples.mu[side]
+    on = np.flatnonzero((mu > EDGE) & (mu < 0.99))  # nearer to 1 the logarithm loses its digits
+    if on.size < 3:
+        return None
+    three = on[[0, on.size // 2, -1]] if left else on[[-1, on.size // 2, 0]]
+    places = samples.x[side][three] if left else -samples.x[side][three]
+    steps = -np.diff(np.log(1.0 / mu[three] - 1.0))
+    if not (steps > 0).all():
+        return None
+
+    def excess(distance: float) -> float:
+        nearer = -np.diff(np.log(places[-1] + distance - places))
+        return float(nearer[0] / nearer[1] - steps[0] / steps[1])
+
+    centre = float(places[-1]) + root(excess, 1e-12 * samples.width, 1e3 * samples.width)
+    slope = 0.5 * float(steps[0] / np.log((centre - places[0]) / (centre - places[1])))
+    half_width = (centre - float(places[0])) / (1.0 / mu[three[0]] - 1.0) ** (0.5 / slope)
+    return float(half_width), slope, centre if left else -centre
 
 
 def _ends(

@@ -1,8 +1,8 @@
 """Rules that repeat, contradict or outdo one another, by their terms alone.
 
 A rule is dominated if another one with the same consequent is at least as strong at every reading,
-as `if hcv is F2` is beside `if hcv is F2 and hbv is F4`. Where rules are merged by max it then
-changes no answer.
+as `if food is good` is beside `if food is good and service is poor`. Where rules are merged by max
+it then changes no answer.
 """
 
 from collections import Counter

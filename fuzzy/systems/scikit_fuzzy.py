@@ -45,7 +45,7 @@ class ListedRules(control.ControlSystem):  # type: ignore[misc]  # scikit-fuzzy 
 
     @property
     def rules(self) -> tuple[Any, ...]:
-        """The rules as given."""
+        """The rules of the control system in the order given."""
         return self._rules
 
 

@@ -312,7 +312,7 @@ def _crossing(one: FuzzySet) -> float:
         left, right = membership(one, _stretched(one, x + np.array([-shift, shift]), factor))
         return float(left - right)
 
-    return _root(difference, low - shift, high + shift)
+    return root(difference, low - shift, high + shift)
 
 
 @lru_cache(maxsize=1024)
@@ -323,7 +323,7 @@ def _turns(one: FuzzySet) -> Parameters:
     if one.kind == "psigmf":
         # The slope of its logarithm falls throughout, from above 0 to below it if it has a peak.
         centres, slopes = np.array([c_1, c_2]), np.array([a_1, a_2])
-        peak = _root(
+        peak = root(
             lambda x: -float(slopes @ np.exp(-np.logaddexp(0.0, slopes * (x - centres)))),
             min(c_1, c_2) - reach,
             max(c_1, c_2) + reach,
@@ -339,8 +339,8 @@ def _turns(one: FuzzySet) -> Parameters:
         ratio = _log_slope(steep * (x - centre)) - _log_slope(flat * (x - other))
         return ratio + log(steep / flat)
 
-    left = _root(steeper, centre - reach, centre)
-    right = _root(lambda x: -steeper(x), centre, centre + reach)
+    left = root(steeper, centre - reach, centre)
+    right = root(lambda x: -steeper(x), centre, centre + reach)
     return (*zero, left, right)
 
 
@@ -349,7 +349,7 @@ def _log_slope(z: float) -> float:
     return -abs(z) - 2.0 * log1p(exp(-abs(z)))
 
 
-def _root(function: Callable[[float], float], left: float, right: float) -> float:
+def root(function: Callable[[float], float], left: float, right: float) -> float:
     """Where a function rises through 0, by bisection."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (left + right)

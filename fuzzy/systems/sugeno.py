@@ -57,7 +57,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how the answers are computed."""
+    """One sentence on how Sugeno answers are computed."""
     average = f"weighted average over every {MERGES[options.sugeno_aggregation].weighed}"
     if system.is_sugeno:
         return f"Sugeno: {joins(system.operators)}, {average}"

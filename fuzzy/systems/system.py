@@ -162,7 +162,7 @@ def _check_kinds(system: FuzzySystem) -> None:
 
 
 def joins(operators: Operators) -> str:
-    """Words for the operators."""
+    """Words for a system's operators, as methods name them."""
     return (
         f"AND {operators.conjunction}, OR {operators.disjunction}, "
         f"implication {operators.implication}, aggregation max"

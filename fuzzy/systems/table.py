@@ -37,7 +37,7 @@ class Table(NamedTuple):
     lines: list[int]
 
     def fault(self, line: int, what: str) -> TableError:
-        """The error of something wrong on a line."""
+        """The TableError that blames a line of the file."""
         return TableError(f"{self.file}:{line}: {what}")
 
 
