@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
 import tomllib
 from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
-from msm.calibration import SPRING_POISSON_RATIO
 from study.quantity import Quantity
-from study.scene import Lattice, Scene, SpringLaw
+from study.scene import Scene, SpringLaw
+from study.scene.consistency import MESH_ONLY, Table, contradictions
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -21,24 +20,6 @@ if TYPE_CHECKING:
 BUILT_IN = ("liver", "block", "paper")
 MAX_BYTES = 65_536
 MAX_LINE = 1_000
-_ON_POINT = ("basafa", "msm")
-_OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
-# What a scene without a mesh cannot use.
-_MESH_ONLY = (
-    ("organ", "volume"),
-    ("organ", "size"),
-    ("support",),
-    ("lattice",),
-    ("reference",),
-    ("superposition",),
-    ("control_points",),
-    ("renders",),
-    ("tool", "place"),
-    ("tool", "direction"),
-    ("tool", "radius"),
-    ("tissue", "poisson_ratio"),
-    ("tissue", "density"),
-)
 
 
 class SceneError(ValueError):
@@ -58,7 +39,7 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     return validate(table, name)
 
 
-def validate(table: dict[str, Any], source: str) -> Scene:
+def validate(table: Table, source: str) -> Scene:
     """Scene of a parsed TOML table; SceneError lists all problems, `source` names the file."""
     from pydantic import TypeAdapter, ValidationError
 
@@ -67,7 +48,7 @@ def validate(table: dict[str, Any], source: str) -> Scene:
     except ValidationError as error:
         lines = sorted({_line(problem) for problem in error.errors(include_url=False)})
         raise SceneError(_summary(source, lines)) from None
-    problems = list(_contradictions(scene, table))
+    problems = list(contradictions(scene, table))
     if problems:
         raise SceneError(_summary(source, problems))
     return scene
@@ -85,13 +66,13 @@ def write_scene(scene: Scene) -> str:
     return tomli_w.dumps(resolved(scene))
 
 
-def resolved(scene: Scene) -> dict[str, Any]:
+def resolved(scene: Scene) -> Table:
     """Plain table of every value in use, quantities as text with unit."""
     table = _plain(scene)
     for key in _unused(scene):
         _remove(table, key)
-    if scene.organ.shape == "point" and scene.organ.mesh is None:
-        for key in _MESH_ONLY:
+    if scene.is_point:
+        for key in MESH_ONLY:
             _remove(table, key)
     return table
 
@@ -123,7 +104,7 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield ("superposition",)
 
 
-def _load(name: str) -> tuple[dict[str, Any], Path]:
+def _load(name: str) -> tuple[Table, Path]:
     if name in BUILT_IN:
         file = resources.files("study.scene.built_in").joinpath(f"{name}.toml")
         return tomllib.loads(file.read_text(encoding="utf-8")), Path()
@@ -137,7 +118,7 @@ def _load(name: str) -> tuple[dict[str, Any], Path]:
     return _parse(path), path.parent
 
 
-def _parse(path: Path) -> dict[str, Any]:
+def _parse(path: Path) -> Table:
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -154,14 +135,14 @@ def _parse(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path}: not valid TOML: {error}") from None
 
 
-def _resolve_mesh(table: dict[str, Any], base: Path) -> None:
+def _resolve_mesh(table: Table, base: Path) -> None:
     """Make a mesh path relative to the scene file that names it."""
     organ = table.get("organ")
     if isinstance(organ, dict) and isinstance(organ.get("mesh"), str):
         organ["mesh"] = str((base / organ["mesh"]).absolute())
 
 
-def _apply(table: dict[str, Any], override: str) -> None:
+def _apply(table: Table, override: str) -> None:
     path, separator, text = override.partition("=")
     keys = [key.strip() for key in path.split(".")]
     if not separator or not all(keys):
@@ -220,190 +201,13 @@ def _summary(source: str, lines: Sequence[str]) -> str:
     return "\n  ".join([f"{source}: {len(lines)} problem(s)", *lines])
 
 
-def _contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
-    """What is wrong between keys that are each right."""
-    if not scene.models:
-        yield "models: empty; name at least one of fem, basafa, msm"
-    if len(set(scene.models)) < len(scene.models):
-        yield "models: a model is named twice"
-    if "msm" in scene.models and not scene.fuzzy.systems:
-        yield "fuzzy.systems: empty; name a system or leave msm out of models"
-    if len(set(scene.fuzzy.systems)) < len(scene.fuzzy.systems):
-        yield "fuzzy.systems: a system is named twice"
-    if len(set(scene.fuzzy.surface)) < len(scene.fuzzy.surface):
-        yield "fuzzy.surface: names one reading twice; name two different ones"
-    if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
-        yield "fuzzy.samples: has no effect with exact sampling; remove it"
-    if scene.reference.method != "modal" and "modes" in table.get("reference", {}):
-        yield "reference.modes: only the method modal takes it; remove it"
-    yield from _lattice_contradictions(scene, table)
-    yield from _damping_contradictions(scene, table)
-    if scene.organ.mesh is None and scene.organ.unit is not None:
-        yield "organ.unit: has no effect without organ.mesh; remove it"
-    for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
-        if not _one_way(place):
-            yield f"{name}: give either side and at, or fraction, or point"
-    yield from _tool_contradictions(scene)
-    yield from _unseen_load(scene)
-    if scene.organ.shape == "point" and scene.organ.mesh is None:
-        yield from _point_contradictions(scene, table)
-    elif scene.organ.mass is not None:
-        yield "organ.mass: only a point has a mass of its own; use tissue.density"
-
-
-def _lattice_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
-    lattice, nu = scene.lattice, scene.tissue.poisson_ratio
-    if lattice.springs == "tetrahedra":
-        yield from _mesh_springs_contradictions(lattice, table)
-    if lattice.law is not None:
-        yield from _law_contradictions(scene, lattice.law)
-    if lattice.volume_term and nu < SPRING_POISSON_RATIO:
-        yield (
-            f"lattice.volume_term: needs tissue.poisson_ratio of {SPRING_POISSON_RATIO} or more, "
-            f"not {nu:g}; leave it out or raise the ratio"
-        )
-    if _has(table, ("lattice", "integrator")):
-        yield from _integrator_contradictions(scene)
-    if lattice.time_step is not None and lattice.step_rate is not None:
-        yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
-
-
-def _integrator_contradictions(scene: Scene) -> Iterator[str]:
-    from msm.integrators import INTEGRATORS
-
-    lattice = scene.lattice
-    name, method = lattice.integrator, INTEGRATORS[lattice.integrator]
-    if method.implicit_volume and not lattice.volume_term:
-        yield f"lattice.integrator: {name} needs lattice.volume_term; set it to true"
-    if method.linear_only and "basafa" in scene.models:
-        yield (
-            f"lattice.integrator: {name} takes linear springs only; leave basafa out of models or "
-            "choose another integrator"
-        )
-    if method.linear_only and lattice.law is not None and not lattice.law.is_linear:
-        yield (
-            f"lattice.law: {name} takes linear springs only; remove it or change lattice.integrator"
-        )
-    own_law = _OWN_LAW & set(scene.models)
-    if scene.damping.stiffness > 0.0 and own_law and not method.stiffness_damping:
-        yield (
-            f"damping.stiffness: {name} has only the mass part of Rayleigh damping; set it to 0, "
-            "or lattice.integrator to symplectic-euler"
-        )
-
-
-def _mesh_springs_contradictions(lattice: Lattice, table: dict[str, Any]) -> Iterator[str]:
-    if lattice.volume_term:
-        yield (
-            "lattice.volume_term: springs on tetrahedra have none; leave it out or set "
-            "lattice.springs to lattice"
-        )
-    for key in ("flexion", "body_diagonals"):
-        if _has(table, ("lattice", key)):
-            yield f"lattice.{key}: has no effect on springs along a mesh; remove it"
-
-
-def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
-    if not _OWN_LAW & set(scene.models):
-        yield (
-            "lattice.law: only springs tuned by an estimate, or of the tissue, follow it; add msm "
-            "or tissue to models, or remove it"
-        )
-    if scene.lattice.volume_term and not _is_unity_at_rest(law):
-        yield (
-            "lattice.law: with lattice.volume_term the springs must start as linear ones, with a "
-            "relative tension equal to their strain on both sides of 0, or they lack the shear "
-            "modulus that the term completes; change the law or leave the term out"
-        )
-
-
-def _is_unity_at_rest(law: SpringLaw) -> bool:
-    """Whether springs of the law start as linear ones, to either side."""
-    from msm.laws import stiffness_at_rest
-
-    return all(math.isclose(slope, 1.0) for slope in stiffness_at_rest(law.make(1.0)))
-
-
-def _damping_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
-    damping = scene.damping
-    given = [key for key in ("mass", "stiffness") if _has(table, ("damping", key))]
-    if damping.kind == "eq-2":
-        for key in given:
-            yield (
-                f"damping.{key}: has no effect on the damping of eq. (2); set damping.kind to "
-                "rayleigh or remove it"
-            )
-        return
-    if not given:
-        yield "damping.kind: rayleigh needs damping.mass, damping.stiffness or both; give them"
-
-
-def _tool_contradictions(scene: Scene) -> Iterator[str]:
-    if scene.tool.direction is not None and not any(scene.tool.direction):
-        yield "tool.direction: a zero vector has no direction"
-    if (
-        scene.tool.history.kind == "ramp-hold-release"
-        and scene.tool.history.ramp == 0.0
-        and scene.tool.history.hold == 0.0
-    ):
-        yield "tool.history: ramp and hold are both zero; nothing is ever loaded"
-    history, time = scene.tool.history, scene.time
-    if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
-        needed = math.ceil(8 * history.frequency * time.duration)
-        yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
-
-
-def _unseen_load(scene: Scene) -> Iterator[str]:
-    """A load that comes and goes between samples would leave no trace of itself."""
-    history, time = scene.tool.history, scene.time
-    if history.kind != "ramp-hold-release":
-        return
-    loaded = min(history.ramp + history.hold + history.release, time.duration)
-    if 8 * time.duration > (time.samples - 1) * loaded > 0.0:
-        needed = math.ceil(8 * time.duration / loaded) + 1
-        yield f"time.samples: a load of {loaded:g} s needs 8 samples in it, here {needed}"
-
-
-def _point_contradictions(scene: Scene, table: dict[str, Any]) -> Iterator[str]:
-    for name in scene.models:
-        if name not in _ON_POINT:
-            yield f"models: {name} needs an organ with a mesh; a point has none"
-    if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
-        yield (
-            "organ.mass: cannot follow from eq. (2) without damping; give it, or set "
-            "damping.ratio and basafa.gamma_0 above zero"
-        )
-    if scene.damping.kind == "rayleigh":
-        yield "damping.kind: a single point has the damping of eqs. (2) and (9) only; remove it"
-    for key in _MESH_ONLY:
-        if _has(table, key):
-            yield f"{'.'.join(key)}: has no effect on a single point; remove it"
-
-
-def _named_points(scene: Scene) -> list[tuple[str, Any]]:
-    return [(f"control_points.{name}", place) for name, place in scene.control_points.items()]
-
-
-def _one_way(place: Any) -> bool:
-    ways = [place.side is not None, place.fraction is not None, place.point is not None]
-    return sum(ways) == 1 and (place.side is None) == (place.at is None)
-
-
-def _has(table: dict[str, Any], keys: Sequence[str]) -> bool:
-    for key in keys:
-        if not isinstance(table, dict) or key not in table:
-            return False
-        table = table[key]
-    return True
-
-
-def _remove(table: dict[str, Any], keys: Sequence[str]) -> None:
+def _remove(table: Table, keys: Sequence[str]) -> None:
     for key in keys[:-1]:
         table = table[key]
     table.pop(keys[-1], None)
 
 
-def _plain(item: Any) -> dict[str, Any]:
+def _plain(item: Any) -> Table:
     """Table of a dataclass without its empty entries."""
     hints = get_type_hints(type(item), include_extras=True)
     values = {f.name: getattr(item, f.name) for f in dataclasses.fields(item)}

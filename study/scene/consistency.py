@@ -1,0 +1,209 @@
+"""What is wrong in a scene between keys that are each right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from msm.calibration import SPRING_POISSON_RATIO
+from study.scene.law import SpringLaw
+from study.scene.schema import Lattice, Scene
+
+Table = dict[str, Any]
+"""A parsed table of TOML, not yet checked."""
+_ON_POINT = ("basafa", "msm")
+_OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
+# What a scene without a mesh cannot use.
+MESH_ONLY = (
+    ("organ", "volume"),
+    ("organ", "size"),
+    ("support",),
+    ("lattice",),
+    ("reference",),
+    ("superposition",),
+    ("control_points",),
+    ("renders",),
+    ("tool", "place"),
+    ("tool", "direction"),
+    ("tool", "radius"),
+    ("tissue", "poisson_ratio"),
+    ("tissue", "density"),
+)
+
+
+def contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    """What is wrong between keys that are each right."""
+    if not scene.models:
+        yield "models: empty; name at least one of fem, basafa, msm"
+    if len(set(scene.models)) < len(scene.models):
+        yield "models: a model is named twice"
+    if "msm" in scene.models and not scene.fuzzy.systems:
+        yield "fuzzy.systems: empty; name a system or leave msm out of models"
+    if len(set(scene.fuzzy.systems)) < len(scene.fuzzy.systems):
+        yield "fuzzy.systems: a system is named twice"
+    if len(set(scene.fuzzy.surface)) < len(scene.fuzzy.surface):
+        yield "fuzzy.surface: names one reading twice; name two different ones"
+    if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
+        yield "fuzzy.samples: has no effect with exact sampling; remove it"
+    if scene.reference.method != "modal" and "modes" in table.get("reference", {}):
+        yield "reference.modes: only the method modal takes it; remove it"
+    yield from _lattice_contradictions(scene, table)
+    yield from _damping_contradictions(scene, table)
+    if scene.organ.mesh is None and scene.organ.unit is not None:
+        yield "organ.unit: has no effect without organ.mesh; remove it"
+    for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
+        if not _one_way(place):
+            yield f"{name}: give either side and at, or fraction, or point"
+    yield from _tool_contradictions(scene)
+    yield from _unseen_load(scene)
+    if scene.is_point:
+        yield from _point_contradictions(scene, table)
+    elif scene.organ.mass is not None:
+        yield "organ.mass: only a point has a mass of its own; use tissue.density"
+
+
+def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    lattice, nu = scene.lattice, scene.tissue.poisson_ratio
+    if lattice.springs == "tetrahedra":
+        yield from _mesh_springs_contradictions(lattice, table)
+    if lattice.law is not None:
+        yield from _law_contradictions(scene, lattice.law)
+    if lattice.volume_term and nu < SPRING_POISSON_RATIO:
+        yield (
+            f"lattice.volume_term: needs tissue.poisson_ratio of {SPRING_POISSON_RATIO} or more, "
+            f"not {nu:g}; leave it out or raise the ratio"
+        )
+    if _has(table, ("lattice", "integrator")):
+        yield from _integrator_contradictions(scene)
+    if lattice.time_step is not None and lattice.step_rate is not None:
+        yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
+
+
+def _integrator_contradictions(scene: Scene) -> Iterator[str]:
+    from msm.integrators import INTEGRATORS
+
+    lattice = scene.lattice
+    name, method = lattice.integrator, INTEGRATORS[lattice.integrator]
+    if method.implicit_volume and not lattice.volume_term:
+        yield f"lattice.integrator: {name} needs lattice.volume_term; set it to true"
+    if method.linear_only and "basafa" in scene.models:
+        yield (
+            f"lattice.integrator: {name} takes linear springs only; leave basafa out of models or "
+            "choose another integrator"
+        )
+    if method.linear_only and lattice.law is not None and not lattice.law.is_linear:
+        yield (
+            f"lattice.law: {name} takes linear springs only; remove it or change lattice.integrator"
+        )
+    own_law = _OWN_LAW & set(scene.models)
+    if scene.damping.stiffness > 0.0 and own_law and not method.stiffness_damping:
+        yield (
+            f"damping.stiffness: {name} has only the mass part of Rayleigh damping; set it to 0, "
+            "or lattice.integrator to symplectic-euler"
+        )
+
+
+def _mesh_springs_contradictions(lattice: Lattice, table: Table) -> Iterator[str]:
+    if lattice.volume_term:
+        yield (
+            "lattice.volume_term: springs on tetrahedra have none; leave it out or set "
+            "lattice.springs to lattice"
+        )
+    for key in ("flexion", "body_diagonals"):
+        if _has(table, ("lattice", key)):
+            yield f"lattice.{key}: has no effect on springs along a mesh; remove it"
+
+
+def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
+    if not _OWN_LAW & set(scene.models):
+        yield (
+            "lattice.law: only springs tuned by an estimate, or of the tissue, follow it; add msm "
+            "or tissue to models, or remove it"
+        )
+    if scene.lattice.volume_term and not _is_unity_at_rest(law):
+        yield (
+            "lattice.law: with lattice.volume_term the springs must start as linear ones, with a "
+            "relative tension equal to their strain on both sides of 0, or they lack the shear "
+            "modulus that the term completes; change the law or leave the term out"
+        )
+
+
+def _is_unity_at_rest(law: SpringLaw) -> bool:
+    """Whether springs of the law start as linear ones, to either side."""
+    from msm.laws import stiffness_at_rest
+
+    return all(math.isclose(slope, 1.0) for slope in stiffness_at_rest(law.make(1.0)))
+
+
+def _damping_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    damping = scene.damping
+    given = [key for key in ("mass", "stiffness") if _has(table, ("damping", key))]
+    if damping.kind == "eq-2":
+        for key in given:
+            yield (
+                f"damping.{key}: has no effect on the damping of eq. (2); set damping.kind to "
+                "rayleigh or remove it"
+            )
+        return
+    if not given:
+        yield "damping.kind: rayleigh needs damping.mass, damping.stiffness or both; give them"
+
+
+def _tool_contradictions(scene: Scene) -> Iterator[str]:
+    if scene.tool.direction is not None and not any(scene.tool.direction):
+        yield "tool.direction: a zero vector has no direction"
+    if (
+        scene.tool.history.kind == "ramp-hold-release"
+        and scene.tool.history.ramp == 0.0
+        and scene.tool.history.hold == 0.0
+    ):
+        yield "tool.history: ramp and hold are both zero; nothing is ever loaded"
+    history, time = scene.tool.history, scene.time
+    if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
+        needed = math.ceil(8 * history.frequency * time.duration)
+        yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+
+
+def _unseen_load(scene: Scene) -> Iterator[str]:
+    """A load that comes and goes between samples would leave no trace of itself."""
+    history, time = scene.tool.history, scene.time
+    if history.kind != "ramp-hold-release":
+        return
+    loaded = min(history.ramp + history.hold + history.release, time.duration)
+    if 8 * time.duration > (time.samples - 1) * loaded > 0.0:
+        needed = math.ceil(8 * time.duration / loaded) + 1
+        yield f"time.samples: a load of {loaded:g} s needs 8 samples in it, here {needed}"
+
+
+def _point_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    for name in scene.models:
+        if name not in _ON_POINT:
+            yield f"models: {name} needs an organ with a mesh; a point has none"
+    if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
+        yield (
+            "organ.mass: cannot follow from eq. (2) without damping; give it, or set "
+            "damping.ratio and basafa.gamma_0 above zero"
+        )
+    if scene.damping.kind == "rayleigh":
+        yield "damping.kind: a single point has the damping of eqs. (2) and (9) only; remove it"
+    for key in MESH_ONLY:
+        if _has(table, key):
+            yield f"{'.'.join(key)}: has no effect on a single point; remove it"
+
+
+def _named_points(scene: Scene) -> list[tuple[str, Any]]:
+    return [(f"control_points.{name}", place) for name, place in scene.control_points.items()]
+
+
+def _one_way(place: Any) -> bool:
+    ways = [place.side is not None, place.fraction is not None, place.point is not None]
+    return sum(ways) == 1 and (place.side is None) == (place.at is None)
+
+
+def _has(table: Table, keys: Sequence[str]) -> bool:
+    for key in keys:
+        if not isinstance(table, dict) or key not in table:
+            return False
+        table = table[key]
+    return True
