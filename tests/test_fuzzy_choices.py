@@ -19,7 +19,7 @@ from fuzzy.systems.options import OUT_OF_RANGE, InferenceOptions
 from fuzzy.systems.quadrature import SAMPLINGS, Sampling
 from fuzzy.systems.sets import FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
-from study.choice import Choice
+from study.annotation.choice import Choice
 from study.scene import Fuzzy
 from study.scene.file import SceneError, read_scene
 
@@ -124,7 +124,7 @@ def test_the_tables_are_light():
     tables = {choice.table for found in choices().values() for choice in found}
     heavy = "{'numba', 'scipy', 'pint', 'vtk', 'skfem', 'matplotlib', 'skfuzzy', 'networkx'}"
     code = (
-        "import sys\nfrom study.choice import Choice\n"
+        "import sys\nfrom study.annotation.choice import Choice\n"
         f"for table in {tables!r}:\n    assert Choice(table).names()\n"
         f"print({heavy} & set(sys.modules))"
     )

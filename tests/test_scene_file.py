@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.quantity import Quantity
+from study.annotation.quantity import Quantity
 from study.scene.file import BUILT_IN, SceneError, read_scene, resolved, write_scene
 
 MESH = "lattice.springs=tetrahedra"
@@ -185,7 +185,7 @@ def law(strain, relative_tension):
             [law([0, 1], [0, 1]), "lattice.integrator=xpbd", NO_BENCHMARK],
             r"lattice\.law: xpbd takes",
         ),
-        ([law([0, 1], [0, 1]), 'models=["fem"]'], "add msm to models"),
+        ([law([0, 1], [0, 1]), 'models=["fem"]'], "add msm or tissue to models"),
         ([law([0, 1], [0, 2]), "lattice.volume_term=true"], "equal to their strain"),
         ([law([-1, 0, 1], [-2, 0, 1]), "lattice.volume_term=true"], "equal to their strain"),
     ],

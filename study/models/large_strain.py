@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fem_reference.elasticity import Body
-from fem_reference.elements import LOCKING
+from fem_reference.elements import ELEMENTS, LOCKING
 from fem_reference.newton import solve
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
@@ -28,7 +28,7 @@ def compare(problem: Problem, body: Body, law: str) -> LargeStrain | str:
     What the mesh costs either solution is not estimated: near a small tool the difference still
     grows as the mesh is refined.
     """
-    if body.element == "taylor-hood":
+    if ELEMENTS[body.element].mixed:
         return f"elements without a pressure lock at a Poisson ratio above {LOCKING:g}"
     try:
         path = solve(body, problem.tissue, law)

@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from study.choice import Choice
-from study.quantity import Quantity
+from study.annotation.choice import Choice
+from study.annotation.quantity import Quantity
 
 Floats = NDArray[np.float64]
 Duration = Annotated[float, Quantity("s", 0.0, 3600.0)]

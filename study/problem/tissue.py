@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from study.quantity import Quantity
+from study.annotation.quantity import Quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from msm.calibration import SPRING_POISSON_RATIO
+from study.annotation.choice import Choice
 from study.scene.law import SpringLaw
 from study.scene.schema import Lattice, Scene
 
+MODELS = Choice("study.models.table:MODELS")
 Table = dict[str, Any]
 """A parsed table of TOML, not yet checked."""
 _ON_POINT = ("basafa", "msm")
@@ -35,7 +37,7 @@ MESH_ONLY = (
 def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     """What is wrong between keys that are each right."""
     if not scene.models:
-        yield "models: empty; name at least one of fem, basafa, msm"
+        yield f"models: empty; name at least one of {', '.join(MODELS.names())}"
     if len(set(scene.models)) < len(scene.models):
         yield "models: a model is named twice"
     if "msm" in scene.models and not scene.fuzzy.systems:

@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
-from study.quantity import Quantity
+from study.annotation.quantity import Quantity
 from study.scene import Scene, SpringLaw
 from study.scene.consistency import MESH_ONLY, Table, contradictions
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from study.choice import Choice
+from study.annotation.choice import Choice
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from study.choice import Choice
+from study.annotation.choice import Choice
+from study.annotation.quantity import Quantity
 from study.problem.history import LoadHistory
 from study.problem.tissue import Tissue
-from study.quantity import Quantity
 from study.scene.law import SpringLaw
 
 Length = Annotated[float, Quantity("m", 1e-6, 10.0)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from study.quantity import Quantity
+from study.annotation.quantity import Quantity
 
 RATE = Quantity("Hz", 0.1, 1e5)
 ERROR = Quantity("", 1e-6, 1.0)
