@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from study.problem.problem import Problem
-from study.progress import Silent
-from study.run.whole import run_study
+from study.run.study import run_study
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -47,12 +46,12 @@ def small_posed(small_scene) -> Problem:
 
 @pytest.fixture(scope="session")
 def small_results(small_scene):
-    return run_study(small_scene, Silent())
+    return run_study(small_scene)
 
 
 @pytest.fixture(scope="session")
 def paper_results():
-    return run_study(read_scene("paper"), Silent())
+    return run_study(read_scene("paper"))
 
 
 @pytest.fixture
