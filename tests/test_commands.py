@@ -12,9 +12,16 @@ from pathlib import Path
 import pytest
 
 from study import progress
-from study.results.folder import TABLES
+from study.results import tables
 
 ROOT = Path(__file__).resolve().parent.parent
+TABLES = {
+    "curves": tables.CurveSample,
+    "bands": tables.BandSample,
+    "similarity": tables.SimilarityScore,
+    "errors": tables.FieldDifference,
+    "sensitivity": tables.SensitivityEntry,
+}
 
 
 def study(*arguments, cwd=None, **options):
@@ -40,9 +47,9 @@ def paper_folder(tmp_path_factory):
 def test_a_run_writes_every_file_of_the_interface(paper_folder):
     names = {path.name for path in paper_folder.iterdir()}
     assert names >= {"scene.toml", "results.json", "report.pdf"} | {f"{t}.csv" for t in TABLES}
-    for table, header in TABLES.items():
+    for table, kind in TABLES.items():
         with (paper_folder / f"{table}.csv").open(newline="") as file:
-            assert tuple(next(csv.reader(file))) == header
+            assert tuple(next(csv.reader(file))) == kind._fields
     assert (paper_folder / "report.pdf").read_bytes().startswith(b"%PDF")
 
 

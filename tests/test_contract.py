@@ -5,13 +5,12 @@ import json
 
 import numpy as np
 import pytest
-from study.run.whole import run_study
 
 from msm.integrators import INTEGRATORS
 from study.folders import FolderError
-from study.progress import Silent
-from study.results.folder import TABLES, Results, ResultsError, read, replacing
+from study.results.folder import Results, ResultsError, read, replacing
 from study.results.folder import write as write_files
+from study.run.study import run_study
 from study.similarity.fields import best_factor, relative_l2
 
 MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2"]
@@ -22,14 +21,16 @@ def write(results: Results, folder):
         write_files(results, partial)
 
 
-def rows(results, table):
-    return [dict(zip(TABLES[table], row, strict=True)) for row in results.tables[table]]
+def plain(record):
+    """What results.json says of a record."""
+    return json.loads(json.dumps(dataclasses.asdict(record), allow_nan=False))
 
 
 @pytest.fixture(params=MODELS)
 def curve(request, small_results):
-    found = [r for r in rows(small_results, "curves") if r["model"] == request.param]
-    return {key: np.array([r[key] for r in found]) for key in TABLES["curves"][2:]}
+    found = [row for row in small_results.curves if row.model == request.param]
+    keys = ("time_s", "displacement_m", "velocity_m_per_s")
+    return {key: np.array([getattr(row, key) for row in found]) for key in keys}
 
 
 def test_each_model_gives_finite_curves_from_rest_at_every_sample(curve, small_scene):
@@ -54,55 +55,53 @@ def test_velocity_is_the_rate_of_displacement(curve, small_scene):
 
 
 def test_results_name_every_model_and_number(small_results):
-    numbers = small_results.numbers
-    assert [m["name"] for m in numbers["models"]] == MODELS
-    assert numbers["rule_count"] == 247
-    for record in numbers["models"]:
-        for key in ("nodes", "time_step_s", "critical_time_step_s", "steps", "wall_s"):
-            assert key in record
-        assert ("springs" in record) != ("elements" in record)
-        assert record["status"] == "finished"
-        assert record["time_step_error"] < 0.01
-    assert numbers["stiffness"].keys() == {"mamdani", "sugeno", "interval-type-2"}
-    low, high = numbers["stiffness"]["interval-type-2"]["interval_pa"]
-    assert low < numbers["stiffness"]["interval-type-2"]["estimate_pa"] < high
-    assert all(check["passed"] for check in numbers["checks"])
-    assert {"versions", "commit", "platform", "seed"} <= numbers["provenance"].keys()
-    json.dumps(numbers, allow_nan=False)
+    found = small_results.record
+    assert [model.name for model in found.models] == MODELS
+    assert found.fuzzy.rule_count == 247
+    for model in found.models:
+        for key in ("nodes", "time_step_s", "steps", "wall_s"):
+            assert getattr(model, key) > 0
+        assert (model.critical_time_step_s is None) == (model.name == "fem")
+        assert (model.lattice is None) != (model.elements is None)
+        assert model.status == "finished"
+        assert model.time_step_errors.keys() == set(found.probes)
+        assert model.time_step_error.displacement < 0.01
+    systems = found.fuzzy.systems
+    assert systems.keys() == {"mamdani", "sugeno", "interval-type-2"}
+    low, high = systems["interval-type-2"].interval_pa
+    assert low < systems["interval-type-2"].estimate_pa < high
+    assert all(check.passed for check in found.checks)
+    assert {"versions", "commit", "platform", "seed"} <= plain(found)["provenance"].keys()
 
 
 def test_every_pair_has_every_score_in_the_unit_interval(small_results):
-    scores = rows(small_results, "similarity")
-    pairs = {(r["model"], r["reference"]) for r in scores}
+    scores = small_results.scores
+    pairs = {(row.model, row.reference) for row in scores}
     assert pairs == {(m, "fem") for m in MODELS[1:]} | {(m, "basafa") for m in MODELS[2:]}
-    assert {r["curve"] for r in scores} == {"displacement", "velocity", "phase-plane"}
+    assert {row.curve for row in scores} == {"displacement", "velocity", "phase-plane"}
     assert len(scores) == len(pairs) * 2 * 7
-    assert all(0 <= r["score"] <= 1 for r in scores)
+    assert all(0 <= row.score <= 1 for row in scores)
 
 
 def test_field_errors_are_those_of_the_whole_organ(small_results):
-    quantities = {r["quantity"] for r in rows(small_results, "errors")}
+    quantities = {row.quantity for row in small_results.field_differences}
     assert {"field-relative-l2-peak", "field-relative-l2-final"} <= quantities
 
 
 def test_the_type_2_band_holds_its_own_curve(small_results):
     """The stiffness lies between the bounds, so at the peak the displacement does."""
-    band = [r for r in rows(small_results, "bands") if r["probe"] == "tool"]
-    curve = [
-        r["displacement_m"]
-        for r in rows(small_results, "curves")
-        if r["model"] == "msm-interval-type-2" and r["probe"] == "tool"
-    ]
+    band = [row for row in small_results.bands if row.probe == "tool"]
+    curve = small_results.curve("msm-interval-type-2", "tool").displacement
     peak = int(np.argmax(curve))
-    assert band[peak]["displacement_at_upper_m"] < curve[peak]
-    assert curve[peak] < band[peak]["displacement_at_lower_m"]
+    assert band[peak].displacement_at_upper_m < curve[peak]
+    assert curve[peak] < band[peak].displacement_at_lower_m
 
 
 def test_the_limits_of_the_lattice_are_told(small_results):
-    limits = small_results.numbers["lattice_limits"]
-    assert limits["relative_l2_at_best_factor"] <= limits["relative_l2"]
-    assert limits["relative_l2_at_quarter"] < limits["relative_l2"]
-    assert limits["relative_l2_with_volume_term"] < 0.5 * limits["relative_l2_at_best_factor"]
+    limits = small_results.record.lattice_limits
+    assert limits.relative_l2_at_best_factor <= limits.relative_l2
+    assert limits.relative_l2_at_quarter < limits.relative_l2
+    assert limits.relative_l2_with_volume_term < 0.5 * limits.relative_l2_at_best_factor
 
 
 def lattice_only(scene, **keys):
@@ -116,7 +115,7 @@ def lattice_only(scene, **keys):
 
 
 def largest_displacement(results):
-    return max(row["displacement_m"] for row in rows(results, "curves"))
+    return max(row.displacement_m for row in results.curves)
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -124,29 +123,27 @@ def test_every_integrator_runs_a_scene_to_the_same_peak(small_scene, integrator)
     """Those without a limit take samples for steps, and XPBD is stiff only in the limit."""
     scene = lattice_only(small_scene, volume_term=True)
     plain, other = (
-        run_study(dataclasses.replace(scene, lattice=lattice), Silent())
+        run_study(dataclasses.replace(scene, lattice=lattice))
         for lattice in (scene.lattice, dataclasses.replace(scene.lattice, integrator=integrator))
     )
-    records = [results.numbers["models"][0] for results in (plain, other)]
-    assert [record["status"] for record in records] == ["finished"] * 2
-    assert records[1]["integrator"] == integrator
-    peaks = [
-        max(r["displacement_m"] for r in rows(results, "curves")) for results in (plain, other)
-    ]
+    records = [results.record.models[0] for results in (plain, other)]
+    assert [record.status for record in records] == ["finished"] * 2
+    assert records[1].lattice.integrator == integrator
+    peaks = [largest_displacement(results) for results in (plain, other)]
     assert peaks[1] == pytest.approx(peaks[0], rel=0.5 if integrator == "xpbd" else 0.05)
 
 
 @pytest.mark.parametrize("keys", [{"time_step": 1e-3}, {"step_rate": 1777.0}])
 def test_a_given_step_is_kept(small_scene, keys):
-    record = run_study(lattice_only(small_scene, **keys), Silent()).numbers["models"][0]
+    record = run_study(lattice_only(small_scene, **keys)).record.models[0]
     longest = keys.get("time_step") or 1.0 / keys["step_rate"]
-    assert record["status"] == "finished"
-    assert record["smallest_time_step_s"] == record["time_step_s"] <= longest * (1 + 1e-9)
+    assert record.status == "finished"
+    assert record.lattice.smallest_time_step_s == record.time_step_s <= longest * (1 + 1e-9)
 
 
 def test_small_displacements_are_nearly_those_of_the_linear_path(small_scene):
     peaks = [
-        largest_displacement(run_study(scene, Silent()))
+        largest_displacement(run_study(scene))
         for scene in (lattice_only(small_scene), lattice_only(small_scene, geometry="linear"))
     ]
     assert peaks[0] != peaks[1]
@@ -154,24 +151,24 @@ def test_small_displacements_are_nearly_those_of_the_linear_path(small_scene):
 
 
 def test_runs_repeat_exactly(small_scene, small_results):
-    again = run_study(dataclasses.replace(small_scene, models=("basafa", "msm")), Silent())
-    first = [r for r in small_results.tables["curves"] if r[0] != "fem"]
-    assert again.tables["curves"] == first
+    again = run_study(dataclasses.replace(small_scene, models=("basafa", "msm")))
+    first = tuple(row for row in small_results.curves if row.model != "fem")
+    assert again.curves == first
 
 
 def test_only_the_named_models_run(small_scene):
-    only = run_study(dataclasses.replace(small_scene, models=("basafa",)), Silent())
-    assert [m["name"] for m in only.numbers["models"]] == ["basafa"]
-    assert only.numbers["stiffness"] == {}
-    assert not only.tables["similarity"]
+    only = run_study(dataclasses.replace(small_scene, models=("basafa",)))
+    assert [model.name for model in only.record.models] == ["basafa"]
+    assert only.record.fuzzy.systems == {}
+    assert not only.scores
 
 
 def test_the_paper_s_point_needs_no_mesh(paper_results):
-    numbers = paper_results.numbers
-    assert [m["name"] for m in numbers["models"]] == MODELS[1:]
-    assert numbers["control_point"]["mass_kg"] == pytest.approx(0.1358, abs=1e-4)
-    assert numbers["models"][0]["damping_ratio"] == pytest.approx(0.9)
-    assert "fields" not in paper_results.arrays
+    found = paper_results.record
+    assert [model.name for model in found.models] == MODELS[1:]
+    assert found.control_point.mass_kg == pytest.approx(0.1358, abs=1e-4)
+    assert found.models[0].point.damping_ratio == pytest.approx(0.9)
+    assert paper_results.fields == {}
 
 
 def test_best_factor_and_difference_of_scaled_fields(rng):
@@ -183,12 +180,22 @@ def test_best_factor_and_difference_of_scaled_fields(rng):
 def test_results_read_back_as_written(small_results, tmp_path):
     write(small_results, tmp_path / "out")
     again = read(tmp_path / "out")
-    assert again.numbers == small_results.numbers
+    assert again.record == small_results.record
     assert again.scene == small_results.scene
-    assert len(again.tables["curves"]) == len(small_results.tables["curves"])
-    for stem, arrays in small_results.arrays.items():
+    for table in ("curves", "bands", "scores", "field_differences", "sensitivity"):
+        assert getattr(again, table) == rounded(getattr(small_results, table))
+    for stem in ("fields", "fuzzy"):
+        arrays, found = getattr(small_results, stem), getattr(again, stem)
+        assert found.keys() == arrays.keys() != set()
         for name, array in arrays.items():
-            assert np.array_equal(again.arrays[stem][name], array)
+            assert np.array_equal(found[name], array)
+
+
+def rounded(rows):
+    """Rows in the twelve digits that the tables have."""
+    return tuple(
+        row._make(float(f"{v:.12g}") if not isinstance(v, str) else v for v in row) for row in rows
+    )
 
 
 def test_a_failure_while_writing_leaves_nothing_and_keeps_the_old(paper_results, tmp_path):
@@ -223,7 +230,7 @@ def test_damaged_results_are_refused_with_a_reason(paper_results, tmp_path, dama
     elif damage == "json":
         (target / "results.json").write_text("{")
     elif damage == "version":
-        numbers = paper_results.numbers | {"schema_version": 99}
+        numbers = plain(paper_results.record) | {"schema_version": 99}
         (target / "results.json").write_text(json.dumps(numbers))
     else:
         (target / "curves.csv").write_text("a,b\n1,2\n")
@@ -243,5 +250,5 @@ def test_a_folder_of_results_with_a_foreign_file_is_not_replaced(paper_results, 
 def test_names_that_look_like_numbers_stay_names(small_scene, tmp_path):
     places = {"1": small_scene.control_points["tool"], "nan": small_scene.control_points["corner"]}
     scene = dataclasses.replace(small_scene, models=("basafa",), control_points=places)
-    write(run_study(scene, Silent()), tmp_path / "out")
-    assert {row[1] for row in read(tmp_path / "out").tables["curves"]} == {"1", "nan"}
+    write(run_study(scene), tmp_path / "out")
+    assert {row.probe for row in read(tmp_path / "out").curves} == {"1", "nan"}

@@ -16,8 +16,8 @@ from study import export as exporting
 from study.commands import app
 from study.export import Request, export
 from study.progress import Silent
-from study.results.folder import SCHEMA_VERSION, Results, write
-from study.scene.file import write_scene
+from study.results.folder import Results, write
+from study.results.records import ElementsRecord
 from tests.oracles.cases import build, ramp
 
 SMALL = ('organ.size=["60 mm", "40 mm", "30 mm"]', "tool.radius=15 mm", "tool.force=0.05 N")
@@ -221,21 +221,21 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path):
     assert (tmp_path / "README.txt").read_text() == "mine"
 
 
-def results_of(scene, elements, folder):
+def results_of(results, elements, folder):
     """A results folder of a reference with so many elements."""
-    models = [{"name": "fem", "elements": elements}]
-    numbers = {"schema_version": SCHEMA_VERSION, "models": models}
+    used = ElementsRecord(element="p2", elements=elements, unknowns=1, method="ritz-vectors")
+    model = replace(results.model("fem"), elements=used)
     folder.mkdir()
-    write(Results(write_scene(scene), numbers, {}, {}), folder)
+    write(Results(results.scene, replace(results.record, models=(model,))), folder)
     return Request(target=str(folder), to="vtu")
 
 
 @pytest.mark.parametrize("level", [0, 1])
 def test_results_are_exported_with_the_mesh_that_they_were_run_on(
-    tmp_path, small_scene, small_posed, level
+    tmp_path, small_results, small_posed, level
 ):
     mesh = small_posed.geometry.level(level).mesh
-    request = results_of(small_scene, len(mesh.tetrahedra), tmp_path / "results")
+    request = results_of(small_results, len(mesh.tetrahedra), tmp_path / "results")
     written = export(request, Silent())
     assert written == tmp_path / "results" / "export"
     text = (written / "README.txt").read_text(encoding="utf-8")
@@ -244,8 +244,8 @@ def test_results_are_exported_with_the_mesh_that_they_were_run_on(
         export(replace(request, overrides=("tool.force=1 N",)), Silent())
 
 
-def test_results_on_a_mesh_that_is_no_more_are_refused(tmp_path, small_scene):
-    request = results_of(small_scene, 12345, tmp_path / "results")
+def test_results_on_a_mesh_that_is_no_more_are_refused(tmp_path, small_results):
+    request = results_of(small_results, 12345, tmp_path / "results")
     with pytest.raises(ValueError, match=r"have 12345 finite elements, .* run it again"):
         export(request, Silent())
     assert not (tmp_path / "results" / "export").exists()

@@ -7,9 +7,10 @@ from contextlib import suppress
 import numpy as np
 import pytest
 import pyvista
-from study.run.lattices import assemble, elastic
 
 from msm import model
+from study.models.lattice import assembled
+from study.models.tissue import elastic
 from study.organ.block import block_mesh
 from study.results import vtkhdf
 from study.results.fields import Frames, Mesh, recording
@@ -187,7 +188,7 @@ def test_the_mesh_is_written_once(tmp_path, rng):
 
 def test_a_lattice_run_is_seen_whole_in_its_file(small_scene, small_posed, tmp_path):
     """At a lattice node the file holds what the run recorded of the same place."""
-    body = assemble(small_scene, small_posed)
+    body = assembled(small_posed, small_scene.lattice)
     material = elastic(body.lattice, 9e3, 0.45)
     nodes = body.lattice.nodes
     seen = dataclasses.replace(small_posed.observation, probes=nodes[[0, 7]])

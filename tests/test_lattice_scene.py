@@ -4,17 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from study.run.estimates import estimates
-from study.run.lattices import (
-    assemble,
-    benchmark,
-    damping_rates,
-    elastic,
-    fuzzy_tuned,
-    node_damping,
-)
-from study.run.organ import run_organ, spacing
-from study.run.outcome import Outcome
 
 from msm import model
 from msm.checkpoint import Checkpoint
@@ -23,8 +12,15 @@ from msm.laws import Hooke, Piecewise, initial_stiffness
 from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
 from study.check import describe_scene
 from study.mesh.tetrahedra import edges, mean_edge
-from study.progress import Silent
+from study.models import table
+from study.models.damping import nodal_damping, reference_damping
+from study.models.estimates import estimates
+from study.models.lattice import assembled
+from study.models.model import SILENT
+from study.models.tissue import elastic, of_modulus
+from study.problem.damping import RayleighDamping
 from study.run.assumptions import assumptions
+from study.run.dimensionless import dimensionless
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
 from tests.conftest import SMALL
@@ -51,7 +47,17 @@ def scene_with(*overrides):
 def posed_with(*overrides):
     scene = scene_with(*overrides)
     posed = problem_of(scene)
-    return scene, posed, assemble(scene, posed)
+    return scene, posed, assembled(posed, scene.lattice)
+
+
+def tuned(scene, mesh, modulus):
+    """Springs of the fuzzy-tuned models for an estimate."""
+    return of_modulus(scene, mesh, modulus=modulus)
+
+
+def benchmark(scene, mesh):
+    """Springs of the benchmark."""
+    return table.model(scene, "basafa").make(scene, mesh)
 
 
 def motion(posed, assembly, material, **options):
@@ -69,8 +75,8 @@ def test_a_scene_with_the_option_reads_back_unchanged(options, tmp_path):
 def test_a_scene_with_the_option_runs_and_is_described(options, small_posed):
     """The numbers that do not depend on it stay; every check of the lattice passes."""
     scene = scene_with(*options)
-    assembly = assemble(scene, small_posed)
-    contender = fuzzy_tuned(scene, assembly.lattice, "sugeno", E)
+    assembly = assembled(small_posed, scene.lattice)
+    contender = tuned(scene, assembly.lattice, E)
     found = motion(small_posed, assembly, contender.material)
     assert found.trajectory.status == "finished"
     assert found.trajectory.displacement[:, 0, 2].min() < -1e-5
@@ -82,13 +88,15 @@ def test_a_scene_with_the_option_runs_and_is_described(options, small_posed):
 def test_without_options_there_is_no_law_no_stiffness_part_and_a_cubic_lattice(
     small_scene, small_posed
 ):
-    assembly = assemble(small_scene, small_posed)
-    contender = fuzzy_tuned(small_scene, assembly.lattice, "sugeno", E)
+    assembly = assembled(small_posed, small_scene.lattice)
+    contender = tuned(small_scene, assembly.lattice, E)
     assert contender.material.law == Hooke(0.4 * E * 0.01)
     assert contender.modulus == E
     assert contender.material.damping.beta == 0.0
     assert assembly.lattice.cells.shape[1] == 8
-    assert damping_rates(small_scene) == (node_damping(small_scene, E).gamma_0, 0.0)
+    assert reference_damping(small_scene) == RayleighDamping(
+        nodal_damping(small_scene, E).gamma_0, 0.0
+    )
 
 
 # Spring laws
@@ -96,11 +104,11 @@ def test_without_options_there_is_no_law_no_stiffness_part_and_a_cubic_lattice(
 
 def test_a_law_scales_with_the_estimate():
     scene, _, assembly = posed_with(STIFFENING)
-    laws = [fuzzy_tuned(scene, assembly.lattice, "sugeno", f * E).material.law for f in (1, 3)]
+    laws = [tuned(scene, assembly.lattice, f * E).material.law for f in (1, 3)]
     k = 0.4 * E * 0.01
     assert laws[0].tensions == pytest.approx(k * np.array([-0.3, 0, 0.01, 0.6]))
     assert laws[1].tensions == pytest.approx(3 * laws[0].tensions)
-    assert not isinstance(benchmark(scene, 0.01).material.law, Piecewise)
+    assert not isinstance(benchmark(scene, assembly.lattice).material.law, Piecewise)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +122,7 @@ def test_tension_equal_to_strain_is_the_linear_spring(law, same):
     """Rounding over 700 steps; negative control: 1 % stiffer springs are seen."""
     scene, posed, assembly = posed_with(f"lattice.law={law}")
     found = [
-        motion(posed, assembly, fuzzy_tuned(s, assembly.lattice, "sugeno", E).material)
+        motion(posed, assembly, tuned(s, assembly.lattice, E).material)
         for s in (scene, scene_with())
     ]
     a, b = (run.trajectory.displacement for run in found)
@@ -123,8 +131,8 @@ def test_tension_equal_to_strain_is_the_linear_spring(law, same):
 
 def test_a_law_twice_as_stiff_is_the_linear_spring_of_twice_the_modulus():
     scene, _, assembly = posed_with("lattice.law={strain=[0, 1], relative_tension=[0, 2]}")
-    doubled = fuzzy_tuned(scene, assembly.lattice, "sugeno", E)
-    plain = fuzzy_tuned(scene_with(), assembly.lattice, "sugeno", 2 * E)
+    doubled = tuned(scene, assembly.lattice, E)
+    plain = tuned(scene_with(), assembly.lattice, 2 * E)
     assert doubled.modulus == pytest.approx(2 * E, rel=1e-12)
     assert initial_stiffness(doubled.material.law) == pytest.approx(plain.material.law.k)
     rest = [static_displacement(assembly, c.material) for c in (doubled, plain)]
@@ -139,7 +147,7 @@ def test_stiffening_is_felt_under_load_and_shortens_the_step():
     heavy = ("tool.force=0.5 N", "support.stiffness=1 MPa/m")
     scene, posed, assembly = posed_with(STIFFENING, *heavy)
     stiff, linear = (
-        motion(posed, assembly, fuzzy_tuned(s, assembly.lattice, "sugeno", E).material)
+        motion(posed, assembly, tuned(s, assembly.lattice, E).material)
         for s in (scene, scene_with(*heavy))
     )
     depth = [-run.trajectory.displacement[:, 0, 2].min() for run in (stiff, linear)]
@@ -152,10 +160,10 @@ def test_stiffening_is_felt_under_load_and_shortens_the_step():
 
 def test_the_report_states_the_slopes_of_a_law_at_rest():
     scene = scene_with(SOFT_BELOW)
-    text = " ".join(assumptions(scene, Outcome()))
+    text = " ".join(assumptions(scene, None))
     assert "1 times that in tension and 0.5 times that in compression" in text
     assert "eq. (1)" not in text
-    assert "linear, eq. (1)" in " ".join(assumptions(scene_with(), Outcome()))
+    assert "linear, eq. (1)" in " ".join(assumptions(scene_with(), None))
 
 
 # Rayleigh damping
@@ -163,18 +171,18 @@ def test_the_report_states_the_slopes_of_a_law_at_rest():
 
 def test_rayleigh_reaches_springs_and_reference_alike_and_leaves_the_benchmark():
     scene, _, assembly = posed_with(*RAYLEIGH)
-    found = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material.damping
+    found = tuned(scene, assembly.lattice, E).material.damping
     assert found == NodalDamping(30.0, beta=5e-4)
-    assert damping_rates(scene) == (30.0, 5e-4)
-    table = benchmark(scene, 0.01).material.damping
-    assert table == benchmark(scene_with(), 0.01).material.damping
+    assert reference_damping(scene) == RayleighDamping(30.0, 5e-4)
+    found = benchmark(scene, assembly.lattice).material.damping
+    assert found == benchmark(scene_with(), assembly.lattice).material.damping
 
 
 @pytest.mark.parametrize(("share", "status"), [(0.98, "finished"), (1.03, "diverged")])
 def test_the_step_is_kept_below_the_limit_that_dashpots_leave(share, status):
     """The limit is a third of the undamped one; negative control: 3 % above it, the run is lost."""
     scene, posed, assembly = posed_with("damping.kind=rayleigh", "damping.stiffness=3 ms")
-    material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
+    material = tuned(scene, assembly.lattice, E).material
     undamped = dataclasses.replace(material, damping=NodalDamping(0.0))
     limit = critical_time_step(assembly, material)
     assert limit < 0.35 * critical_time_step(assembly, undamped)
@@ -186,7 +194,7 @@ def test_the_step_is_kept_below_the_limit_that_dashpots_leave(share, status):
 
 def test_a_step_that_follows_the_limit_stays_below_it_with_dashpots():
     scene, posed, assembly = posed_with("damping.kind=rayleigh", "damping.stiffness=3 ms")
-    material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
+    material = tuned(scene, assembly.lattice, E).material
     found = motion(posed, assembly, material, step=Automatic(0.9))
     assert found.trajectory.status == "finished"
     assert found.margin > 1.0
@@ -198,7 +206,7 @@ def test_dashpots_slow_what_they_damp_and_not_where_it_comes_to_rest():
     scene, posed, assembly = posed_with(
         "damping.kind=rayleigh", "damping.mass=40", "damping.stiffness=10 ms"
     )
-    material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
+    material = tuned(scene, assembly.lattice, E).material
     rest = static_displacement(assembly, material)
     weights = assembly.lattice.interpolation(posed.observation.probes)[0]
     found = model.run(assembly, material, np.ones_like, posed.observation, linear=True)
@@ -213,7 +221,7 @@ def test_dashpots_slow_what_they_damp_and_not_where_it_comes_to_rest():
 @pytest.mark.parametrize("integrator", ["velocity-verlet", "implicit-euler", "split-volume"])
 def test_integrators_without_a_stiffness_part_refuse_it(integrator):
     scene, posed, assembly = posed_with(*RAYLEIGH)
-    material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
+    material = tuned(scene, assembly.lattice, E).material
     with pytest.raises(ValueError, match=r"stiffness part.*damping\.stiffness"):
         motion(posed, assembly, material, integrator=integrator)
 
@@ -227,7 +235,9 @@ def test_springs_on_tetrahedra_run_along_the_edges_of_the_mesh():
     assert assembly.lattice.nodes is mesh.points
     assert assembly.lattice.cells is mesh.tetrahedra
     np.testing.assert_array_equal(assembly.springs.ends, edges(mesh.tetrahedra))
-    assert spacing(scene, posed) == assembly.lattice.spacing == mean_edge(mesh)
+    assert assembly.lattice.spacing == mean_edge(mesh)
+    ratio = dimensionless(scene, posed).tool_radius_over_spacing
+    assert ratio == pytest.approx(posed.tool.radius / mean_edge(mesh), rel=1e-15)
     assert "springs on the mesh" in " ".join(
         describe_scene("block", [*SMALL, TETRAHEDRA, "fuzzy.sensitivity_readings=0"])
     )
@@ -237,14 +247,14 @@ def test_the_benchmark_on_tetrahedra_has_the_modulus_of_its_table():
     """K_1 of an edge is carried to the mean edge of the mesh: 2.5 k_1 / h stays."""
     _, _, assembly = posed_with(TETRAHEDRA)
     h = assembly.lattice.spacing
-    found = benchmark(scene_with(TETRAHEDRA), h)
+    found = benchmark(scene_with(TETRAHEDRA), assembly.lattice)
     assert 2.5 * found.material.law.k1 / h == pytest.approx(found.modulus, rel=1e-12)
 
 
 def test_a_run_on_tetrahedra_continues_to_the_same_bits(tmp_path):
     """Interrupted at sample 40, with a law and dashpots."""
     scene, posed, assembly = posed_with(TETRAHEDRA, STIFFENING, *RAYLEIGH)
-    material = fuzzy_tuned(scene, assembly.lattice, "sugeno", E).material
+    material = tuned(scene, assembly.lattice, E).material
 
     class Killed(Exception):  # noqa: N818 - not an error of the program
         pass
@@ -285,12 +295,14 @@ def test_a_volume_term_on_tetrahedra_is_refused():
 def test_results_state_what_the_mesh_decides():
     """No Poisson ratio is claimed, and the mass of a node is that of the mesh."""
     scene, posed, assembly = posed_with(TETRAHEDRA)
-    outcome = run_organ(scene, posed, estimates(scene), Silent())
-    record = outcome.models[0]
-    assert record["poisson_ratio"] is None
-    assert record["node_mass_kg"] == pytest.approx(assembly.mass.mean())
-    assert record["springs"] == len(edges(posed.geometry.mesh.tetrahedra))
-    assert all(check["passed"] for check in outcome.checks)
-    text = " ".join(assumptions(scene, outcome))
+    (found,) = table.models_of(scene, estimates(scene))
+    run = found.prepare(posed).run(SILENT)
+    assert run.record.name == "msm-sugeno"
+    assert run.record.lattice.poisson_ratio is None
+    assert run.record.lattice.node_mass_kg == pytest.approx(assembly.mass.mean())
+    assert run.record.lattice.springs == len(edges(posed.geometry.mesh.tetrahedra))
+    assert {check.name for check in run.checks} >= {"lattice: mass"}
+    assert all(check.passed for check in run.checks)
+    text = " ".join(assumptions(scene, None))
     assert "edges of the finite-element mesh" in text
     assert "cubic lattice" not in text

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from study.run.outcome import Outcome
 
 from fem_reference import iterative as module
 from fem_reference import memory
@@ -27,10 +26,10 @@ from fem_reference.observation import (
 from fem_reference.solvers import solve_static
 from fem_reference.subspace import eigenvectors, empty, extended, superposition
 from study.mesh.tetrahedra import volumes
+from study.models import finite_elements as reference
+from study.models.model import SILENT
 from study.organ.block import block_mesh
 from study.problem.damping import RayleighDamping
-from study.progress import Silent
-from study.run import reference
 from study.scene import Organ, Reference, Tissue
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import geometry_of, problem_of
@@ -60,7 +59,7 @@ def short(small_scene):
 
 @pytest.fixture(scope="module")
 def usual(short):
-    """Record and outcome of the reference as it is."""
+    """Record, its part of the elements, and run of the reference as it is."""
     return run(with_reference(short))
 
 
@@ -333,59 +332,62 @@ def with_reference(scene, **keys):
 
 
 def run(scene):
-    posed, outcome = problem_of(scene), Outcome()
-    reference.run_reference(scene, posed, outcome, Silent())
-    return outcome.models[0], outcome
+    """The record of the reference, its part of that, and the run."""
+    (model,) = reference.models(scene, {})
+    found = model.prepare(problem_of(scene)).run(SILENT)
+    return found.record, found.record.elements, found
 
 
 def test_an_accuracy_is_reached_by_finer_meshes_and_the_finest_is_the_reference(short, usual):
-    first, _ = usual
-    wanted = 0.8 * first["mesh_error"]["displacement"]
-    second, _ = run(with_reference(short, accuracy=wanted))
-    assert second["mesh_error"]["displacement"] <= wanted
-    assert second["unknowns"] > first["unknowns"]
-    assert len(second["mesh_levels"]) > len(first["mesh_levels"]) == 3
-    assert second["mesh_levels"][-1]["unknowns"] == second["unknowns"]
-    assert "accuracy_missed" not in second
+    _, first, _ = usual
+    wanted = 0.8 * first.mesh_error.worst.displacement
+    _, second, _ = run(with_reference(short, accuracy=wanted))
+    assert second.mesh_error.worst.displacement <= wanted
+    assert second.unknowns > first.unknowns
+    assert len(second.levels) > len(first.levels) == 3
+    assert second.levels[-1].unknowns == second.unknowns
+    assert second.accuracy_missed is None
 
 
 def test_an_accuracy_out_of_reach_is_said(short, monkeypatch):
     monkeypatch.setattr(reference, "FINER", 1)
-    record, _ = run(with_reference(short, accuracy=1e-4))
-    assert len(record["mesh_levels"]) == 4
-    assert record["accuracy_missed"] == 1e-4
+    _, elements, _ = run(with_reference(short, accuracy=1e-4))
+    assert len(elements.levels) == 4
+    assert elements.accuracy_missed == 1e-4
 
 
 def test_the_stated_error_holds_against_a_much_finer_mesh(short, usual, monkeypatch):
     """An estimate with a safety factor: at least 0.8 of the true error, at every control point."""
-    record, outcome = usual
+    _, elements, found = usual
     monkeypatch.setattr(reference, "COARSER", 0)
-    _, fine = run(with_reference(short, element_size=0.005))
-    a, b = (one.runs["fem"].displacement for one in (outcome, fine))
-    for i, stated in enumerate(record["mesh_error_by_probe"].values()):
+    _, _, fine = run(with_reference(short, element_size=0.005))
+    a, b = (one.trajectory.displacement for one in (found, fine))
+    assert elements.mesh_error.by_probe.keys() == {"tool"}
+    for i, stated in enumerate(elements.mesh_error.by_probe.values()):
         true = relative(a[:, i], b[:, i])
-        assert stated["displacement"] > 0.8 * true
-        assert stated["displacement"] < 20 * true
+        assert stated.displacement > 0.8 * true
+        assert stated.displacement < 20 * true
 
 
 def test_a_strained_reference_is_compared_with_a_hyperelastic_solid(short, usual):
     pressed = changed(short, tool={"force": 1.0})
-    record, _ = run(with_reference(pressed))
-    assert record["largest_strain"] > 0.05
-    assert record["hyperelastic"]["law"] == "neo-hookean"
-    assert 0.005 < record["hyperelastic"]["field_difference"] < 0.3
-    without, _ = run(with_reference(pressed, large_strain="none"))
-    gentle, _ = usual
-    assert "hyperelastic" not in without
-    assert "hyperelastic" not in gentle
+    record, elements, _ = run(with_reference(pressed))
+    assert record.largest_strain > 0.05
+    assert elements.large_strain.law == "neo-hookean"
+    assert 0.005 < elements.large_strain.field_difference < 0.3
+    _, without, _ = run(with_reference(pressed, large_strain="none"))
+    _, gentle, _ = usual
+    assert without.large_strain is None
+    assert gentle.large_strain is None
 
 
 def test_a_hyperelastic_solid_that_gives_way_is_a_note_and_no_number(short):
     crushed = changed(short, tool={"force": 20.0})
-    keys = {"large_strain": "st-venant-kirchhoff", "element_size": 0.02}
-    record, outcome = run(with_reference(crushed, **keys))
-    assert "hyperelastic" not in record
-    assert any("No st-venant-kirchhoff solution" in note for note in outcome.notes)
+    _, elements, found = run(
+        with_reference(crushed, large_strain="st-venant-kirchhoff", element_size=0.02)
+    )
+    assert elements.large_strain is None
+    assert any("No st-venant-kirchhoff solution" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(
@@ -407,19 +409,22 @@ def test_bad_keys_are_named(keys, message):
 @pytest.mark.parametrize("nu", [0.0, 0.49999])
 def test_the_ends_of_the_poisson_ratio_give_numbers_with_errors(short, nu):
     tissue = dataclasses.replace(short.tissue, poisson_ratio=nu)
-    record, outcome = run(with_reference(dataclasses.replace(short, tissue=tissue)))
-    assert record["element"] == ("p2" if nu == 0 else "taylor-hood")
-    assert np.isfinite(outcome.runs["fem"].displacement).all()
-    assert record["mesh_error"]["field_peak"] < 0.2
+    _, elements, found = run(with_reference(dataclasses.replace(short, tissue=tissue)))
+    assert elements.element == ("p2" if nu == 0 else "taylor-hood")
+    assert np.isfinite(found.trajectory.displacement).all()
+    assert elements.mesh_error.field_peak < 0.2
 
 
 def test_results_carry_the_error_and_what_it_came_from(small_results):
-    record = small_results.numbers["models"][0]
-    assert record["name"] == "fem"
-    assert [level["size"] for level in record["mesh_levels"]] == pytest.approx([2.0, 4 / 3, 1.0])
-    assert record["mesh_order"].keys() == {"field_peak"}
-    assert record["mesh_order_by_probe"].keys() == record["mesh_error_by_probe"].keys()
-    assert record["truncation_error"] < 0.01
+    record = small_results.record.models[0]
+    assert record.name == "fem"
+    elements = record.elements
+    assert [level.size for level in elements.levels] == pytest.approx([2.0, 4 / 3, 1.0])
+    assert elements.mesh_error.field_order > 0.0
+    probes = set(small_results.record.probes)
+    assert elements.mesh_error.order_by_probe.keys() == probes
+    assert elements.mesh_error.by_probe.keys() == probes
+    assert elements.truncation_error < 0.01
 
 
 def test_scene_and_reference_agree_on_the_method_that_is_meant():
@@ -437,16 +442,16 @@ def test_a_users_tetrahedra_run_through_and_are_refined_for_an_accuracy(tmp_path
     meshio.write_points_cells(path, mesh.points, [("tetra", mesh.tetrahedra)])
     organ = dataclasses.replace(short.organ, mesh=str(path), unit="m")
     scene = dataclasses.replace(short, organ=organ)
-    record, _ = run(with_reference(scene, accuracy=0.3, element_size=0.02))
-    assert [level["elements"] for level in record["mesh_levels"]] == [72, 8 * 72]
-    assert record["mesh_error"]["displacement"] <= 0.3
-    assert "accuracy_missed" not in record
+    _, elements, _ = run(with_reference(scene, accuracy=0.3, element_size=0.02))
+    assert [level.elements for level in elements.levels] == [72, 8 * 72]
+    assert elements.mesh_error.worst.displacement <= 0.3
+    assert elements.accuracy_missed is None
 
 
 def test_locked_elements_get_no_error_and_a_note(short):
-    record, outcome = run(with_reference(short, element="p1"))
-    assert "mesh_error" not in record
-    assert any("lock" in note for note in outcome.notes)
+    _, elements, found = run(with_reference(short, element="p1"))
+    assert elements.mesh_error is None
+    assert any("lock" in note for note in found.notes)
 
 
 def test_a_load_between_the_samples_is_refused():
@@ -467,11 +472,11 @@ def test_the_ends_of_the_support_give_a_rest(small_scene, stiffness):
 
 
 def test_a_slender_rod_is_solved(small_scene):
-    organ = dataclasses.replace(small_scene.organ, size=(0.12, 0.005, 0.005))
+    organ = dataclasses.replace(short.organ, size=(0.12, 0.005, 0.005))
     support = dataclasses.replace(small_scene.support, side="right")
     place = dataclasses.replace(small_scene.tool.place, at=(0.9, 0.5))
     tool = dataclasses.replace(small_scene.tool, place=place, radius=0.004, force=1e-4)
-    scene = dataclasses.replace(small_scene, organ=organ, support=support, tool=tool)
+    scene = dataclasses.replace(short, organ=organ, support=support, tool=tool)
     posed = problem_of(with_reference(scene, element_size=0.006))
     one = discretise(posed.geometry.mesh, Tissue(), posed.foundation, posed.tool)
     u = iterative(one, 1e-10)(one.load)

@@ -10,9 +10,8 @@ import json
 from pathlib import Path
 
 import pytest
-from study.run.whole import run_study
 
-from study.progress import Silent
+from study.run.study import run_study
 from study.scene.file import read_scene
 
 STORE = Path(__file__).parent / "data" / "scores.json"
@@ -23,8 +22,8 @@ TOLERANCE, AREA_TOLERANCE = 1e-6, 2e-5
 
 
 def entries(results):
-    found = {"/".join(row[:-1]): row[-1] for row in results.tables["similarity"]}
-    return found | {"/".join(row[:-1]): row[-1] for row in results.tables["errors"]}
+    found = {"/".join(row[:-1]): row[-1] for row in results.scores}
+    return found | {"/".join(row[:-1]): row[-1] for row in results.field_differences}
 
 
 def halved(scene):
@@ -52,7 +51,7 @@ def test_scores_are_those_on_record(name, request, small_scene, small_results, p
     values = entries(results)
     store = json.loads(STORE.read_text()) if STORE.exists() else {}
     if request.config.getoption("--update-scores"):
-        store[name] = record(values, entries(run_study(halved(scene), Silent())))
+        store[name] = record(values, entries(run_study(halved(scene))))
         STORE.write_text(json.dumps(store, indent=1, sort_keys=True) + "\n")
         return
     assert values.keys() == store[name].keys(), "stale or missing entries: pytest --update-scores"
@@ -72,6 +71,6 @@ def test_the_record_would_catch_a_stiffness_off_by_a_tenth_of_a_per_cent(small_s
         basafa=dataclasses.replace(small_scene.basafa, k1=1.001 * small_scene.basafa.k1),
     )
     store = json.loads(STORE.read_text())["small block"]
-    for key, value in entries(run_study(softer, Silent())).items():
+    for key, value in entries(run_study(softer)).items():
         if key.endswith("/relative-l2") and value > 0.0:
             assert abs(value - store[key]["value"]) > store[key]["tolerance"]

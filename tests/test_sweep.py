@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from study.models.table import MODELS
 from study.sweep import program as programs
 from study.sweep.attempt import attempt
 from study.sweep.imports import reached
@@ -244,7 +245,7 @@ def test_a_library_of_another_version_makes_another_program(monkeypatch):
 
 
 def test_the_program_holds_imports_within_functions_and_leaves_out_the_command_line():
-    found = set(reached("study.run.whole", (ROOT,)))
+    found = set(reached("study.run.study", (ROOT,)))
     assert {"study", "study.run", "study.scene", "msm.forces", "fuzzy.systems.kernel"} <= found
     assert "fem_reference.elasticity" in found
     assert not found & {"study.commands", "study.sweep.runner"}
@@ -253,7 +254,7 @@ def test_the_program_holds_imports_within_functions_and_leaves_out_the_command_l
 def test_every_module_that_a_run_loads_is_part_of_its_program():
     """Held to what Python itself imports."""
     load = (
-        "import sys, study.run.whole\n"
+        "import sys, study.run.study\n"
         "print(*(n for n in sys.modules if n.split('.')[0] in "
         "{'study', 'fem_reference', 'msm', 'fuzzy'}))"
     )
@@ -261,7 +262,18 @@ def test_every_module_that_a_run_loads_is_part_of_its_program():
         [sys.executable, "-c", load], capture_output=True, text=True, check=True, cwd=ROOT
     ).stdout.split()
     assert len(loaded) > 30
-    assert set(loaded) <= set(reached("study.run.whole", (ROOT,)))
+    assert set(loaded) <= set(reached("study.run.study", (ROOT,)))
+
+
+def test_the_program_follows_tables_that_are_named_in_a_text(tmp_path):
+    """As the models of `study.models.table`, and the choices of a scene, are."""
+    (tmp_path / "one.py").write_text('TABLE = {"a": "two:THINGS"}\nTEXT = "three: not a name"\n')
+    for name in ("two.py", "three.py"):
+        (tmp_path / name).touch()
+    assert set(reached("one", (tmp_path,))) == {"one", "two"}
+    models = {text.partition(":")[0] for text in MODELS.values()}
+    assert models <= set(reached("study.tradeoff.observation", (ROOT,)))
+    assert "msm.integrators" in reached("study.scene.schema", (ROOT,))
 
 
 def test_a_source_that_imports_by_name_takes_its_whole_package_with_it(tmp_path):

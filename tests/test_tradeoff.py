@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from study.run.lattices import assemble
-from study.tradeoff.body import build
-from study.tradeoff.contender import Ready
-from study.tradeoff.lattice import with_settings
 
 from fem_reference.observation import evaluation
 from fem_reference.subspace import transitions
 from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
+from study.models import lattice
+from study.models.model import Stepper
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.scene.file import read_scene
@@ -26,11 +24,12 @@ from study.tradeoff import recommend as advice
 from study.tradeoff import table, whole
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lineup import CONTENDERS, Configuration, configurations, contender
+from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
+from study.tradeoff.observation import Observed
 from study.tradeoff.problem import SAMPLING, arguments, plain, sampled
 from study.tradeoff.rates import Frame, frame
-from study.tradeoff.reference import Reference
-from study.tradeoff.table import Cost
+from study.tradeoff.reference import Truth
+from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import FEWEST, Timing, in_turns
 
 SMALL = (
@@ -64,12 +63,32 @@ def stated():
     return problem_module.stated(**arguments(sampled(read_scene("block", SMALL))))
 
 
-def row_of(found, configuration):
-    return found.rows[CHOSEN.index(configuration)]
+def rows_of(entries, folder):
+    """Rows of the table as it is written, with numbers and marks in place of their text."""
+    path = folder / "table.csv"
+    table.write(entries, path)
+    with path.open(newline="") as file:
+        return [{k: value_of(k, text) for k, text in row.items()} for row in csv.DictReader(file)]
 
 
-def test_every_row_has_finite_numbers_or_a_status_that_says_why_not(found):
-    for row in found.rows:
+def value_of(column, text):
+    marks = {"": None, "True": True, "False": False}
+    if column in {"contender", "configuration", "status", "message"}:
+        return text
+    return marks[text] if text in marks else float(text)
+
+
+@pytest.fixture(scope="module")
+def rows(found, tmp_path_factory):
+    return rows_of(found.entries, tmp_path_factory.mktemp("table"))
+
+
+def row_of(rows, configuration):
+    return rows[CHOSEN.index(configuration)]
+
+
+def test_every_row_has_finite_numbers_or_a_status_that_says_why_not(rows):
+    for row in rows:
         assert tuple(row) == table.COLUMNS
         numbers = [v for v in row.values() if isinstance(v, float)]
         assert all(math.isfinite(v) and v >= 0.0 for v in numbers)
@@ -80,30 +99,30 @@ def test_every_row_has_finite_numbers_or_a_status_that_says_why_not(found):
             assert row["field_error"] is None
 
 
-def test_what_diverged_or_failed_is_told_and_has_neither_score_nor_cost(found):
+def test_what_diverged_or_failed_is_told_and_has_neither_score_nor_cost(rows):
     for configuration, status, word in (
         (TOO_LONG, "diverged", "at "),
         (NO_MESH, "failed", "level -9"),
     ):
-        row = row_of(found, configuration)
+        row = row_of(rows, configuration)
         assert row["status"] == status
         assert word in row["message"]
         assert [row[c] for c in ("tool_error", "worst_error", "wall_per_s")] == [None] * 3
         assert row["pareto"] is row["pareto_any_load"] is False
 
 
-def test_refining_the_spacing_lowers_the_error_and_raises_the_cost(found):
-    rows = [row_of(found, one) for one in VOLUME]
-    assert rows[0]["field_error"] > 1.2 * rows[1]["field_error"]
-    assert rows[0]["worst_error"] > 1.2 * rows[1]["worst_error"]
-    steps = [row["step_s"] for row in rows]
+def test_refining_the_spacing_lowers_the_error_and_raises_the_cost(rows):
+    found = [row_of(rows, one) for one in VOLUME]
+    assert found[0]["field_error"] > 1.2 * found[1]["field_error"]
+    assert found[0]["worst_error"] > 1.2 * found[1]["worst_error"]
+    steps = [row["step_s"] for row in found]
     assert steps == sorted(steps, reverse=True)
 
 
-def test_a_superposition_follows_one_load_and_stays_off_the_front_of_those_that_follow_any(found):
-    assert row_of(found, RITZ)["any_load"] is False
-    assert row_of(found, RITZ)["pareto_any_load"] is False
-    assert any(row["pareto_any_load"] for row in found.rows)
+def test_a_superposition_follows_one_load_and_stays_off_the_front_of_those_that_follow_any(rows):
+    assert row_of(rows, RITZ)["any_load"] is False
+    assert row_of(rows, RITZ)["pareto_any_load"] is False
+    assert any(row["pareto_any_load"] for row in rows)
 
 
 def test_the_table_is_read_back_with_all_columns(found, tmp_path):
@@ -112,7 +131,7 @@ def test_the_table_is_read_back_with_all_columns(found, tmp_path):
     with (tmp_path / "out" / whole.TABLE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == table.COLUMNS
-    assert [row["status"] for row in rows] == [row["status"] for row in found.rows]
+    assert [row["status"] for row in rows] == [one.errors.status for one in found.entries]
 
 
 def test_every_contender_enters_with_settings_of_its_own():
@@ -125,15 +144,19 @@ def test_every_contender_enters_with_settings_of_its_own():
 
 
 def planted(error, wall, *, any_load=True):
-    return {"field_error": error, "wall_per_s": wall, "any_load": any_load, "status": "resolved"}
+    """An entry of an error, or one that is not resolved, and a wall per simulated second."""
+    found = Errors("not resolved") if error is None else Errors("resolved", field=error)
+    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), wall * 1e-3), None))
+    return Entry(VOLUME[0] if any_load else RITZ, found, 0.01, cost)
 
 
-def test_the_front_holds_what_nothing_beats():
+def test_the_front_holds_what_nothing_beats(tmp_path):
     best, cheap, beaten = planted(0.1, 2.0), planted(0.3, 1.0), planted(0.2, 3.0)
     twin, hardly_better = planted(0.1, 2.0), planted(0.0995, 2.5)
-    unresolved = planted(None, 0.1) | {"status": "not resolved"}
+    unresolved = planted(None, 0.1)
     precomputed = planted(0.05, 0.5, any_load=False)
-    rows = table.with_fronts([best, cheap, beaten, twin, hardly_better, unresolved, precomputed])
+    entries = [best, cheap, beaten, twin, hardly_better, unresolved, precomputed]
+    rows = rows_of(entries, tmp_path)
     assert [row["pareto"] for row in rows] == [False] * 6 + [True]
     assert [row["pareto_any_load"] for row in rows] == [
         True,
@@ -158,17 +181,17 @@ class Clock:
         def take(count=1):
             self.now += seconds * count
 
-        return Ready(take, lambda: np.zeros((1, 3)), 1e-3, 3, take)
+        return Stepper(take, lambda: np.zeros((1, 3)), 1e-3, 3, take)
 
 
-def test_a_slower_kernel_costs_in_proportion_and_loses_its_place_on_the_front():
+def test_a_slower_kernel_costs_in_proportion_and_loses_its_place_on_the_front(tmp_path):
     def rows(second):
         clock = Clock()
         timings = in_turns([clock.ready(1e-4), clock.ready(second)], 3, clock)
         kept = [Errors("resolved", field=0.2), Errors("resolved", field=0.1)]
         costs = [Cost(3, 0.0, 1e-3, timing) for timing in timings]
         pairs = zip(kept, costs, strict=True)
-        return table.with_fronts([table.row(VOLUME[0], e, 0.01, c) for e, c in pairs])
+        return rows_of([Entry(VOLUME[0], e, 0.01, c) for e, c in pairs], tmp_path)
 
     equal, slower = rows(1e-4), rows(3e-4)
     assert equal[1]["wall_per_s"] == pytest.approx(0.1)
@@ -176,6 +199,20 @@ def test_a_slower_kernel_costs_in_proportion_and_loses_its_place_on_the_front():
     assert slower[1]["bare_step_us"] == pytest.approx(300.0)
     assert [row["pareto"] for row in equal] == [False, True]
     assert [row["pareto"] for row in slower] == [True, True]
+
+
+def test_a_setup_is_that_of_a_lattice_of_its_own(stated, monkeypatch):
+    """One on the same lattice would take what another had assembled, and seem to cost nothing."""
+    built, genuine = [], lattice.msm.assemble
+
+    def counting(*things):
+        built.append(1)
+        return genuine(*things)
+
+    monkeypatch.setattr(lattice.msm, "assemble", counting)
+    same = [VOLUME[0], Configuration("step-sizes", {**VOLUME[0].settings, "step_fraction": 0.4})]
+    whole.costs(stated, same, [1e-3, 1e-3], 1, Silent())
+    assert len(built) == 2 * len(same)  # of each contender one to warm up
 
 
 def test_a_turn_takes_as_many_steps_whatever_disturbs_it():
@@ -211,18 +248,19 @@ def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
     assert found.wall == pytest.approx(4e-3)
 
 
+def observed(**values):
+    """What a run observed, of a whole motion unless told otherwise."""
+    whole = {"diverged_at_s": None, "inverted_cells": 0, "margin": None, "step_s": 1e-3}
+    return vars(Observed(**whole | values))
+
+
 @pytest.mark.parametrize(("away", "status"), [(0.019, "not resolved"), (0.021, "resolved")])
 def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, stated):
     seen = stated.problem.observation
     field = np.ones((len(seen.volume_points), 3))
     curves = np.ones((len(seen.times), len(seen.probes), 3))
-    known = Reference(field, curves, 0.02, np.full(len(seen.probes), 0.02))
-    value = {
-        "field": plain((1 + away) * field),
-        "curves": plain((1 + away) * curves),
-        "margin": None,
-        "inverted_cells": 0,
-    }
+    known = Truth(field, curves, 0.02, np.full(len(seen.probes), 0.02))
+    value = observed(field=plain((1 + away) * field), curves=plain((1 + away) * curves))
     task = Task("study.tradeoff.observation:observe", {})
     found = errors(Outcome(task, "done", value, "", 0.0), known, stated)
     assert found.status == status
@@ -236,7 +274,7 @@ def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, stat
 def test_cells_turned_inside_out_and_steps_beyond_the_limit_leave_no_error(
     margin, inverted, status
 ):
-    value = {"field": [1.0], "curves": [1.0], "margin": margin, "inverted_cells": inverted}
+    value = observed(field=[1.0], curves=[1.0], margin=margin, inverted_cells=inverted)
     task = Task("study.tradeoff.observation:observe", {})
     found = errors(Outcome(task, "done", value, "", 0.0), None, None)
     assert (found.status, found.field) == (status, None)
@@ -252,9 +290,7 @@ def test_control_points_have_one_order_here_and_in_a_run(stated):
 
 def stepped(stated, configuration, seconds):
     """Displacement of the nodes after a time, as the timing steps to it."""
-    ready = contender(configuration.contender).prepare(
-        stated.scene, stated.problem, configuration.settings
-    )
+    ready = configuration.model(stated.scene).prepare(stated.problem).stepper()
     for _ in range(round(seconds / ready.step)):
         ready.take_step()
     return ready.displacement()
@@ -262,17 +298,15 @@ def stepped(stated, configuration, seconds):
 
 def ran(stated, configuration, seconds):
     """Displacement of the control points after a time, as the errors have it."""
-    found = contender(configuration.contender).run(
-        stated.scene, stated.problem, configuration.settings
-    )
+    found = configuration.model(stated.scene).prepare(stated.problem).simulate()
     return found.trajectory.displacement[round(seconds / SAMPLING)]
 
 
 def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
     settings = {"spacing": 0.01, "volume_term": True, "step_rate": 2000.0}
     one = Configuration("step-sizes", settings)
-    lattice = assemble(with_settings(stated.scene, settings), stated.problem).lattice
-    at_probes = lattice.interpolation(stated.problem.observation.probes)[0]
+    net = one.model(stated.scene).prepare(stated.problem).assembly.lattice
+    at_probes = net.interpolation(stated.problem.observation.probes)[0]
     expected = ran(stated, one, 0.2)
     found = at_probes @ stepped(stated, one, 0.2)
     scale = np.abs(expected).max()
@@ -284,8 +318,8 @@ def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
 
 @pytest.mark.parametrize("one", [LINEAR, RITZ], ids=lambda one: one.contender)
 def test_what_is_timed_are_the_elements_whose_error_is_measured(one, stated):
-    element, level = one.settings.get("element", "p2"), one.settings["level"]
-    body = build(stated.scene, stated.problem, element, level, "tr-bdf2")
+    prepared = one.model(stated.scene).prepare(stated.problem)
+    body = prepared.body() if one is LINEAR else prepared.body
     at_probes = evaluation(body, stated.problem.observation.probes)
     expected = ran(stated, one, 0.2)
     scale = np.abs(expected).max()

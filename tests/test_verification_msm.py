@@ -243,14 +243,16 @@ def test_compiled_law_equals_the_plain_one(law):
 
 def test_benchmark_scaling_keeps_the_modulus_at_every_spacing():
     """K (h / h_0)^2 per length h: k_ref / h, and so E = 2.5 k_ref / h, does not change."""
-    from study.run.lattices import benchmark
-
+    from study.models import table
     from study.scene.file import read_scene
 
     for spacing in ("5 mm", "10 mm", "20 mm"):
         scene = read_scene("liver", [f"lattice.spacing={spacing}"])
-        found = benchmark(scene, scene.lattice.spacing)
-        material, h = found.material, scene.lattice.spacing
+        h = scene.lattice.spacing
+        size = (2 * h, 2 * h, 2 * h)
+        mesh = build(MeshBody(block_mesh(size, h)), np.zeros(3), np.array(size), h)
+        found = table.model(scene, "basafa").make(scene, mesh)
+        material = found.material
         assert 2.5 * material.law.k1 / h == pytest.approx(found.modulus)
         assert found.modulus == pytest.approx(4132, abs=1)
         assert material.damping.gamma_0 == pytest.approx(2 / (1054 * 0.0055**3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -24,8 +24,7 @@ class Choice:
 
     def names(self) -> tuple[str, ...]:
         """The keys of the table, in its order."""
-        module, _, name = self.table.partition(":")
-        found: Mapping[str, object] = getattr(import_module(module), name)
+        found: Mapping[str, object] = resolve_name(self.table)
         return tuple(found)
 
     def read(self, value: object) -> str:

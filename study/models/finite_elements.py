@@ -166,13 +166,13 @@ class PreparedElements:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
         levels = [geometry.level(k) for k in range(-COARSER, 1)]
-        solved = [self._solved_on(level, progress) for level in levels if level is not None]
+        solved = [self.solved_on(level, progress) for level in levels if level is not None]
         error = mesh_error(self.problem, solved)
         while is_too_coarse(accuracy, error):
             finer = self._finer(solved[-1].level, next_size(accuracy, error))
             if finer is None:
                 break
-            solved.append(self._solved_on(finer, progress))
+            solved.append(self.solved_on(finer, progress))
             error = mesh_error(self.problem, solved)
         return solved, error
 
@@ -184,7 +184,8 @@ class PreparedElements:
                 found = level
         return found
 
-    def _solved_on(self, level: Level, progress: Progress) -> MeshSolution:
+    def solved_on(self, level: Level, progress: Progress) -> MeshSolution:
+        """Body and motion on one of the organ's meshes."""
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
             body = self.body(level)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib import import_module
+from pkgutil import resolve_name
 
 from study.models.model import Estimates, Model, ModelKind, PointModel
 from study.scene import Scene
@@ -22,8 +22,7 @@ def kind(name: str) -> ModelKind:
     """The kind of a name. ValueError with the names there are."""
     if name not in MODELS:
         raise ValueError(f"models: {name!r} is no model; there are {', '.join(MODELS)}")
-    module, _, attribute = MODELS[name].partition(":")
-    found: ModelKind = getattr(import_module(module), attribute)
+    found: ModelKind = resolve_name(MODELS[name])
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from study.models.estimates import FuzzySide, run_fuzzy
 from study.models.large_strain import STRAIN_LIMIT
-from study.models.model import SILENT, ModelRun, Watch
+from study.models.model import SILENT, ModelRun, Prepared, Watch
 from study.models.table import kind, models_of, named, point_models_of
 from study.problem.problem import Problem
 from study.problem.response import Response
@@ -65,13 +65,15 @@ def _on_point(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
 def _on_organ(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
     with watch.progress.stage("organ"):
         problem = problem_of(scene)
+    ready: dict[str, Prepared] = {}
+    for model in models_of(scene, fuzzy.estimates):  # all before any runs: one may be refused
+        with watch.progress.stage(f"{model.name}: set up"):
+            ready[model.name] = model.prepare(problem)
     runs: dict[str, ModelRun] = {}
     limits = None
-    for model in models_of(scene, fuzzy.estimates):
-        with watch.progress.stage(f"{model.name}: set up"):
-            prepared = model.prepare(problem)
-        runs[model.name] = prepared.run(watch)
-        if model.name == "fem" and fuzzy.estimates:
+    for name, prepared in ready.items():
+        runs[name] = prepared.run(watch)
+        if name == "fem" and fuzzy.estimates:
             from study.run.limits import lattice_limits
 
             limits = lattice_limits(scene, problem, prepared, watch.progress)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import ast
 import functools
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 DYNAMIC = ("import_module", "__import__", "iter_modules", "walk_packages", "run_module")
 """A source with one of these words may load modules by a name that no source states."""
+TABLED = re.compile(r"([a-z]\w*(?:\.\w+)*):[A-Z]\w*")
+"""A text such as "msm.integrators:INTEGRATORS", whose module is loaded when it is resolved."""
 
 
 def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
     """Sources under these folders that a module can come to import, itself included, by name.
 
-    Imports within functions count. A module that may load others by name is taken to load all of
-    its package.
+    Imports within functions count, and texts that name an object as "module:NAME". A module that
+    may load others by name is taken to load all of its package.
     """
     found: dict[str, Path] = {}
     waiting = {module}
@@ -53,7 +56,10 @@ def _named(name: str, path: Path) -> frozenset[str]:
 
 
 def _imported(node: ast.AST, package: str) -> Iterator[str]:
-    """Absolute names in an import; of `from a import b` both a and a.b, as b may be a module."""
+    """Absolute names in an import; of `from a import b` both a and a.b, as b may be a module.
+
+    Of a text "a:NAME" it is a.
+    """
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
@@ -61,6 +67,9 @@ def _imported(node: ast.AST, package: str) -> Iterator[str]:
         base = ".".join(filter(None, (above, node.module)))
         yield base
         yield from (f"{base}.{alias.name}" for alias in node.names)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        named = TABLED.fullmatch(node.value)
+        yield from [] if named is None else [named[1]]
 
 
 def _members(package: str, folder: Path) -> Iterator[str]:

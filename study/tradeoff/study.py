@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from study.folders import replacing
@@ -128,7 +128,8 @@ def costs(
 
 
 def _stepper(given: Stated, one: Configuration) -> Stepper:
-    return one.model(given.scene).prepare(given.problem).stepper()
+    """Set up afresh: a lattice keeps what it assembled for the same problem."""
+    return one.model(given.scene).prepare(replace(given.problem)).stepper()
 
 
 def step_of(outcome: Outcome) -> float:

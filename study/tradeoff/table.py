@@ -72,7 +72,7 @@ class Cost:
         return low / self.step, middle / self.step, high / self.step
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a front is of these, not of any that are equal
 class Entry:
     """A configuration with its errors and, where it was timed, its cost.
 

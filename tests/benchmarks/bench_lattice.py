@@ -30,7 +30,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
-from study.run.lattices import node_damping
 
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import reference_stiffness
@@ -44,6 +43,7 @@ from msm.springs import connect
 from msm.stability import critical_time_step
 from msm.timestep import LOOK
 from msm.volume import volume_term
+from study.models.damping import nodal_damping
 from study.scene.file import read_scene
 from tests.benchmarks import field_error
 
@@ -257,7 +257,7 @@ class Liver(NamedTuple):
 
 def liver(case: field_error.Case, assembly: Assembly, nu: float) -> Liver:
     """The lattice of `field_error` with the damping of eq. (2), as the study sets it."""
-    damping = node_damping(read_scene("liver"), case.youngs_modulus)
+    damping = nodal_damping(read_scene("liver"), case.youngs_modulus)
     stiff = field_error.material(case, assembly, nu, with_volume=True)
     material = Material(stiff.law, stiff.volume, damping)
     return Liver(assembly, material, critical_time_step(assembly, material))

@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from study.models.finite_elements import models
+from study.models.mesh_error import mesh_error
 from study.progress import Silent
-from study.run import reference
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
@@ -86,25 +87,27 @@ def rows(name: str) -> Iterator[Row]:
     scene = read_scene(base, ('models=["fem"]', *overrides))
     posed = problem_of(scene)
     levels = [found for k in range(-2, FINEST + 1) if (found := posed.geometry.level(k))]
-    solved = [reference.solved_on(scene, posed, level, Silent()) for level in levels]
+    (reference,) = models(scene, {})
+    prepared = reference.prepare(posed)
+    solved = [prepared.solved_on(level, Silent()) for level in levels]
     truth, volumes = solved[-1].found.trajectory, posed.volume_rule.weights
     for last in range(2, len(solved) - 2):
-        errors = reference.mesh_errors(scene, posed, solved[: last + 1])
+        errors = mesh_error(posed, solved[: last + 1])
         run = solved[last].found.trajectory
         if errors is None:
             continue
         for i, probe in enumerate(posed.probes):
-            for kind in reference.KINDS:
-                one, ours, exact = (
-                    errors.by_probe[probe][kind],
-                    getattr(run, kind),
-                    getattr(truth, kind),
+            for kind in ("displacement", "velocity"):
+                stated, order, ours, exact = (
+                    getattr(one, kind)
+                    for one in (errors.by_probe[probe], errors.order_by_probe[probe], run, truth)
                 )
                 every = np.ones(len(exact))
                 true = relative_l2(ours[:, i], exact[:, i], every)
-                yield Row(name, last - 2, f"{kind}, {probe}", one.error, true, _order(one.observed))
+                yield Row(name, last - 2, f"{kind}, {probe}", stated, true, _order(order))
         true = relative_l2(run.volume_field[0], truth.volume_field[0], volumes)
-        yield Row(name, last - 2, "field", errors.field.error, true, _order(errors.field.observed))
+        order = _order(errors.field_order)
+        yield Row(name, last - 2, "field", errors.field_peak, true, order)
 
 
 def _order(observed: float | None) -> float:
