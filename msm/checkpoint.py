@@ -8,10 +8,11 @@ followed from, and what was recorded.
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import time
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,12 +99,17 @@ def identity(*things: object) -> str:
     return digest.hexdigest()
 
 
-def program() -> str:
-    """SHA-256 of this package's sources and the versions of what runs them."""
-    package = Path(__file__).parent
-    sources = sorted(package.rglob("*.py"))
+def program(*used: Callable[..., object]) -> str:
+    """SHA-256 of this package's sources and the versions of what runs them.
+
+    And of the files of functions that are `used`, for laws and integrators may come from elsewhere.
+    """
+    files = {Path(inspect.unwrap(function).__code__.co_filename) for function in used}
+    files |= set(Path(__file__).parent.rglob("*.py"))
     texts = tuple(
-        (str(source.relative_to(package)), source.read_text(encoding="utf-8")) for source in sources
+        (source.name, source.read_text(encoding="utf-8"))
+        for source in sorted(files)
+        if source.is_file()  # and not typed into a prompt
     )
     return identity(texts, np.__version__, numba.__version__)
 

@@ -3,6 +3,8 @@
 Numba keeps the type of a kernel's arguments in an index on disk, a named tuple as the name of its
 class. A spring law from outside the package would make that index unreadable for a process that
 cannot import it, and an edit of it would go unseen: its kernels are compiled in each process anew.
+So is an integrator from outside, for it would outlive changes of the kernels that it calls, which
+`msm.compiled` drops in this package's folders only.
 """
 
 from __future__ import annotations
@@ -33,20 +35,25 @@ class _OwnTypes(FunctionCache):  # type: ignore[misc] # numba publishes no types
 
 def _is_ours(sig: Any) -> bool:
     tuples = [kind.instance_class for kind in sig if hasattr(kind, "instance_class")]
-    return all(kind.__module__.partition(".")[0] == OURS for kind in tuples)
+    return all(map(_stands_here, tuples))
+
+
+def _stands_here(thing: Any) -> bool:
+    return bool(thing.__module__.partition(".")[0] == OURS)
 
 
 def kernel(
     *, nogil: bool = False, inline: Literal["never", "always"] = "never"
 ) -> Callable[[F], F]:
-    """Decorate a function as a compiled kernel that is kept on disk; the options are numba's.
+    """Decorate a function as a compiled kernel, kept on disk if it is this package's.
 
-    Division by zero follows IEEE.
+    The options are numba's. Division by zero follows IEEE.
     """
 
     def compiled(function: F) -> F:
         made = numba.njit(error_model="numpy", nogil=nogil, inline=inline)(function)
-        made._cache = _OwnTypes(function)  # what cache=True sets
+        if _stands_here(function):
+            made._cache = _OwnTypes(function)  # what cache=True sets
         return made  # type: ignore[no-any-return] # numba publishes no types
 
     return compiled

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
 from msm.lattice import LatticeMesh
+from msm.laws import force_law_of
 from msm.linearised import largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, critical_time_step
@@ -125,7 +126,8 @@ def _identity(
     history = stepper.factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
     seen = tuple(getattr(observation, field.name) for field in fields(observation))
     body = assembly.lattice.nodes, stepper.law, stepper.net
-    return identity(program(), body, integrator, step, seen, history)
+    runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
+    return identity(runs, body, integrator, step, seen, history)
 
 
 def _parts(motion: _Motion, stepper: Stepper, pace: Pace, recorder: _Recorder) -> dict[str, object]:

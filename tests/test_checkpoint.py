@@ -1,6 +1,7 @@
 """A run that is interrupted and continued is the run that was not."""
 
 import dataclasses
+import importlib
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from msm.assembly import Assembly, Material
 from msm.calibration import reference_stiffness
 from msm.checkpoint import Checkpoint
 from msm.damping import NodalDamping
+from msm.explicit import symplectic_euler
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
 from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, Stepper, critical_time_step, run
@@ -267,7 +269,7 @@ def test_another_history_of_the_load_or_another_watch_is_refused(tmp_path):
 def test_a_state_of_another_program_is_refused(tmp_path, monkeypatch):
     point = Checkpoint(tmp_path / "state.npz", seconds=1e9, resume=True)
     go(press(), checkpoint=point)
-    monkeypatch.setattr(model, "program", lambda: "later")
+    monkeypatch.setattr(model, "program", lambda *_: "later")
     with pytest.raises(ValueError, match="the program has changed"):
         go(press(), checkpoint=point)
 
@@ -309,6 +311,18 @@ def test_states_are_written_no_more_often_than_asked(tmp_path, monkeypatch):
 
 def test_keeping_states_does_not_change_a_run(pressed, tmp_path):
     assert_same(go(press(), checkpoint=Checkpoint(tmp_path / "state.npz", seconds=0.0)), pressed)
+
+
+def test_a_run_is_also_of_the_law_and_the_integrator_from_other_files(tmp_path, monkeypatch):
+    """As numba wraps them; nothing changes with a function of the package."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    source = tmp_path / "elsewhere.py"
+    source.write_text("import numba\n\n@numba.njit\ndef advance(x):\n    return x\n")
+    advance = importlib.import_module("elsewhere").advance
+    before = states.program(advance)
+    assert states.program(advance, symplectic_euler) == before != states.program()
+    source.write_text(source.read_text() + "# edited\n")
+    assert states.program(advance) != before
 
 
 # Step by step

@@ -12,6 +12,7 @@ from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
 from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS, UNBOUNDED, Integrator
+from msm.kernel import kernel
 from msm.lattice import build, interpolation, node_volumes
 from msm.laws import Basafa, Hooke
 from msm.model import Material, critical_time_step, run
@@ -425,13 +426,20 @@ def test_the_definite_tangent_is_positive_and_has_the_diagonal_it_says(rng):
 # An integrator from elsewhere ----------------------------------------------------------------
 
 
+@kernel(nogil=True)
 def leapfrog(law, net, factors, dt, u, v):
-    """Symplectic Euler once more, in plain Python, without damping."""
+    """Symplectic Euler once more, without damping."""
     force = np.empty_like(u)
-    for (factor,) in factors:
+    for n in range(len(factors)):
         internal_forces(law, net, u, force)
-        v += dt * (force + factor * net.load) / net.mass[:, None]
+        v += dt * (force + factors[n, 0] * net.load) / net.mass.reshape(-1, 1)
         u += dt * v
+
+
+def test_only_kernels_of_the_package_are_kept_on_disk():
+    """Others would outlive a change of what they call."""
+    assert leapfrog.stats.cache_path is None
+    assert "__pycache__" in INTEGRATORS["symplectic-euler"].advance.stats.cache_path
 
 
 def test_an_integrator_added_to_the_table_runs_with_nothing_else_told(monkeypatch):

@@ -201,6 +201,8 @@ def test_a_kernel_is_compiled_anew_when_another_file_changes(tmp_path):
 def package(tmp_path):
     """A package of one source with kernels and bytecode kept, just looked at."""
     (tmp_path / "laws.py").write_text("K = 1\n")
+    (tmp_path / "laws").mkdir()
+    (tmp_path / "laws" / "hooke.py").write_text("K = 10\n")
     kept = tmp_path / "__pycache__"
     kept.mkdir()
     compiled.drop_outdated(tmp_path)
@@ -218,7 +220,7 @@ def test_kernels_of_unchanged_sources_are_kept(package):
     assert kernels(package) == [".nbc", ".nbi", ".pyc"]
 
 
-@pytest.mark.parametrize("change", ["edited", "put back", "added", "removed"])
+@pytest.mark.parametrize("change", ["edited", "put back", "added", "removed", "deeper"])
 def test_kernels_of_changed_sources_are_dropped(package, change):
     source = package / "laws.py"
     if change == "edited":
@@ -227,6 +229,8 @@ def test_kernels_of_changed_sources_are_dropped(package, change):
         os.utime(source, (1e9, 1e9))
     elif change == "added":
         (package / "more.py").touch()
+    elif change == "deeper":
+        (package / "laws" / "hooke.py").write_text("K = 2\n")
     else:
         source.unlink()
     compiled.drop_outdated(package)
