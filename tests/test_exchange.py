@@ -14,7 +14,7 @@ from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from study import export as exporting
 from study.commands import app
-from study.export import Request, export
+from study.export import ExportRequest, export
 from study.progress import Silent
 from study.results.folder import Results, write
 from study.results.records import ElementsRecord
@@ -164,7 +164,7 @@ def test_a_vtu_file_reads_back_with_its_curved_elements_and_fields(tmp_path):
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("decks") / "out"
-    request = Request(target="block", to="calculix", out=folder, overrides=QUICK)
+    request = ExportRequest(target="block", to="calculix", out=folder, overrides=QUICK)
     return export(request, Silent())
 
 
@@ -201,13 +201,13 @@ def test_an_export_says_what_it_holds_and_can_be_written_again(exported):
     text = (exported / "README.txt").read_text()
     assert all(name in text for name in names - {"README.txt"})
     (exported / "static.dat").write_text("of an earlier comparison")
-    export(Request(target="block", to="vtu", out=exported, overrides=QUICK), Silent())
+    export(ExportRequest(target="block", to="vtu", out=exported, overrides=QUICK), Silent())
     assert {path.name for path in exported.iterdir()} == {"README.txt", "problem.vtu"}
 
 
 def test_a_problem_that_memory_does_not_hold_is_refused_and_nothing_written(tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "available", lambda: 1e6)
-    request = Request(target="block", to="calculix", out=tmp_path / "out", overrides=QUICK)
+    request = ExportRequest(target="block", to="calculix", out=tmp_path / "out", overrides=QUICK)
     with pytest.raises(ValueError, match=r"reference\.element_size: \d+ unknowns .* GiB"):
         export(request, Silent())
     assert not list(tmp_path.iterdir())
@@ -217,7 +217,7 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path):
     (tmp_path / "README.txt").write_text("mine")
     (tmp_path / "thesis.tex").write_text("mine too")
     with pytest.raises(ValueError, match=r"thesis\.tex, which no export wrote"):
-        export(Request(target="block", to="vtu", out=tmp_path, overrides=QUICK), Silent())
+        export(ExportRequest(target="block", to="vtu", out=tmp_path, overrides=QUICK), Silent())
     assert (tmp_path / "README.txt").read_text() == "mine"
 
 
@@ -227,7 +227,7 @@ def results_of(results, elements, folder):
     model = replace(results.model("fem"), elements=used)
     folder.mkdir()
     write(Results(results.scene, replace(results.record, models=(model,))), folder)
-    return Request(target=str(folder), to="vtu")
+    return ExportRequest(target=str(folder), to="vtu")
 
 
 @pytest.mark.parametrize("level", [0, 1])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.linalg import eigvals, eigvalsh, norm
 from scipy.sparse import csr_array, eye_array, kron
-from study.run.lattices import assemble
 
 from msm import springs as lattice_springs
 from msm import volume as volumes
@@ -19,6 +18,7 @@ from msm.model import Material, critical_time_step, run
 from msm.network import network
 from msm.relaxation import relax
 from msm.tangent import add_diagonal, add_product, empty_tangent, linearise, make_definite
+from study.models.lattice import assembled
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
 from study.scene.file import SceneError, read_scene
@@ -448,7 +448,7 @@ def test_an_integrator_added_to_the_table_runs_with_nothing_else_told(monkeypatc
     overrides = (*SMALL, "lattice.integrator=toy", 'models=["fem", "msm"]')
     scene = read_scene("block", overrides)
     posed = problem_of(scene)
-    assembly = assemble(scene, posed)
+    assembly = assembled(posed, scene.lattice)
     material = Material(Hooke(38.0))
     limits = [critical_time_step(assembly, material, name) for name in ("toy", "symplectic-euler")]
     assert limits[0] == pytest.approx(limits[1], rel=1e-12)

@@ -10,7 +10,6 @@ import numba
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from study.run.lattices import spring_law
 from study.run.outcome import Outcome
 
 from msm.calibration import reference_stiffness
@@ -32,6 +31,7 @@ from msm.laws import (
 from msm.network import network
 from msm.springs import connect
 from msm.volume import none
+from study.models.tissue import spring_law
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
 from study.run.assumptions import assumptions

@@ -9,8 +9,8 @@ from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
-from study.choice import Choice
 
+from study.annotation.choice import Choice
 from study.known.stability.cases import own_scene
 from study.models.estimates import estimates
 from study.models.finite_elements import PreparedElements

@@ -19,7 +19,7 @@ from study.sweep.plan import plan
 from study.sweep.program import ROOT, program
 from study.sweep.runner import How, run
 from study.sweep.store import Store
-from study.sweep.tally import Lines, Tally, duration, on_stderr
+from study.sweep.tally import Tally, TallyLines, duration, on_stderr
 from study.sweep.task import Task
 
 FUNCTIONS = "tests.sweep_tasks"
@@ -333,7 +333,7 @@ def test_progress_counts_stored_done_and_failed_and_says_how_long_it_takes(store
 
 def test_lines_are_sparse_where_stderr_is_no_terminal(store, capsys):
     with on_stderr("squares") as tell:
-        assert isinstance(tell, Lines)
+        assert isinstance(tell, TallyLines)
         run(squares(50), store, progress=tell)
     assert capsys.readouterr().err.splitlines() == ["squares: 0 of 50", "squares: 50 of 50"]
 
