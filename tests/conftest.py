@@ -51,8 +51,13 @@ def small_results(small_scene):
 
 
 @pytest.fixture(scope="session")
-def paper_results():
-    return run_study(read_scene("paper"), Silent())
+def paper_scene() -> Scene:
+    return read_scene("paper")
+
+
+@pytest.fixture(scope="session")
+def paper_results(paper_scene):
+    return run_study(paper_scene, Silent())
 
 
 @pytest.fixture
