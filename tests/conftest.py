@@ -50,8 +50,13 @@ def small_results(small_scene):
 
 
 @pytest.fixture(scope="session")
-def paper_results():
-    return run_study(read_scene("paper"))
+def paper_scene() -> Scene:
+    return read_scene("paper")
+
+
+@pytest.fixture(scope="session")
+def paper_results(paper_scene):
+    return run_study(paper_scene)
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ import numba
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from study.run.outcome import Outcome
 
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED
@@ -237,7 +236,7 @@ def test_a_scene_chooses_a_law_from_a_file_of_its_own(toy, tmp_path):
     assert spring_law(scene, 3.0) == toy.Toy(3.0, 2.0)
     (tmp_path / "scene.toml").write_text(write_scene(scene), encoding="utf-8")
     assert read_scene(str(tmp_path / "scene.toml")) == scene
-    told = " ".join(assumptions(scene, Outcome()))
+    told = " ".join(assumptions(scene, None))
     assert "springs follow the law toy of the scene with a = 2, from the stiffness" in told
 
 

@@ -26,7 +26,8 @@ from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import How
 from study.sweep.store import Store
-from study.tradeoff import recommend, reference, whole
+from study.tradeoff import recommend, reference
+from study.tradeoff import study as study_module
 from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import arguments, sampled, stated
@@ -232,7 +233,7 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
     spacing = 0.0125
     settings = {"spacing": spacing, "volume_term": True, "step_fraction": 0.8}
     chosen = Configuration("volume-springs", settings)
-    outcomes = whole.solved(sampled(scene), [chosen], Store(tmp_path / "runs"), How())
+    outcomes = study_module.solved(sampled(scene), [chosen], Store(tmp_path / "runs"), How())
     given = stated(**arguments(sampled(scene)))
     known = reference.truth(outcomes[0].value, given)
     measured = errors(outcomes[1], known, given)

@@ -21,7 +21,8 @@ from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import problem as problem_module
 from study.tradeoff import recommend as advice
-from study.tradeoff import table, whole
+from study.tradeoff import study as study_module
+from study.tradeoff import table
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
@@ -55,7 +56,7 @@ CHOSEN = [*VOLUME, LINEAR, RITZ, TOO_LONG, NO_MESH]
 def found(tmp_path_factory):
     scene = sampled(read_scene("block", SMALL))
     store = Store(tmp_path_factory.mktemp("runs"))
-    return whole.study(scene, CHOSEN, store, How(), 2, Silent())
+    return study_module.study(scene, CHOSEN, store, How(), 2, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -127,8 +128,8 @@ def test_a_superposition_follows_one_load_and_stays_off_the_front_of_those_that_
 
 def test_the_table_is_read_back_with_all_columns(found, tmp_path):
     scene = sampled(read_scene("block", SMALL))
-    whole.write(found, scene, 2, tmp_path / "out")
-    with (tmp_path / "out" / whole.TABLE).open(newline="") as file:
+    study_module.write(found, scene, 2, tmp_path / "out")
+    with (tmp_path / "out" / study_module.TABLE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == table.COLUMNS
     assert [row["status"] for row in rows] == [one.errors.status for one in found.entries]
@@ -211,7 +212,7 @@ def test_a_setup_is_that_of_a_lattice_of_its_own(stated, monkeypatch):
 
     monkeypatch.setattr(lattice.msm, "assemble", counting)
     same = [VOLUME[0], Configuration("step-sizes", {**VOLUME[0].settings, "step_fraction": 0.4})]
-    whole.costs(stated, same, [1e-3, 1e-3], 1, Silent())
+    study_module.costs(stated, same, [1e-3, 1e-3], 1, Silent())
     assert len(built) == 2 * len(same)  # of each contender one to warm up
 
 
