@@ -238,17 +238,18 @@ def verify(
     as_json
         Print JSON instead of a table.
     """
-    from study.known import verify as verifying
+    from study.known import request, table
     from study.progress import on_stderr
 
     if out is not None and not out.parent.is_dir():
         raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")
     with on_stderr() as progress:
-        verdicts = verifying.verify(progress, quick=quick)
+        verdicts = request.verify(progress, quick=quick)
     if out is not None:
-        verifying.write_csv(verdicts, out)
-    print(verifying.as_json(verdicts) if as_json else "\n".join(verifying.table(verdicts)))
-    if not all(verdict.passed for verdict in verdicts):
+        table.write_verification(verdicts, out)
+    lines = [table.verification_json(verdicts)] if as_json else table.verification_lines(verdicts)
+    print("\n".join(lines))
+    if not request.all_passed(verdicts):
         sys.exit(EXIT_FAILED_CHECK)
 
 
@@ -385,11 +386,11 @@ def stability(
     quick
         Only a part of the cases, half a minute.
     """
-    from study.known.stability import request as asked
-    from study.known.stability import table
+    from study.known import request as asked
+    from study.known import table
     from study.sweep.tally import on_stderr
 
-    request = asked.Request(
+    request = asked.StabilityRequest(
         scene=scene,
         out=out,
         workers=sweep.workers,
@@ -403,10 +404,10 @@ def stability(
         verdicts = asked.study(request, progress)
     from reports.stability_map import write_figures
 
-    print("\n".join(table.lines(verdicts)))
+    print("\n".join(table.stability_lines(verdicts)))
     print(f"table in {request.folder / table.NAME}")
     print("\n".join(map(str, write_figures(request.folder))))
-    if not all(verdict.passed for verdict in verdicts):
+    if not asked.all_passed(verdicts):
         sys.exit(EXIT_FAILED_CHECK)
 
 

@@ -18,8 +18,8 @@ from msm.relaxation import relax
 from msm.stability import DEFAULT
 from msm.statics import static_displacement
 from msm.timestep import whole_steps
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known.case import Case
+from study.known.finding import Finding, beside, value
 from study.known.stability.growth import longest_stable_step
 from study.problem.problem import Problem
 from study.run import lattices
