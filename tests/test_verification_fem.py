@@ -182,6 +182,22 @@ def early_end_of_iterations(monkeypatch):
     monkeypatch.setattr(iterations, "TOLERANCE", 1e-4)
 
 
+@pytest.fixture
+def coarser(monkeypatch):
+    """The two dearest problems on the coarsest meshes that hold their limits."""
+    monkeypatch.setattr(half_space, "CASES", (("taylor-hood", 0.4999),))
+    monkeypatch.setattr(half_space, "CELLS", (3, 6))
+    monkeypatch.setattr(bent_bar, "CASES", (("p2", 0.3),))
+    monkeypatch.setattr(bent_bar, "CELLS", (0.01, 0.02 / 3))
+
+
+@pytest.mark.usefixtures("coarser")
+@pytest.mark.parametrize("problem", [half_space.findings, bent_bar.findings])
+def test_nothing_is_seen_on_coarser_meshes_where_nothing_is_planted(problem):
+    assert not fails(problem)
+
+
+@pytest.mark.usefixtures("coarser")
 @pytest.mark.parametrize(
     ("plant", "problem"),
     [

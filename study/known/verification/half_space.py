@@ -44,6 +44,8 @@ CASES: tuple[tuple[ElementName, float], ...] = (
     ("p2", 0.45),
     ("taylor-hood", 0.4999),
 )
+CELLS = (4, 8)
+"""Cells along an edge of the block."""
 MEAN, CENTRE = 393216.0 / (155925.0 * np.pi), 16.0 / 15.0
 """Depth over (1 - nu^2) p a / E."""
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -53,7 +55,7 @@ def findings() -> Iterator[Finding]:
     """Mean depth of the half space's surface under the tool, and that at its centre."""
     for name, nu in CASES:
         tissue = Tissue(poisson_ratio=nu)
-        found = np.array([depths(name, tissue, cells) for cells in (4, 8)])
+        found = np.array([depths(name, tissue, cells) for cells in CELLS])
         scale = (1.0 - nu**2) * PRESSURE * RADIUS / tissue.youngs_modulus
         for what, share, limit, ours in zip(
             ("mean depth", "depth at the centre"),

@@ -57,7 +57,6 @@ def _case(name: str, nu: float | None, *, linear: bool, steps: int) -> Case:
         {"integrator": name, "nu": nu, "linear": linear, "steps": steps},
         RESOLVED,
         expected="bounded",
-        seconds=60.0,
         quick=steps < 1e5,
     )
 
