@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 # Two BLAS threads spin against each other on small factors; must be set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -32,6 +33,14 @@ def pytest_addoption(parser):
         action="store_true",
         help="rewrite tests/data/scores.json from this run; review the difference",
     )
+
+
+@pytest.fixture
+def heeding_interrupts():
+    """Children started meanwhile heed SIGINT, which a shell lets its background jobs ignore."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

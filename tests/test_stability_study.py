@@ -11,16 +11,19 @@ import pytest
 
 from fem_reference.elasticity import discretise
 from study.commands import EXIT_FAILED_CHECK, app
-from study.known.stability import request as asked
-from study.known.stability import suite, table
-from study.known.stability.case import Case, judge
+from study.known import request as asked
+from study.known import table
+from study.known.case import Case, CaseVerdict, Family
+from study.known.finding import Finding, at_most, beside, error_of, value
+from study.known.request import tried
 from study.known.stability.cases import collapse, critical_step, drift, fixed_step, lattice_shapes
-from study.known.stability.finding import Finding, at_most, beside, value
-from study.known.stability.trial import trial
+from study.known.suite import PROBLEMS, stability_cases
+from study.known.trial import attempted, trial
 from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.tissue import Tissue
+from study.progress import Silent
 from study.scene.file import read_scene
 from study.sweep.runner import Outcome
 
@@ -30,13 +33,13 @@ HERE = "tests.test_stability_study"
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory):
-    request = asked.Request(quick=True, out=tmp_path_factory.mktemp("stability") / "table")
+    request = asked.StabilityRequest(quick=True, out=tmp_path_factory.mktemp("stability") / "table")
     return request, asked.study(request)
 
 
 def verdict(case):
     """Of a case run here and now, with whatever is planted."""
-    return judge(case, Finding(**trial(case.function, case.arguments, case.seconds)))
+    return tried(case, Silent())
 
 
 def named(family, name):
@@ -54,7 +57,7 @@ def test_the_quick_cases_are_all_as_expected(quick):
 
 
 def test_every_family_has_a_quick_case(quick):
-    families = {case.family for case in suite.cases(read_scene("block"))}
+    families = {case.family for case in stability_cases(read_scene("block"))}
     assert {verdict.case.family for verdict in quick[1]} == families
 
 
@@ -63,7 +66,7 @@ def test_the_table_has_a_row_for_each_case(quick):
     with (request.folder / table.NAME).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["case"] for row in rows] == [verdict.case.name for verdict in verdicts]
-    assert tuple(rows[0]) == table.COLUMNS
+    assert tuple(rows[0]) == table.STABILITY
 
 
 def test_what_is_stored_is_not_run_again(quick):
@@ -75,7 +78,7 @@ def test_what_is_stored_is_not_run_again(quick):
 
 
 def test_no_two_cases_share_a_name():
-    every = [(case.family, case.name) for case in suite.cases(read_scene("block"))]
+    every = [(case.family, case.name) for case in stability_cases(read_scene("block"))]
     assert len(set(every)) == len(every)
 
 
@@ -83,7 +86,7 @@ def test_the_committed_list_is_that_of_this_study_and_all_of_it_passed():
     with COMMITTED.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) >= 150
-    now = [(c.family, c.name, c.expectation) for c in suite.cases(read_scene("block"))]
+    now = [(c.family, c.name, c.expectation) for c in stability_cases(read_scene("block"))]
     assert [(row["family"], row["case"], row["expected"]) for row in rows] == now
     assert {row["passed"] for row in rows} == {"True"}
     assert all(row["message"] for row in rows if row["outcome"] == "refused")
@@ -138,7 +141,7 @@ def steady():
 
 def drift_verdict(energies):
     case = next(iter(drift.cases()))
-    return judge(case, drift.verdict(energies)).passed
+    return case.judge(drift.verdict(energies))
 
 
 def test_a_drift_of_half_a_percent_is_caught():
@@ -197,41 +200,65 @@ def valuing(tolerance=0.01):
 
 
 def test_a_refusal_that_returns_a_number_is_caught():
-    assert not judge(refusing(), value(0.0, 0.0)).passed
+    assert not refusing().judge(value(0.0, 0.0))
 
 
 def test_a_refusal_has_to_name_what_is_wrong():
-    assert judge(refusing(), Finding("refused", message="naming it, and the remedy")).passed
-    assert not judge(refusing(), Finding("refused", message="shapes not aligned")).passed
+    assert refusing().judge(Finding("refused", message="naming it, and the remedy"))
+    assert not refusing().judge(Finding("refused", message="shapes not aligned"))
 
 
 @pytest.mark.parametrize("number", [1.02, 0.98, np.nan, np.inf, -1.0])
 def test_a_number_beyond_its_tolerance_is_caught(number):
-    assert judge(valuing(), value(1.0, 1.009)).passed
-    assert not judge(valuing(), value(1.0, number)).passed
+    assert valuing().judge(value(1.0, 1.009))
+    assert not valuing().judge(value(1.0, number))
 
 
 def test_a_number_without_anything_beside_it_is_caught():
-    assert not judge(valuing(), Finding("value", measured=1.0)).passed
+    assert not valuing().judge(Finding("value", measured=1.0))
 
 
 def test_an_ending_that_was_not_expected_is_caught():
-    assert not judge(valuing(), value(1.0, 1.0, ending="diverged")).passed
+    assert not valuing().judge(value(1.0, 1.0, ending="diverged"))
 
 
 def test_a_field_that_is_not_finite_is_caught():
-    assert not judge(valuing(), beside(np.ones(3), np.array([1.0, np.nan, 1.0]))).passed
-    assert not judge(valuing(), at_most(1.0, np.nan, ending="value")).passed
-    assert judge(valuing(), at_most(1.0, -5.0, ending="value")).passed
+    assert not valuing().judge(beside(np.ones(3), np.array([1.0, np.nan, 1.0])))
+    assert not valuing().judge(at_most(1.0, np.nan, ending="value"))
+    assert valuing().judge(at_most(1.0, -5.0, ending="value"))
 
 
 @pytest.mark.parametrize(
     "settings",
-    [{}, {"expected": "refused"}, {"expected": "refused", "says": "x", "tolerance": 1.0}],
+    [
+        {},
+        {"expected": "refused"},
+        {"says": "x"},
+        {"expected": "refused", "says": "x", "tolerance": 1.0},
+        {"source": "a book", "tolerance": 1.0},
+        {"expected": "refused", "source": "a book"},
+    ],
 )
 def test_a_case_without_a_criterion_is_refused(settings):
     with pytest.raises(ValueError, match="give a refusal what it says"):
         Case(family="f", name="n", function="m:f", **settings)
+
+
+def test_a_case_cannot_set_its_own_tolerance():
+    assert not valuing().judge(error_of("x", 0.02, limit=0.05))
+    assert valuing().judge(error_of("x", 0.02)) is False
+
+
+def test_a_case_that_finds_nothing_has_failed():
+    assert not CaseVerdict(PROBLEMS[0], ()).passed
+
+
+def test_a_family_names_functions_of_its_module_and_runs_its_refusals_always():
+    family = Family("f", HERE)
+    held, refused = family.case("n", "broken", {}, 0.1), family.case("n", "broken", {}, "why")
+    assert held.function == refused.function == f"{HERE}:broken"
+    assert (held.expectation, refused.expectation) == ("value, within 0.1", "refused, naming why")
+    assert (held.quick, refused.quick) == (False, True)
 
 
 # How a case is run ----------------------------------------------------------------------------
@@ -265,13 +292,13 @@ def not_finite():
     ],
 )
 def test_a_hang_a_warning_and_a_traceback_are_errors(function, message):
-    found = trial(f"{HERE}:{function}", {}, 0.2)
-    assert found["ending"] == "error"
-    assert message in found["message"]
+    (found,) = attempted(f"{HERE}:{function}", {}, 0.2)
+    assert found.ending == "error"
+    assert message in found.message
 
 
 def test_numbers_that_are_not_finite_are_missing():
-    found = trial(f"{HERE}:not_finite", {}, 5.0)
+    (found,) = trial(f"{HERE}:not_finite", {}, 5.0)["findings"]
     assert found["measured"] is found["difference"] is None
 
 
@@ -338,6 +365,6 @@ def test_a_scene_without_a_lattice_is_bad_input(tmp_path):
 def test_a_case_that_is_not_as_expected_is_a_failed_check(monkeypatch, tmp_path, capsys):
     wrong = named(lattice_shapes, "share left out: apart")
     wrong = dataclasses.replace(wrong, expected="bounded")
-    monkeypatch.setattr(asked, "cases", lambda *_, **__: [wrong])
+    monkeypatch.setattr(asked, "stability_cases", lambda *_, **__: [wrong])
     assert ask("--out", str(tmp_path / "table")) == EXIT_FAILED_CHECK
     assert "NOT AS EXPECTED: lattice shapes: share left out: apart" in capsys.readouterr().out

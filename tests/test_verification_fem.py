@@ -16,6 +16,10 @@ from fem_reference.model import build
 from fem_reference.observation import at_points, evaluation, largest_strain
 from fem_reference.solvers import solve_static
 from fem_reference.stiffness import Stiffness
+from study.known.case import Case
+from study.known.finding import convergence, error_of
+from study.known.request import tried
+from study.known.suite import PROBLEMS
 from study.known.verification import (
     bent_bar,
     column,
@@ -28,18 +32,20 @@ from study.known.verification import (
     thick_sphere,
     torsional_modes,
 )
-from study.known.verification.finding import Finding, convergence
-from study.known.verification.suite import PROBLEMS
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
+from study.progress import Silent
 
 SIZE = (0.06, 0.05, 0.04)
 DOWN = np.array([0.0, 0.0, -1.0])
 TISSUE = Tissue(youngs_modulus=5e3, poisson_ratio=0.3, density=1060.0)
+
+
+POSED = Case(family="f", name="n", function="m:f", source="a book")
 
 
 def foundation(stiffness=1e6):
@@ -67,23 +73,23 @@ def body(nu=0.3, element_size=0.02, mesh=None, element="p2"):
     ],
 )
 def test_the_reference_solves(problem):
-    found = list(problem.findings())
-    assert found
-    assert not [finding for finding in found if not finding.passed]
+    found = tried(problem, Silent())
+    assert found.findings
+    assert not [finding for finding, passed in found.judged if passed is False]
 
 
 def test_a_finding_out_of_its_limit_or_not_a_number_fails():
-    assert Finding("x", 0.1, 0.1).passed
-    assert not Finding("x", 0.11, 0.1).passed
-    assert not Finding("x", float("nan"), 0.1).passed
-    assert Finding("x", 0.5).passed  # shown, not judged
+    assert POSED.judge(error_of("x", 0.1, 0.1)) is True
+    assert POSED.judge(error_of("x", 0.11, 0.1)) is False
+    assert POSED.judge(error_of("x", float("nan"), 0.1)) is False
+    assert POSED.judge(error_of("x", 0.5)) is None  # shown, not judged
 
 
 def test_a_lower_order_fails_whatever_the_error():
     error, order = convergence("x", [4e-9, 2e-9], 2, 0.1, 1e-3)
-    assert error.passed
-    assert not order.passed
-    assert order.ours == pytest.approx(1.0)
+    assert POSED.judge(error)
+    assert not POSED.judge(order)
+    assert order.measured == pytest.approx(1.0)
 
 
 # --- errors planted in the reference --------------------------------------------------------------
@@ -92,7 +98,7 @@ def test_a_lower_order_fails_whatever_the_error():
 def fails(problem):
     """Whether a finding is out of its limit or, as for the command, the problem is not solved."""
     try:
-        return any(not finding.passed for finding in problem())
+        return any(POSED.judge(finding) is False for finding in problem())
     except ValueError:
         return True
 
@@ -178,6 +184,22 @@ def early_end_of_iterations(monkeypatch):
     monkeypatch.setattr(iterations, "TOLERANCE", 1e-4)
 
 
+@pytest.fixture
+def coarser(monkeypatch):
+    """The two dearest problems on the coarsest meshes that hold their limits."""
+    monkeypatch.setattr(half_space, "CASES", (("taylor-hood", 0.4999),))
+    monkeypatch.setattr(half_space, "CELLS", (3, 6))
+    monkeypatch.setattr(bent_bar, "CASES", (("p2", 0.3),))
+    monkeypatch.setattr(bent_bar, "CELLS", (0.01, 0.02 / 3))
+
+
+@pytest.mark.usefixtures("coarser")
+@pytest.mark.parametrize("problem", [half_space.findings, bent_bar.findings])
+def test_nothing_is_seen_on_coarser_meshes_where_nothing_is_planted(problem):
+    assert not fails(problem)
+
+
+@pytest.mark.usefixtures("coarser")
 @pytest.mark.parametrize(
     ("plant", "problem"),
     [

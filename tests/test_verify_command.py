@@ -1,36 +1,60 @@
 """`liver-study verify`, as a person uses it."""
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
 
 import pytest
 
 from study.commands import EXIT_FAILED_CHECK, app
-from study.known import verify as verifying
-from study.known.verification.finding import Finding, Problem
-from study.known.verification.suite import PROBLEMS
+from study.known import request, table
+from study.known.case import Case
+from study.known.finding import error_of, number_of
+from study.known.suite import PROBLEMS
 from study.progress import Silent
 
 ROOT = Path(__file__).resolve().parent.parent
-GOOD = Problem(
-    "good", "a book", lambda: iter([Finding("depth [m]", 1e-4, 1e-3, 2.0, 2.0002, order=2.98)])
-)
-SHOWN = Problem("shown", "a paper", lambda: iter([Finding("depth, p1", 0.5)]), quick=False)
-BAD = Problem("bad", "a book", lambda: iter([Finding("depth [m]", 2e-3, 1e-3, 2.0, 2.004)]))
 
 
-def unsolvable():
+def problem(name, *, quick=True):
+    """Posed by the function of that name below."""
+    function = f"tests.test_verify_command:{name}"
+    return Case(family="f", name=name, function=function, source="a book", quick=quick)
+
+
+def good():
+    yield number_of("depth [m]", 2.0, 2.0002, 1e-3, order=2.98)
+
+
+def shown():
+    yield error_of("depth, p1", 0.5)
+
+
+def bad():
+    yield error_of("depth [m], rounded", 1e-9, 1e-3)
+    yield number_of("depth [m]", 2.0, 2.004, 1e-3)
+
+
+def unsolved():
+    yield error_of("depth [m]", 1e-9, 1e-3)
     raise ValueError("the stiffness is singular")
 
 
-UNSOLVED = Problem("unsolved", "a book", unsolvable)
+def endless():
+    while True:
+        pass
+
+
+GOOD, SHOWN, BAD = problem("good"), problem("shown", quick=False), problem("bad")
+UNSOLVED = problem("unsolved")
+ENDLESS = dataclasses.replace(problem("endless"), seconds=0.1)
 
 
 @pytest.fixture
 def problems(monkeypatch):
     def use(*chosen):
-        monkeypatch.setattr(verifying, "PROBLEMS", chosen)
+        monkeypatch.setattr(request, "PROBLEMS", chosen)
 
     return use
 
@@ -53,7 +77,7 @@ def test_a_table_shows_exact_value_ours_error_order_and_limit(problems, capsys):
     assert "all 2 findings" in out
 
 
-@pytest.mark.parametrize("problem", [BAD, UNSOLVED])
+@pytest.mark.parametrize("problem", [BAD, UNSOLVED, ENDLESS])
 def test_one_failure_ends_with_exit_code_1_and_its_name(problem, problems, capsys):
     problems(GOOD, problem)
     code, out = verify(capsys)
@@ -71,6 +95,7 @@ def test_json_is_strict_and_says_what_failed(problems, capsys):
     assert [one["passed"] for one in found["problems"]] == [True, False, False]
     assert found["problems"][0]["findings"][0]["order"] == 2.98
     assert found["problems"][2]["findings"][0]["error"] is None
+    assert found["problems"][2]["findings"][0]["limit"] == 0.0
     assert "singular" in found["problems"][2]["findings"][0]["quantity"]
 
 
@@ -87,8 +112,8 @@ def test_the_csv_file_holds_a_row_per_finding(problems, capsys, tmp_path):
     assert code == EXIT_FAILED_CHECK  # and written nevertheless
     with (tmp_path / "found.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == verifying.COLUMNS
-    assert [row["passed"] for row in rows] == ["True", "", "False"]
+    assert tuple(rows[0]) == table.VERIFICATION
+    assert [row["passed"] for row in rows] == ["True", "", "True", "False"]
     assert rows[0]["problem"] == "good"
     assert float(rows[0]["ours"]) == 2.0002
     assert rows[1]["limit"] == rows[1]["exact"] == ""
@@ -107,7 +132,7 @@ def committed():
 
 
 def test_the_committed_table_is_of_all_problems_and_passed(committed):
-    assert tuple(committed[0]) == verifying.COLUMNS
+    assert tuple(committed[0]) == table.VERIFICATION
     assert list(dict.fromkeys(row["problem"] for row in committed)) == [p.name for p in PROBLEMS]
     assert {row["passed"] for row in committed} == {"True", ""}
     assert all((row["passed"] == "") == (row["limit"] == "") for row in committed)
@@ -116,7 +141,7 @@ def test_the_committed_table_is_of_all_problems_and_passed(committed):
 def test_the_committed_table_is_what_the_command_finds(committed, problems, tmp_path):
     """Errors by discretisation and step are the same on any machine, those by rounding are not."""
     problems(*(p for p in PROBLEMS if p.name in {"damped motion, steps", "torsion in an eighth"}))
-    verifying.write_csv(verifying.verify(Silent()), tmp_path / "now.csv")
+    table.write_verification(request.verify(Silent()), tmp_path / "now.csv")
     with (tmp_path / "now.csv").open(newline="") as file:
         now = list(csv.DictReader(file))
     before = {(row["problem"], row["quantity"]): row for row in committed}
@@ -130,4 +155,4 @@ def test_the_committed_table_is_what_the_command_finds(committed, problems, tmp_
 def test_quantities_are_distinct_and_columns_stay_in_line(committed):
     quantities = [(row["problem"], row["quantity"]) for row in committed]
     assert len(set(quantities)) == len(quantities)
-    assert max(len(quantity) for _, quantity in quantities) <= verifying.WIDTHS[0] - 2
+    assert max(len(quantity) for _, quantity in quantities) <= table.WIDTHS[0] - 2

@@ -29,11 +29,11 @@ def stability(
     dry_run
         Say what would be run, and stop.
     """
-    from study.known.stability import request as asked
-    from study.known.stability import table
+    from study.known import request as asked
+    from study.known import table
     from study.sweep.tally import on_stderr
 
-    request = asked.Request(
+    request = asked.StabilityRequest(
         scene=scene,
         out=out,
         workers=where.workers,
@@ -47,8 +47,8 @@ def stability(
         verdicts = asked.study(request, progress)
     from reports.stability_map import write_figures
 
-    print("\n".join(table.lines(verdicts)))
+    print("\n".join(table.stability_lines(verdicts)))
     print(f"table in {request.folder / table.NAME}")
     print("\n".join(map(str, write_figures(request.folder))))
-    if not all(verdict.passed for verdict in verdicts):
+    if not asked.all_passed(verdicts):
         sys.exit(EXIT_FAILED_CHECK)

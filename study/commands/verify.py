@@ -25,15 +25,16 @@ def verify(
     as_json
         Print JSON instead of a table.
     """
-    from study.known import verify as verifying
+    from study.known import request, table
     from study.progress import on_stderr
 
     if out is not None and not out.parent.is_dir():
         raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")
     with on_stderr() as progress:
-        verdicts = verifying.verify(progress, quick=quick)
+        verdicts = request.verify(progress, quick=quick)
     if out is not None:
-        verifying.write_csv(verdicts, out)
-    print(verifying.as_json(verdicts) if as_json else "\n".join(verifying.table(verdicts)))
-    if not all(verdict.passed for verdict in verdicts):
+        table.write_verification(verdicts, out)
+    lines = [table.verification_json(verdicts)] if as_json else table.verification_lines(verdicts)
+    print("\n".join(lines))
+    if not request.all_passed(verdicts):
         sys.exit(EXIT_FAILED_CHECK)

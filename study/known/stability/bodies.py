@@ -15,12 +15,11 @@ from msm.damping import UNDAMPED, NodalDamping
 from msm.laws import Hooke
 from msm.springs import connect
 from msm.volume import volume_term
+from study.known.pressed import DOWN
 from study.organ.occupancy import Booleans
 from study.problem.trajectory import Observation
 
 Floats = NDArray[np.float64]
-
-DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True)

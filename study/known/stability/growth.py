@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.integrators import Integrator
+from msm.assembly import Assembly, Material, arrays
+from msm.integrators import INTEGRATORS, UNBOUNDED, Integrator
 from msm.laws import Law
 from msm.network import Network
 
 Floats = NDArray[np.float64]
 
+EXPLICIT = tuple(name for name, one in INTEGRATORS.items() if one.oscillation < UNBOUNDED)
+"""Names of the integrators that have a longest stable step."""
 RESOLUTION = 1e-3
 """Ratio of the two steps, one stable and one not, between which the limit is found, less one."""
 LOOKS = 40
@@ -21,6 +24,21 @@ LOST = 1e4
 GROWN = 10.0
 """Growth from the first to the second half of the watch. What beats below the limit has beaten in
 the first half; what grows by 10 in the second does so by more than 1e-3 a step in 2000."""
+
+
+def measured_limit(
+    assembly: Assembly,
+    material: Material,
+    integrator: str,
+    guess: float,
+    steps: int,
+    *,
+    linear: bool = True,
+) -> float:
+    """Longest stable step [s] of a lattice without load about its shape, near a guess [s]."""
+    net = arrays(assembly, material, linear=linear)
+    net, still = net._replace(load=np.zeros_like(net.load)), np.zeros_like(net.load)
+    return longest_stable_step(material.law, net, INTEGRATORS[integrator], guess, still, steps)
 
 
 def longest_stable_step(
@@ -57,5 +75,5 @@ def grows(law: Law, net: Network, method: Integrator, dt: float, about: Floats, 
 
 
 def _size(net: Network, u: Floats, v: Floats, dt: float) -> float:
-    """Of a motion, in terms of energy."""
+    """Size of a motion, as a root of its energy [J^0.5]."""
     return float(np.sqrt((net.mass[:, None] * (v**2 + (u / dt) ** 2)).sum()))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from fem_reference.elements import ElementName
 from fem_reference.grid import straight
-from study.known.verification.finding import Finding, observed_order, value
+from study.known.finding import Finding, error_of, number_of, observed_order
 from study.known.verification.moduli import shear_modulus
 from study.known.verification.solid import (
     Solid,
@@ -50,7 +50,7 @@ CELLS = (0.01, 0.005)
 
 
 def findings() -> Iterator[Finding]:
-    """Deflection of the end's centre, and the field."""
+    """Deflection of the bent bar's end, and the whole displacement."""
     for name, nu in CASES:
         yield from _bent(name, Tissue(poisson_ratio=nu))
 
@@ -63,8 +63,8 @@ def _bent(name: ElementName, tissue: Tissue) -> Iterator[Finding]:
     label = f"{name}, nu {tissue.poisson_ratio:g}"
     centre = np.linalg.norm(body.points - [0.0, 0.0, L], axis=1).argmin()
     exact = P * L**3 / (3.0 * tissue.youngs_modulus * I)
-    yield value(f"deflection of the end [m], {label}", exact, float(u[3 * centre]), 1e-3)
-    yield Finding(f"displacement, L2, {label}", errors[-1], 1e-3, order=observed_order(errors))
+    yield number_of(f"deflection of the end [m], {label}", exact, float(u[3 * centre]), 1e-3)
+    yield error_of(f"displacement, L2, {label}", errors[-1], 1e-3, order=observed_order(errors))
 
 
 def solved(name: ElementName, tissue: Tissue, cell: float) -> tuple[Solid, Floats]:

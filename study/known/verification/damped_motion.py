@@ -15,20 +15,18 @@ from scipy.linalg import eigh
 
 from fem_reference import model
 from fem_reference.dynamics import ORDER, March, Oscillator
-from fem_reference.elasticity import Body, discretise
+from fem_reference.elasticity import Body
 from fem_reference.elements import ElementName
 from fem_reference.observation import at_points, evaluation
-from study.known.verification.finding import Finding, convergence
+from study.known.finding import Finding, convergence, error_of
+from study.known.pressed import block
 from study.known.verification.oscillation import factor, response
-from study.organ.block import block_mesh
-from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 
 Floats = NDArray[np.float64]
 
-SIZE = (0.06, 0.05, 0.04)
 DAMPING = RayleighDamping(mass=10.0, stiffness=2e-3)
 PERIOD, DURATION = 0.2, 0.15
 """[s]"""
@@ -40,7 +38,7 @@ CASES: tuple[tuple[ElementName, float], ...] = (("p2", 0.45), ("taylor-hood", 0.
 
 
 def stepped() -> Iterator[Finding]:
-    """TR-BDF2 and HHT-alpha, all displacements and velocities at all steps."""
+    """Errors of TR-BDF2 and HHT-alpha in all displacements and velocities at all steps."""
     for name, nu in CASES:
         body = _body(name, nu)
         system = Oscillator(body.mass, body.stiffness, body.load, DAMPING)
@@ -52,7 +50,7 @@ def stepped() -> Iterator[Finding]:
 
 
 def superposed() -> Iterator[Finding]:
-    """Ritz vectors and eigenvectors, two points."""
+    """Errors of sums of Ritz vectors and of eigenvectors at two points."""
     times = np.linspace(0.0, DURATION, 61)
     nothing = np.zeros((0, 3))
     observation = Observation(times, PROBES, (), nothing, nothing)
@@ -71,13 +69,11 @@ def superposed() -> Iterator[Finding]:
             )
             for what, ours, true in pairs:
                 label = f"{what}, {method}, {name}, nu {nu:g}"
-                yield Finding(label, _relative(ours, true), TRUNCATED)
+                yield error_of(label, _relative(ours, true), TRUNCATED)
 
 
 def _body(name: ElementName, nu: float) -> Body:
-    down = np.array([0.0, 0.0, -1.0])
-    tool, support = ToolPatch(PROBES[0], down, 0.02, 0.1), Foundation(down, 0.0, 1e-3, 1e6)
-    return discretise(block_mesh(SIZE, 0.03), Tissue(poisson_ratio=nu), support, tool, name)
+    return block(Tissue(poisson_ratio=nu), name, 0.03)
 
 
 def _errors(system: Oscillator, march: March, body: Body, count: int) -> tuple[float, ...]:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fem_reference.elasticity import discretise
 from fem_reference.elements import ElementName
 from fem_reference.stiffness import Stiffness
-from study.known.verification.finding import Finding, observed_order, value
+from study.known.finding import Finding, number_of, observed_order
 from study.known.verification.moduli import shear_modulus
 from study.known.verification.solid import at_rest, free_everywhere
 from study.mesh.kinds import TetrahedralMesh
@@ -34,27 +34,29 @@ from study.problem.tissue import Tissue
 Floats = NDArray[np.float64]
 
 RADIUS, SIZE = 0.015, 0.0375
-"""Of the tool's disc and of the block [m]."""
+"""Radius of the tool's disc and edge of the block [m]."""
 FORCE = 0.1
-"""Of the whole disc [N]."""
+"""Force of the whole disc [N]."""
 PRESSURE = 3.0 * FORCE / (np.pi * RADIUS**2)
-"""At the centre [Pa]: the profile's mean is a third of it."""
+"""Pressure at the centre [Pa]: the profile's mean is a third of it."""
 GRADING = 1.5
 """Power by which cells grow away from the tool."""
 CASES: tuple[tuple[ElementName, float], ...] = (
     ("p2", 0.45),
     ("taylor-hood", 0.4999),
 )
+CELLS = (4, 8)
+"""Cells along an edge of the block."""
 MEAN, CENTRE = 393216.0 / (155925.0 * np.pi), 16.0 / 15.0
 """Depth over (1 - nu^2) p a / E."""
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def findings() -> Iterator[Finding]:
-    """Mean and largest depth of the surface under the tool."""
+    """Mean depth of the half space's surface under the tool, and that at its centre."""
     for name, nu in CASES:
         tissue = Tissue(poisson_ratio=nu)
-        found = np.array([depths(name, tissue, cells) for cells in (4, 8)])
+        found = np.array([depths(name, tissue, cells) for cells in CELLS])
         scale = (1.0 - nu**2) * PRESSURE * RADIUS / tissue.youngs_modulus
         for what, share, limit, ours in zip(
             ("mean depth", "depth at the centre"),
@@ -65,7 +67,7 @@ def findings() -> Iterator[Finding]:
         ):
             order = observed_order(list(np.abs(ours - share * scale)))
             label = f"{what} [m], {name}, nu {nu:g}"
-            yield value(label, share * scale, float(ours[-1]), limit, order)
+            yield number_of(label, share * scale, float(ours[-1]), limit, order)
 
 
 def depths(name: ElementName, tissue: Tissue, cells: int) -> tuple[float, float]:

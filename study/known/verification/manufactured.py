@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fem_reference.elements import ElementName
 from fem_reference.grid import straight
-from study.known.verification.finding import Finding, convergence
+from study.known.finding import Finding, convergence
 from study.known.verification.moduli import lame_lambda, oedometric, shear_modulus
 from study.known.verification.solid import (
     at_rest,
@@ -36,17 +36,17 @@ ORDER_TOLERANCE = 0.1
 
 
 def linear() -> Iterator[Finding]:
-    """Linear tetrahedra."""
+    """Order and error of linear tetrahedra."""
     yield from _converging("p1", 0.3, (8, 16), 2, 0.02)
 
 
 def quadratic() -> Iterator[Finding]:
-    """Quadratic tetrahedra."""
+    """Order and error of quadratic tetrahedra."""
     yield from _converging("p2", 0.3, (4, 8), 3, 0.002)
 
 
 def mixed() -> Iterator[Finding]:
-    """Taylor-Hood, the same at both Poisson ratios."""
+    """Order and error of Taylor-Hood elements, the same at both Poisson ratios."""
     for nu in (0.3, 0.4999):
         yield from _converging("taylor-hood", nu, (4, 8), 3, 0.002)
 
@@ -75,7 +75,7 @@ def displacement(x: Floats, tissue: Tissue) -> Floats:
 
 
 def force(x: Floats, tissue: Tissue) -> Floats:
-    """The force per volume that it takes [N/m^3] (..., 3)."""
+    """The force per volume that the manufactured solution takes [N/m^3] (..., 3)."""
     mu, lame = shear_modulus(tissue), lame_lambda(tissue)
     gradient = 3.0 * oedometric(tissue) * mu / lame * _gradient(x)
     return np.asarray(np.pi**2 * (2.0 * mu * _solenoidal(x) + gradient))

@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 
 
 def factor(times: Floats, period: float) -> Floats:
-    """Of the load: (1 - cos(2 pi t / period)) / 2."""
+    """Share of the full load at times [s], (1 - cos(2 pi t / period)) / 2."""
     return np.asarray(0.5 * (1.0 - np.cos(2.0 * np.pi * times / period)))
 
 

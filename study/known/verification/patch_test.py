@@ -12,7 +12,7 @@ import numpy as np
 
 from fem_reference.elements import ELEMENTS, ElementName
 from fem_reference.grid import straight
-from study.known.verification.finding import Finding, value
+from study.known.finding import Finding, error_of, number_of
 from study.known.verification.moduli import lame_lambda, rounding, shear_modulus
 from study.known.verification.solid import at_rest, free_everywhere, largest_error, solid
 from study.mesh.kinds import TetrahedralMesh
@@ -25,7 +25,7 @@ RATIOS = (0.3, 0.4999)
 
 
 def findings() -> Iterator[Finding]:
-    """Displacement and energy of each element."""
+    """Displacement and energy of every element under a uniform strain."""
     for name in ELEMENTS:
         for nu in RATIOS:
             yield from _patch(name, Tissue(poisson_ratio=nu))
@@ -47,9 +47,9 @@ def _patch(name: ElementName, tissue: Tissue) -> Iterator[Finding]:
     u = at_rest(body.stiffness, np.zeros(exact.size), prescribed)
     limit = rounding(tissue)
     label = f"{name}, nu {tissue.poisson_ratio:g}"
-    yield Finding(f"displacement, {label}", largest_error(u, exact), limit)
+    yield error_of(f"displacement, {label}", largest_error(u, exact), limit)
     energy = 0.5 * float(u @ (body.stiffness @ u))
-    yield value(f"energy [J], {label}", _energy(tissue), energy, limit)
+    yield number_of(f"energy [J], {label}", _energy(tissue), energy, limit)
 
 
 def _energy(tissue: Tissue) -> float:

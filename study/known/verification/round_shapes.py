@@ -24,7 +24,7 @@ def ball(refinements: int) -> tuple[TetrahedralMesh, Projection]:
 
 
 def ball_octant(refinements: int) -> tuple[TetrahedralMesh, Projection]:
-    """The eighth of it where x, y and z are positive."""
+    """Mesh of the eighth of the unit ball where x, y and z are positive, and its sphere."""
     return _ball(np.vstack([np.zeros(3), np.eye(3)]), np.arange(4)[None], refinements)
 
 
@@ -50,7 +50,7 @@ def shell_octant(inner: float, outer: float, layers: int) -> tuple[TetrahedralMe
 
 
 def _triangles(cells: int) -> Ints:
-    """Of a triangle's vertices (i, j), i + j <= cells, in rows of i; numbers ascend in each."""
+    """Triangles of the vertices (i, j), i + j <= cells, in rows of i; numbers ascend in each."""
     start = np.cumsum([0, *range(cells + 1, 0, -1)])
     found = []
     for i in range(cells):
@@ -77,7 +77,7 @@ def _blown_up(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def _spheres(radii: tuple[float, ...], layer: float) -> Projection:
-    """Onto the spheres of a mesh with layers so thick.
+    """Projection onto the spheres of a mesh with layers so thick.
 
     The middle of a chord is closer to its sphere than a quarter of a layer, all others are farther.
     """

@@ -19,7 +19,7 @@ from fem_reference.dynamics import Oscillator
 from fem_reference.elements import ElementName
 from fem_reference.grid import straight
 from fem_reference.model import STEPPING
-from study.known.verification.finding import Finding, observed_order
+from study.known.finding import Finding, error_of, observed_order
 from study.known.verification.moduli import shear_modulus
 from study.known.verification.oscillation import factor, response
 from study.known.verification.solid import body_force, l2_error, mass_matrix, restricted, solid
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 CASES: tuple[tuple[ElementName, float], ...] = (("p2", 0.3), ("taylor-hood", 0.4999))
 STEPS_PER_CELL = 8
 PERIODS = 0.8
-"""Of the wave: duration of the motion, and period of the load."""
+"""Duration of the motion, and period of the load, in periods of the wave."""
 RATIO, SHARE = 0.1, 0.5
 """Damping ratio of the wave, and how much of it is by the stiffness."""
 
@@ -47,7 +47,7 @@ def findings() -> Iterator[Finding]:
         for method in STEPPING:
             errors = [error(name, Tissue(poisson_ratio=nu), method, cells) for cells in (3, 6)]
             label = f"displacement, L2, {method}, {name}, nu {nu:g}"
-            yield Finding(label, errors[-1], 0.01, order=observed_order(errors))
+            yield error_of(label, errors[-1], 0.01, order=observed_order(errors))
 
 
 def error(name: ElementName, tissue: Tissue, method: str, cells: int) -> float:
@@ -74,7 +74,7 @@ def error(name: ElementName, tissue: Tissue, method: str, cells: int) -> float:
 
 
 def shape(x: Floats) -> Floats:
-    """U (..., 3)."""
+    """Shape U of the wave (..., 3) at points (..., 3) of the unit cube."""
     sine, cosine = np.sin(np.pi * x), np.cos(np.pi * x)
     others = np.roll(cosine, -1, axis=-1) * np.roll(cosine, -2, axis=-1)
     return np.asarray(np.array([2.0, -1.0, -1.0]) * sine * others)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fem_reference.elements import ElementName
 from fem_reference.grid import curved, straight
-from study.known.verification.finding import Finding, observed_order
+from study.known.finding import Finding, error_of, observed_order
 from study.known.verification.round_shapes import shell_octant
 from study.known.verification.solid import (
     at_rest,
@@ -47,14 +47,14 @@ def findings() -> Iterator[Finding]:
         coarse, fine = (error("taylor-hood", nu, layers) for layers in LAYERS)
         mixed.append(fine)
         order = observed_order([coarse, fine], ratio=LAYERS[1] / LAYERS[0])
-        yield Finding(
+        yield error_of(
             f"displacement, largest error, taylor-hood, nu {nu:g}", fine, 0.005, order=order
         )
     spread = max(mixed) / min(mixed) - 1.0
-    yield Finding("spread over nu of the error of taylor-hood", spread, 0.1)
+    yield error_of("spread over nu of the error of taylor-hood", spread, 0.1)
     for name in ("p2", "p1"):
         for nu in RATIOS:
-            yield Finding(f"displacement, largest error, {name}, nu {nu:g}", error(name, nu))
+            yield error_of(f"displacement, largest error, {name}, nu {nu:g}", error(name, nu))
 
 
 def error(name: ElementName, nu: float, layers: int = LAYERS[-1]) -> float:

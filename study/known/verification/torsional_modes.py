@@ -20,7 +20,7 @@ from fem_reference.dynamics import Oscillator
 from fem_reference.elements import ElementName
 from fem_reference.grid import curved
 from fem_reference.stiffness import Stiffness
-from study.known.verification.finding import Finding, observed_order, value
+from study.known.finding import Finding, error_of, number_of, observed_order
 from study.known.verification.moduli import shear_modulus
 from study.known.verification.round_shapes import ball, ball_octant
 from study.known.verification.solid import Solid, mass_matrix, restricted, solid
@@ -34,19 +34,19 @@ RIGID, FOLD = 6, 5
 
 
 def whole() -> Iterator[Finding]:
-    """Five frequencies of the whole ball, 512 tetrahedra."""
+    """The five lowest frequencies of torsion of a whole ball of 512 tetrahedra."""
     for name, nu in CASES:
         tissue = Tissue(poisson_ratio=nu)
         body = solid(curved(*ball(2)), name, tissue)
         everything = np.ones(body.points.size, dtype=bool)
         found = _frequencies(body, tissue, everything, RIGID + FOLD)[RIGID:]
         label = f"{name}, nu {nu:g}"
-        yield value(f"mean of five omega R / c_s, {label}", exact(), float(found.mean()), 2e-3)
-        yield Finding(f"spread of the five, {label}", float(np.ptp(found)) / exact(), 2e-3)
+        yield number_of(f"mean of five omega R / c_s, {label}", exact(), float(found.mean()), 2e-3)
+        yield error_of(f"spread of the five, {label}", float(np.ptp(found)) / exact(), 2e-3)
 
 
 def octant() -> Iterator[Finding]:
-    """Two of the five in an eighth, where no plane lets them slide.
+    """Two of the five frequencies, in an eighth of the ball where no plane lets them slide.
 
     The order is between that of quadratic surfaces, 3, and of energy, 4.
     """
@@ -61,11 +61,11 @@ def octant() -> Iterator[Finding]:
             means.append(float(_frequencies(body, tissue, ~held.ravel(), 2).mean()))
         order = observed_order([abs(mean - exact()) for mean in means])
         label = f"mean of two omega R / c_s, {name}, nu {nu:g}"
-        yield value(label, exact(), means[-1], 2e-4, order)
+        yield number_of(label, exact(), means[-1], 2e-4, order)
 
 
 def exact() -> float:
-    """Omega R / c_s."""
+    """Exact frequency of torsion, omega R / c_s."""
     return float(brentq(lambda k: spherical_jn(2, k) - k * spherical_jn(3, k), 2.0, 3.0))
 
 

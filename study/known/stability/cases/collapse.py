@@ -19,15 +19,15 @@ from msm.laws import initial_stiffness
 from msm.model import Automatic, Fixed, Run, Step, critical_time_step, run
 from msm.network import Network
 from msm.timestep import whole_steps
+from study.known.case import Case, Family
+from study.known.finding import Finding, value
 from study.known.stability import energy
 from study.known.stability.bodies import Make, lattice_of, watch
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, value
 
 Floats = NDArray[np.float64]
 
 FRACTIONS = (1.0, 0.5, 0.2, 0.05)
-"""Of the limit at rest, of the fixed steps."""
+"""Lengths of the fixed steps over the limit at rest."""
 SAMPLES = 121
 RATE = 10.0
 """Damping to ground, per mass [1/s]."""
@@ -40,14 +40,14 @@ WEIGHTS = (1.0, 3.0, 6.0, 10.0, 20.0, 40.0, 100.0, 1000.0)
 LOST_FROM = {None: 3.0, 0.45: 20.0, 0.49: 20.0}
 """Weights, by Poisson ratio, from which the body turns inside out and falls through its support."""
 BALANCE = 0.02
-"""Of the work of the load, by which the energies of coarse steps may beat."""
+"""Share of the work of the load by which the energies of coarse steps may beat."""
 LOOKED_AT = 0.15
-"""Of the time of divergence: two sampling intervals of a free fall's fifteen."""
-HERE = "study.known.stability.cases.collapse"
+"""Share of the time of divergence: two sampling intervals of a free fall's fifteen."""
+FAMILY = Family("collapse", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Times of its weight, Poisson ratios, integrators."""
+    """Cases of a body under times of its weight, by Poisson ratio and integrator."""
     for weights in WEIGHTS:
         for nu in LOST_FROM:
             yield _case("symplectic-euler", nu, weights)
@@ -57,13 +57,12 @@ def cases() -> Iterator[Case]:
 
 def _case(name: str, nu: float | None, weights: float) -> Case:
     springs, lost = "springs" if nu is None else f"nu {nu:g}", weights >= LOST_FROM[nu]
-    return Case(
-        family="collapse",
-        name=f"{weights:g} times its weight, {springs}: {name}",
-        function=f"{HERE}:fall",
-        arguments={"integrator": name, "nu": nu, "weights": weights},
+    return FAMILY.case(
+        f"{weights:g} times its weight, {springs}: {name}",
+        "fall",
+        {"integrator": name, "nu": nu, "weights": weights},
+        LOOKED_AT if lost else BALANCE,
         expected="diverged" if lost else "bounded",
-        tolerance=LOOKED_AT if lost else BALANCE,
         quick=name == "symplectic-euler" and weights in (10.0, 1000.0),
     )
 

@@ -15,32 +15,32 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from msm.assembly import arrays
+from msm.assembly import Assembly, Material, arrays
 from msm.damping import NodalDamping, eq_2
-from msm.integrators import INTEGRATORS, UNBOUNDED
+from msm.integrators import INTEGRATORS
 from msm.laws import Basafa, initial_stiffness
 from msm.model import critical_time_step
 from msm.stability import bounding, cell_bound, largest_frequency, longest_step
 from msm.tetrahedra import assemble as springs_on
-from study.known.stability.bodies import DOWN, Make, lattice_of
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, value
-from study.known.stability.growth import longest_stable_step
+from study.known.case import Case, Family
+from study.known.finding import Finding, value
+from study.known.pressed import DOWN
+from study.known.stability.bodies import Make, lattice_of
+from study.known.stability.growth import EXPLICIT, longest_stable_step, measured_limit
 from study.known.stability.modes import frequencies, sharp_limit, split_limit
 from study.mesh.quadrature import over_surface
 from study.mesh.tetrahedra import boundary
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 
-EXPLICIT = tuple(name for name, one in INTEGRATORS.items() if one.oscillation < UNBOUNDED)
 PLAIN = ("symplectic-euler", "velocity-verlet", "runge-kutta-4")
 AGREEMENT = 5e-3
 """The bisection leaves 1e-3, and growth that damping slows another 1e-3; the frequency 5e-4."""
-HERE = "study.known.stability.cases.critical_step"
+FAMILY = Family("critical step", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Stiffness, density, Poisson ratio, damping, Rayleigh damping, laws, and deformed states."""
+    """Cases by stiffness, density, Poisson ratio, damping, law and deformed state."""
     for name in EXPLICIT:
         split = name == "split-volume"
         function, nu = ("split", 0.45) if split else ("undamped", None)
@@ -68,12 +68,11 @@ def cases() -> Iterator[Case]:
 
 
 def _case(title: str, integrator: str, function: str = "undamped", **arguments: Any) -> Case:
-    return Case(
-        family="critical step",
-        name=f"{title}: {integrator}",
-        function=f"{HERE}:{function}",
-        arguments={"integrator": integrator} | arguments,
-        tolerance=AGREEMENT,
+    return FAMILY.case(
+        f"{title}: {integrator}",
+        function,
+        {"integrator": integrator} | arguments,
+        AGREEMENT,
         quick="E 1 Pa" in title or "0.4999" in title or "ratio 12" in title or "stretch" in title,
     )
 
@@ -159,13 +158,10 @@ def cell(integrator: str, nu: float) -> Finding:
 
 
 def _measured(
-    assembly: Any, material: Any, integrator: str, guess: float, *, linear: bool = True
+    assembly: Assembly, material: Material, integrator: str, guess: float, *, linear: bool = True
 ) -> float:
-    net = arrays(assembly, material, linear=linear)
-    net = net._replace(load=np.zeros_like(net.load))
-    still, method = np.zeros_like(net.load), INTEGRATORS[integrator]
     steps = _steps(integrator, damped=material.damping.gamma_0 > 0.0)
-    return longest_stable_step(material.law, net, method, guess, still, steps)
+    return measured_limit(assembly, material, integrator, guess, steps, linear=linear)
 
 
 def _steps(integrator: str, *, damped: bool = False) -> int:

@@ -12,15 +12,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside, value
 from study.problem.response import Motion
 from study.similarity.score import scores
 
 Floats = NDArray[np.float64]
 
 ROUNDING = 1e-9
-HERE = "study.known.stability.cases.curves"
+FAMILY = Family("similarity", __name__, quick=True)
 Change = Callable[[Motion], Motion]
 
 REFUSED: tuple[tuple[str, str], ...] = (
@@ -42,28 +42,17 @@ REFUSED: tuple[tuple[str, str], ...] = (
 
 
 def cases() -> Iterator[Case]:
-    """What is refused, and what has a score that is known."""
+    """Cases of curves that are refused, and of curves whose score is known."""
     for change, says in REFUSED:
-        yield _case(f"both curves {change}", "changed", {"change": change}, says=says)
+        yield FAMILY.case(f"both curves {change}", "changed", {"change": change}, says)
     for scale in (1e-28, 1e-9, 1e9, 1e28):
-        yield _case(f"both curves times {scale:g}", "scaled", {"scale": scale})
+        yield FAMILY.case(f"both curves times {scale:g}", "scaled", {"scale": scale}, ROUNDING)
     for kind in ("oscillation", "ramp", "step", "spike"):
-        yield _case(f"equal curves, {kind}", "equal", {"kind": kind})
+        yield FAMILY.case(f"equal curves, {kind}", "equal", {"kind": kind}, ROUNDING)
     for times in (0.0, -1.0, 1e6, 1e20):
-        yield _case(f"a candidate of {times:g} times the reference", "within", {"times": times})
-
-
-def _case(title: str, function: str, settings: dict[str, object], says: str = "") -> Case:
-    return Case(
-        family="similarity",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        expected="refused" if says else "value",
-        says=says,
-        tolerance=None if says else ROUNDING,
-        quick=True,
-    )
+        yield FAMILY.case(
+            f"a candidate of {times:g} times the reference", "within", {"times": times}, ROUNDING
+        )
 
 
 def changed(change: str) -> Finding:

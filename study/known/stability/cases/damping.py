@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,40 +18,29 @@ from msm.assembly import arrays
 from msm.damping import NodalDamping
 from msm.integrators import INTEGRATORS
 from msm.laws import Hooke
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside
 from study.known.stability.bodies import Make, lattice_of
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside
 from study.known.stability.modes import shapes
 
 Floats = NDArray[np.float64]
 
 STEP = 2e-3
-"""Of a radian of the mode: symplectic Euler is off by half a step, and as much in the damping."""
+"""Step in radians of the mode: symplectic Euler is off by half of it, in damping too."""
 PERIODS, LOOKS = 2.0, 50
 CLOSE, SOLVED = STEP, 1e-6
-HERE = "study.known.stability.cases.damping"
+FAMILY = Family("damping", __name__, quick=True)
 
 
 def cases() -> Iterator[Case]:
-    """Ratios of both parts of Rayleigh's damping; the control point to the paper's 12."""
+    """Cases of both parts of Rayleigh's damping; of the control point to the paper's 12."""
     for which in ("slowest", "fastest"):
         for alpha, beta in ((0.0, 0.0), (0.05, 0.0), (3.0, 0.0), (0.0, 0.05), (0.5, 0.5)):
             title = f"{which} mode, ratios {alpha:g} by mass and {beta:g} by stiffness"
             settings = {"which": which, "by_mass": alpha, "by_stiffness": beta}
-            yield _case(title, "rings", settings, CLOSE)
+            yield FAMILY.case(title, "rings", settings, CLOSE)
     for zeta in (0.0, 0.05, 1.0, 3.0, 12.0):
-        yield _case(f"control point, ratio {zeta:g}", "pushed", {"zeta": zeta}, SOLVED)
-
-
-def _case(title: str, function: str, settings: dict[str, Any], tolerance: float) -> Case:
-    return Case(
-        family="damping",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        tolerance=tolerance,
-        quick=True,
-    )
+        yield FAMILY.case(f"control point, ratio {zeta:g}", "pushed", {"zeta": zeta}, SOLVED)
 
 
 def rings(which: str, by_mass: float, by_stiffness: float) -> Finding:

@@ -19,10 +19,10 @@ from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS
 from msm.laws import initial_stiffness
 from msm.model import critical_time_step
+from study.known.case import Case, Family
+from study.known.finding import Finding
 from study.known.stability import energy
 from study.known.stability.bodies import Make, lattice_of
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding
 
 Floats = NDArray[np.float64]
 
@@ -32,16 +32,16 @@ LOOKS = 100
 SETTLING = 25
 """Stretches before the hundred."""
 SHARE = 0.1
-"""Of the limit."""
+"""Length of a step over the limit."""
 RESOLVED = 1e-3
 """Relative drift over the whole run that must not be missed."""
 ERRORS = 4.0
 """Standard errors that a slope of none may be off by."""
-HERE = "study.known.stability.cases.drift"
+FAMILY = Family("energy drift", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Both symplectic integrators, springs and volume, small and large motions; long and quick."""
+    """Cases of both symplectic integrators, in long runs and in short ones."""
     for name in ("symplectic-euler", "velocity-verlet"):
         for nu in (None, 0.45):
             for linear in (True, False):
@@ -51,14 +51,12 @@ def cases() -> Iterator[Case]:
 
 def _case(name: str, nu: float | None, *, linear: bool, steps: int) -> Case:
     springs = "springs" if nu is None else f"nu {nu:g}"
-    return Case(
-        family="energy drift",
-        name=f"{steps} steps, {springs}, {'linear' if linear else 'nonlinear'}: {name}",
-        function=f"{HERE}:drifting",
-        arguments={"integrator": name, "nu": nu, "linear": linear, "steps": steps},
+    return FAMILY.case(
+        f"{steps} steps, {springs}, {'linear' if linear else 'nonlinear'}: {name}",
+        "drifting",
+        {"integrator": name, "nu": nu, "linear": linear, "steps": steps},
+        RESOLVED,
         expected="bounded",
-        tolerance=RESOLVED,
-        seconds=60.0,
         quick=steps < 1e5,
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,11 @@ from numpy.typing import NDArray
 from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body, discretise
 from fem_reference.solvers import solve_static
-from study.known.stability.bodies import DOWN
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known import pressed
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside, value
+from study.known.pressed import COLUMN, DOWN
 from study.known.verification.moduli import oedometric
-from study.known.verification.solid import at_rest, free_everywhere
 from study.mesh.check import repair_tetrahedra
 from study.mesh.draft import Draft, start_draft
 from study.mesh.kinds import TetrahedralMesh
@@ -27,49 +26,35 @@ from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 
-SIZE = (0.04, 0.04, 0.06)
 CELL = 0.02
-FOUNDATION, PRESSURE, WIDE = 5e5, 200.0, 1e6
-"""[Pa/m], [Pa], and the radius [m] of a tool whose pressure is uniform."""
 ROUNDING, SOLVED = 1e-12, 1e-8
-HERE = "study.known.stability.cases.elements"
+FAMILY = Family("elements", __name__, quick=True)
 
 
 def cases() -> Iterator[Case]:
-    """Each kind of extreme in turn."""
+    """Cases of finite elements at each kind of extreme in turn."""
     for element in ("p1", "p2", "taylor-hood"):
         for nu in (0.0, 0.25, 0.49, 0.4999, 0.49999):
             settings = {"element": element, "nu": nu}
             tolerance = ROUNDING / (1.0 - 2.0 * nu)
-            yield _case(f"column, nu {nu:g}: {element}", "column", settings, tolerance)
+            yield FAMILY.case(f"column, nu {nu:g}: {element}", "column", settings, tolerance)
     for height in (1e-1, 1e-3, 1e-6):
         settings = {"height": height}
         title = f"column with slivers of {height:g} of an edge"
-        yield _case(title, "slivers", settings, ROUNDING / height)
+        yield FAMILY.case(title, "slivers", settings, ROUNDING / height)
     for stiffness in (1.0, 1e3, 1e6, 1e12):
         title = f"column on a support of {stiffness:g} Pa/m"
-        yield _case(title, "supported", {"stiffness": stiffness}, SOLVED)
+        yield FAMILY.case(title, "supported", {"stiffness": stiffness}, SOLVED)
     for size in (1e-3, 1.0, 10.0):
         title = f"an organ of {size:g} m, scaled from 4 cm"
-        yield _case(title, "scales", {"size": size}, SOLVED)
+        yield FAMILY.case(title, "scales", {"size": size}, SOLVED)
     for radius in (2e-2, 5e-3, 2e-3):
         title = f"reaction to a tool of {1e3 * radius:g} mm on facets of 20 mm"
-        yield _case(title, "reacts", {"radius": radius}, SOLVED)
+        yield FAMILY.case(title, "reacts", {"radius": radius}, SOLVED)
     for method in ("tr-bdf2", "hht-alpha"):
-        yield _case(f"steps of 1e4 s to rest: {method}", "leaps", {"method": method}, SOLVED)
-    yield _case("inverted tetrahedra turned round", "turned", {}, ROUNDING)
+        yield FAMILY.case(f"steps of 1e4 s to rest: {method}", "leaps", {"method": method}, SOLVED)
+    yield FAMILY.case("inverted tetrahedra turned round", "turned", {}, ROUNDING)
     yield from _refusals()
-
-
-def _case(title: str, function: str, settings: dict[str, Any], tolerance: float) -> Case:
-    return Case(
-        family="elements",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        tolerance=tolerance,
-        quick=True,
-    )
 
 
 def _refusals() -> Iterator[Case]:
@@ -86,39 +71,32 @@ def _refusals() -> Iterator[Case]:
         ("a tool beside the organ", "beside_organ", {"support": False}, r"tool\.place"),
         ("a tool between integration points", "reacts", {"radius": 1e-6}, r"tool\.radius"),
     ):
-        yield Case(
-            family="elements",
-            name=title,
-            function=f"{HERE}:{function}",
-            arguments=settings,
-            expected="refused",
-            says=says,
-            quick=True,
-        )
+        yield FAMILY.case(title, function, settings, says)
 
 
 def column(element: str, nu: float | None) -> Finding:
-    """Between smooth walls under a uniform pressure: strain is pressure over lambda + 2 mu."""
+    """A column between smooth walls under pressure: strain is pressure over lambda + 2 mu."""
     tissue = Tissue(poisson_ratio=float("nan") if nu is None else nu)
-    return _pressed(_body(block_mesh(SIZE, CELL), tissue, element), tissue)
+    return _pressed(pressed.column(block_mesh(COLUMN, CELL), tissue, element), tissue)
 
 
 def slivers(height: float) -> Finding:
-    """The same on a mesh with a node moved to within a share of an edge of the next one."""
-    mesh = block_mesh(SIZE, CELL)
+    """A column between walls, with a node moved to within a share of an edge of the next one."""
+    mesh = block_mesh(COLUMN, CELL)
     points = mesh.points.copy()
     node = int(np.linalg.norm(points - [0.02, 0.02, 0.02], axis=1).argmin())
     points[node, 2] = 0.04 - height * CELL
     tissue = Tissue(poisson_ratio=0.3)
-    return _pressed(_body(TetrahedralMesh(points, mesh.tetrahedra), tissue, "p2"), tissue)
+    moved = TetrahedralMesh(points, mesh.tetrahedra)
+    return _pressed(pressed.column(moved, tissue, "p2"), tissue)
 
 
 def supported(stiffness: float) -> Finding:
     """A column of nu 0 with free sides sinks by p / k and shortens by p / E."""
     tissue = Tissue(poisson_ratio=0.0)
-    body = _body(block_mesh(SIZE, CELL), tissue, "p2", stiffness)
-    sunk = PRESSURE / stiffness + PRESSURE / tissue.youngs_modulus * body.points[:, 2:]
-    return beside(sunk * DOWN, solve_static(body).reshape(-1, 3))
+    body = pressed.column(block_mesh(COLUMN, CELL), tissue, "p2", stiffness)
+    exact = pressed.exact_column(body.points, tissue.youngs_modulus, stiffness)
+    return beside(exact, solve_static(body).reshape(-1, 3))
 
 
 def scales(size: float) -> Finding:
@@ -128,14 +106,15 @@ def scales(size: float) -> Finding:
 
 def reacts(radius: float) -> Finding:
     """What the support takes is what the tool gives."""
-    body = _body(block_mesh(SIZE, CELL), Tissue(), "p2", tool=_tool(SIZE, radius, 0.1))
+    tool = _tool(COLUMN, radius, 0.1)
+    body = pressed.on_base(block_mesh(COLUMN, CELL), Tissue(), "p2", pressed.FOUNDATION, tool)
     taken = (body.support @ solve_static(body)).reshape(-1, 3).sum(axis=0)
     return value(0.1, float(taken @ DOWN), "N")
 
 
 def leaps(method: str) -> Finding:
     """Steps, each far longer than any period, under a constant load with damping."""
-    body = _body(block_mesh(SIZE, CELL), Tissue(), "p2")
+    body = pressed.column(block_mesh(COLUMN, CELL), Tissue(), "p2")
     system = Oscillator(body.mass, body.stiffness, body.load, RayleighDamping(10.0))
     # HHT's first step overshoots by (omega dt)^2, of which each step leaves nine tenths.
     scheme, count = {"tr-bdf2": (march, 100), "hht-alpha": (hht, 800)}[method]
@@ -145,50 +124,35 @@ def leaps(method: str) -> Finding:
 
 def turned() -> Finding:
     """Volume of a block a quarter of whose elements were wound the other way."""
-    mesh = block_mesh(SIZE, CELL)
+    mesh = block_mesh(COLUMN, CELL)
     tetrahedra = mesh.tetrahedra.copy()
     tetrahedra[::4, 2:] = tetrahedra[::4, :1:-1]
     mended = repair_tetrahedra(_draft(mesh.points, tetrahedra))
     found = volumes(TetrahedralMesh(mended.points, mended.elements))
-    return value(float(np.prod(SIZE)), float(found.sum()), "m^3")
+    return value(float(np.prod(COLUMN)), float(found.sum()), "m^3")
 
 
 def flat_in_file() -> Finding:
     """A block with one node moved into a face of its tetrahedra."""
-    mesh = block_mesh(SIZE, CELL)
+    mesh = block_mesh(COLUMN, CELL)
     points = np.vstack([mesh.points, mesh.points[mesh.tetrahedra[0, :3]].mean(axis=0)])
     extra = np.append(mesh.tetrahedra[0, :3], len(mesh.points))
     mended = repair_tetrahedra(_draft(points, np.vstack([mesh.tetrahedra, extra])))
-    return value(float(np.prod(SIZE)), float(len(mended.elements)))
+    return value(float(np.prod(COLUMN)), float(len(mended.elements)))
 
 
 def beside_organ(*, support: bool) -> Finding:
     """A support far above its level, or a tool a metre away."""
     level = 1.0 if support else 0.0
-    tool = _tool((0.04, 0.04, 0.06), 0.02, 0.1) if support else _tool((3.0, 3.0, 0.06), 0.02, 0.1)
-    foundation = Foundation(DOWN, level, 1e-3, FOUNDATION)
-    body = discretise(block_mesh(SIZE, CELL), Tissue(), foundation, tool, "p2")
+    tool = _tool(COLUMN, 0.02, 0.1) if support else _tool((3.0, 3.0, 0.06), 0.02, 0.1)
+    foundation = Foundation(DOWN, level, 1e-3, pressed.FOUNDATION)
+    body = discretise(block_mesh(COLUMN, CELL), Tissue(), foundation, tool, "p2")
     return value(0.0, float(np.abs(solve_static(body)).max()))
 
 
-def _body(
-    mesh: TetrahedralMesh,
-    tissue: Tissue,
-    element: str,
-    foundation: float = FOUNDATION,
-    tool: ToolPatch | None = None,
-) -> Body:
-    uniform = ToolPatch(np.array(SIZE), DOWN, WIDE, PRESSURE * SIZE[0] * SIZE[1])
-    support = Foundation(DOWN, 0.0, 1e-3, foundation)
-    return discretise(mesh, tissue, support, tool or uniform, element)
-
-
 def _pressed(body: Body, tissue: Tissue) -> Finding:
-    x = body.points
-    walls = ((x < 1e-9) | (x > np.array(SIZE) - 1e-9)) & [True, True, False]
-    u = at_rest(body.stiffness, body.load, np.where(walls, 0.0, free_everywhere(x)))
-    sunk = PRESSURE / FOUNDATION + PRESSURE / oedometric(tissue) * x[:, 2:]
-    return beside(sunk * DOWN, u.reshape(-1, 3))
+    exact = pressed.exact_column(body.points, oedometric(tissue))
+    return beside(exact, pressed.between_walls(body))
 
 
 def _indented(size: float) -> Floats:
@@ -200,10 +164,10 @@ def _indented(size: float) -> Floats:
 
 
 def _tool(size: tuple[float, float, float], radius: float, force: float) -> ToolPatch:
-    """On the top, off the middle of its facets."""
+    """A tool on the top, off the middle of its facets."""
     return ToolPatch(np.array([0.4 * size[0], 0.3 * size[1], size[2]]), DOWN, radius, force)
 
 
 def _draft(points: Floats, tetrahedra: NDArray[np.int64]) -> Draft:
-    """As a file in metres is taken."""
+    """A mesh as it is taken from a file in metres."""
     return start_draft(points, tetrahedra, 1e3)

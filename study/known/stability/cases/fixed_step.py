@@ -14,36 +14,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material
-from msm.integrators import INTEGRATORS, UNBOUNDED
 from msm.model import FAR, Fixed, Rate, critical_time_step, run
 from msm.statics import stiffness_at_rest
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside, value
 from study.known.stability.bodies import Make, lattice_of, watch
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known.stability.growth import EXPLICIT
 from study.known.stability.modes import split_limit
 
 Floats = NDArray[np.float64]
 Step = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
-EXPLICIT = tuple(name for name, one in INTEGRATORS.items() if one.oscillation < UNBOUNDED)
 STEPS = 400
 ROUNDING = 1e-9
 PRESSURES = 1e-5
 """What the split integrator's own solver leaves of the displacement."""
-HERE = "study.known.stability.cases.fixed_step"
+FAMILY = Family("fixed step", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Steps just beyond, far beyond and just below the limit; steps that are refused."""
+    """Cases of steps below and beyond the limit, and of steps that are refused."""
     for name in EXPLICIT:
         for times in (0.98, 1.02, 1.5, 10.0):
-            yield Case(
-                family="fixed step",
-                name=f"{times:g} of the limit: {name}",
-                function=f"{HERE}:held",
-                arguments={"integrator": name, "times": times},
+            yield FAMILY.case(
+                f"{times:g} of the limit: {name}",
+                "held",
+                {"integrator": name, "times": times},
+                PRESSURES if name == "split-volume" else ROUNDING,
                 expected="bounded" if times < 1.0 else "diverged",
-                tolerance=PRESSURES if name == "split-volume" else ROUNDING,
                 quick=times in (0.98, 1.02),
             )
     for title, kind, size, says in (
@@ -53,15 +51,7 @@ def cases() -> Iterator[Case]:
         ("a step that is not a number", "seconds", None, r"step\.seconds must be positive"),
         ("ten million steps", "hertz", 1e8, r"the limit is 3e\+05"),
     ):
-        yield Case(
-            family="fixed step",
-            name=title,
-            function=f"{HERE}:asked",
-            arguments={kind: size},
-            expected="refused",
-            says=says,
-            quick=True,
-        )
+        yield FAMILY.case(title, "asked", {kind: size}, says)
 
 
 def held(integrator: str, times: float) -> Finding:

@@ -25,8 +25,8 @@ from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.quadrature import sampled
 from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable, memberships, union
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside, value
 
 Floats = NDArray[np.float64]
 
@@ -34,43 +34,51 @@ LOW = FuzzySet("low", "trimf", (0.0, 5.0, 10.0))
 HIGH = FuzzySet("high", "trimf", (10.0, 15.0, 30.0))
 TOP, MIDDLE = 30.0, 15.0
 AREAS, CENTRES = np.array([5.0, 10.0]), np.array([5.0, 55.0 / 3.0])
-"""Of the two output sets."""
+"""Areas and centres of the two output sets."""
 ROUNDING, INTEGRATED = 1e-12, 1e-8
 KPA = 1e3
 READINGS = {"hcv": 9.5e3, "hbv": 6e3, "ald": 20e3, "cld": 8e3, "nafld": 7e3}
-HERE = "study.known.stability.cases.fuzzy_readings"
+FAMILY = Family("fuzzy", __name__, quick=True)
 
 
 def cases() -> Iterator[Case]:
-    """Readings by policy, footprints, firing, widths, silence, units."""
+    """Cases of readings by policy, footprints, firing, widths, silence and units."""
     for kind in SYSTEMS:
         yield from _policies(kind)
         yield from _widths(kind)
         for reading in (0.5, 1.999, 75.001, 150.0):
             title = f"{reading:g} kPa, off the scale: {kind}"
-            yield _case(title, "off_scale", {"kind": kind, "reading": reading})
-        yield _case(f"one aetiology, the rest silent: {kind}", "alone", {"kind": kind})
+            yield FAMILY.case(title, "off_scale", {"kind": kind, "reading": reading}, ROUNDING)
+        yield FAMILY.case(
+            f"one aetiology, the rest silent: {kind}", "alone", {"kind": kind}, ROUNDING
+        )
     for footprint in ("uncertain-mean", "uncertain-spread", "scaled"):
         settings = {"footprint": footprint}
-        yield _case(f"footprint of 0, {footprint}", "without_footprint", settings)
-        yield _case(f"footprint at its largest, {footprint}", "with_largest", settings)
+        yield FAMILY.case(f"footprint of 0, {footprint}", "without_footprint", settings, ROUNDING)
+        yield FAMILY.case(
+            f"footprint at its largest, {footprint}", "with_largest", settings, ROUNDING
+        )
     for name, parts in (
         ("a mean anywhere", {"mean": 100.0}),
         ("a spread of almost all", {"spread": 0.999999}),
         ("a lower set of almost nothing", {"scale": 1e-9}),
         ("a lag of almost 1", {"lag": 0.999}),
     ):
-        yield _case(f"footprint with {name}", "wide", {"footprint": parts})
+        yield FAMILY.case(f"footprint with {name}", "wide", {"footprint": parts}, ROUNDING)
     yield from _refusals()
 
 
 def _policies(kind: str) -> Iterator[Case]:
     for reading in (10.0, 14.0, 1e300, -2.0, -1e300):
         settings = {"kind": kind, "reading": reading}
-        yield _case(f"reading {reading:g} of 0-10, clamp: {kind}", "clamped", settings)
+        yield FAMILY.case(
+            f"reading {reading:g} of 0-10, clamp: {kind}", "clamped", settings, ROUNDING
+        )
     for reading in (14.0, -2.0):
         settings = {"kind": kind, "reading": reading}
-        yield _case(f"reading {reading:g} of 0-10, matlab: {kind}", "as_it_is", settings)
+        yield FAMILY.case(
+            f"reading {reading:g} of 0-10, matlab: {kind}", "as_it_is", settings, ROUNDING
+        )
     for given, policy, says in (
         (14.0, "raise", "outside 0-10"),
         (-2.0, "raise", "outside 0-10"),
@@ -78,36 +86,38 @@ def _policies(kind: str) -> Iterator[Case]:
         (None, "matlab", "finite reading"),
     ):
         title = f"reading {'not a number' if given is None else f'{given:g}'}, {policy}: {kind}"
-        yield _case(title, "asked", {"kind": kind, "reading": given, "policy": policy}, says)
-    yield _case(f"no rule fires, matlab: {kind}", "silent", {"kind": kind, "policy": "matlab"})
+        yield FAMILY.case(title, "asked", {"kind": kind, "reading": given, "policy": policy}, says)
+    yield FAMILY.case(
+        f"no rule fires, matlab: {kind}", "silent", {"kind": kind, "policy": "matlab"}, ROUNDING
+    )
     settings = {"kind": kind, "policy": "clamp"}
-    yield _case(f"no rule fires, clamp: {kind}", "silent", settings, "no rule fires")
+    yield FAMILY.case(f"no rule fires, clamp: {kind}", "silent", settings, "no rule fires")
 
 
 def _widths(kind: str) -> Iterator[Case]:
-    yield _case(f"all rules fire: {kind}", "all_fire", {"kind": kind}, tolerance=INTEGRATED)
+    yield FAMILY.case(f"all rules fire: {kind}", "all_fire", {"kind": kind}, INTEGRATED)
     for sd in (1e-3, 1e-6, 1e-12):
         settings = {"kind": kind, "sd": sd, "off": 0.0}
-        yield _case(
-            f"at the middle of a set of sd {sd:g}: {kind}", "narrow", settings, tolerance=INTEGRATED
+        yield FAMILY.case(
+            f"at the middle of a set of sd {sd:g}: {kind}", "narrow", settings, INTEGRATED
         )
         settings = {"kind": kind, "sd": sd, "off": 0.5}
-        yield _case(f"beside a set of sd {sd:g}: {kind}", "narrow", settings, "no rule fires")
+        yield FAMILY.case(f"beside a set of sd {sd:g}: {kind}", "narrow", settings, "no rule fires")
     for sd in (1e-2, 1e-6):
         settings = {"kind": kind, "sd": sd, "sampling": "exact"}
         title = f"output set of sd {sd:g}, exact: {kind}"
-        yield _case(title, "narrow_output", settings, tolerance=INTEGRATED)
+        yield FAMILY.case(title, "narrow_output", settings, INTEGRATED)
     settings = {"kind": kind, "sd": 1e-6, "sampling": "matlab"}
     title = f"output set of sd 1e-06 between samples: {kind}"
-    yield _case(title, "narrow_output", settings, "no mass on the 101 samples")
+    yield FAMILY.case(title, "narrow_output", settings, "no mass on the 101 samples")
 
 
 def _refusals() -> Iterator[Case]:
     for reading in (0.0, -1.0, 0.4, 151.0, 9500.0, None):
         told = "finite positive" if reading is None or reading <= 0 else "beyond any liver"
         title = f"estimate from {'nothing finite' if reading is None else f'{reading:g} kPa'}"
-        yield _case(title, "estimated", {"reading": reading}, told)
-    yield _case(
+        yield FAMILY.case(title, "estimated", {"reading": reading}, told)
+    yield FAMILY.case(
         "estimate from an unknown aetiology", "estimated", {"reading": 9.5, "name": "flu"}, "flu"
     )
     for title, function, settings, says in (
@@ -118,26 +128,7 @@ def _refusals() -> Iterator[Case]:
         ("a footprint factor of 4", "factor", {"factor": 4.0}, "footprint_factor"),
         ("ten samples", "few", {"samples": 10}, "samples = 10"),
     ):
-        yield _case(title, function, settings, says)
-
-
-def _case(
-    title: str,
-    function: str,
-    settings: dict[str, Any],
-    says: str = "",
-    tolerance: float = ROUNDING,
-) -> Case:
-    return Case(
-        family="fuzzy",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        expected="refused" if says else "value",
-        says=says,
-        tolerance=None if says else tolerance,
-        quick=True,
-    )
+        yield FAMILY.case(title, function, settings, says)
 
 
 def clamped(kind: str, reading: float) -> Finding:
@@ -159,7 +150,7 @@ def as_it_is(kind: str, reading: float) -> Finding:
 
 
 def asked(kind: str, reading: float | None, policy: str) -> Finding:
-    """What is to be refused."""
+    """An answer to a reading that a policy is to refuse."""
     given = float("nan") if reading is None else reading
     return value(0.0, float(_infer(_ramp(), given, kind, out_of_range=policy).value[0]))
 

@@ -15,41 +15,51 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse import csc_array, diags_array
 
-from fem_reference.elasticity import Body, discretise
+from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import solid
 from fem_reference.newton import SMALLEST_INCREMENT, TOLERANCE, solve
-from study.known.stability.bodies import DOWN
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, value
+from study.known import pressed
+from study.known.case import Case, Family
+from study.known.finding import Finding, value
 from study.organ.block import block_mesh
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
 from study.problem.tissue import Tissue
 
 EDGE, CELL = 0.04, 0.02
-FOUNDATION, WIDE = 1e9, 1e6
-"""[Pa/m], so stiff that the base hardly sinks; radius [m] of a tool of uniform pressure."""
+FOUNDATION = 1e9
+"""[Pa/m], so stiff that the base hardly sinks."""
 TISSUE = Tissue(youngs_modulus=5e3, poisson_ratio=0.0)
 GIVES_WAY = 1.0 / (3.0 * np.sqrt(3.0))
 """Largest pressure over E that St. Venant and Kirchhoff's law withstands."""
 SOLVED = 1e-5
 """TOLERANCE times what a stiffness that has softened by the stretch makes of it."""
-HERE = "study.known.stability.cases.large_strain"
+FAMILY = Family("large strain", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Pressures over E, negative where the column is pulled; loads that cannot be."""
+    """Cases of a column by pressure over E, negative where it is pulled; loads that cannot be."""
     for pressure in (1e-6, 0.1, 0.5, 2.0, 10.0, -0.5, -2.0):
         settings = {"law": "neo-hookean", "pressure": pressure}
-        yield _case(f"stretch at {pressure:g} E: neo-hookean", "stretch", settings, SOLVED)
+        yield FAMILY.case(
+            f"stretch at {pressure:g} E: neo-hookean", "stretch", settings, SOLVED, quick=True
+        )
     for pressure in (0.1, 0.19, -0.5):
         settings = {"law": "st-venant-kirchhoff", "pressure": pressure}
-        yield _case(f"stretch at {pressure:g} E: st-venant-kirchhoff", "stretch", settings, SOLVED)
+        yield FAMILY.case(
+            f"stretch at {pressure:g} E: st-venant-kirchhoff",
+            "stretch",
+            settings,
+            SOLVED,
+            quick=True,
+        )
     for pressure in (0.2, 0.3, 1.0):
         title = f"load at giving way, {pressure:g} E asked: st-venant-kirchhoff"
         resolved = SMALLEST_INCREMENT * pressure / GIVES_WAY
-        yield _case(title, "gives_way", {"pressure": pressure}, resolved)
+        yield FAMILY.case(title, "gives_way", {"pressure": pressure}, resolved, quick=True)
     for force in (0.1, 1.0, 10.0, 30.0):
-        yield _case(f"balance under a tool of {force:g} N", "balance", {"force": force}, TOLERANCE)
+        yield FAMILY.case(
+            f"balance under a tool of {force:g} N", "balance", {"force": force}, TOLERANCE
+        )
     refused: tuple[tuple[str, dict[str, Any], str], ...] = (
         ("a load factor of zero", {"factors": [0.0]}, "load_factors"),
         ("a load factor that is not a number", {"factors": [None]}, "load_factors"),
@@ -57,26 +67,7 @@ def cases() -> Iterator[Case]:
         ("elements with a pressure", {"element": "taylor-hood", "nu": 0.49}, "element 'p2'"),
     )
     for title, settings, says in refused:
-        yield Case(
-            family="large strain",
-            name=title,
-            function=f"{HERE}:asked",
-            arguments=settings,
-            expected="refused",
-            says=says,
-            quick=True,
-        )
-
-
-def _case(title: str, function: str, settings: dict[str, Any], tolerance: float) -> Case:
-    return Case(
-        family="large strain",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        tolerance=tolerance,
-        quick="balance" not in title,
-    )
+        yield FAMILY.case(title, "asked", settings, says)
 
 
 def stretch(law: str, pressure: float) -> Finding:
@@ -103,10 +94,9 @@ def gives_way(pressure: float) -> Finding:
 
 def balance(force: float) -> Finding:
     """Unbalanced force over the load, at the last rest under a small tool."""
-    tool = ToolPatch(np.array([0.5 * EDGE, 0.5 * EDGE, EDGE]), DOWN, 0.02, force)
+    tool = ToolPatch(np.array([0.5 * EDGE, 0.5 * EDGE, EDGE]), pressed.DOWN, 0.02, force)
     tissue = Tissue(youngs_modulus=5e3, poisson_ratio=0.45)
-    support = Foundation(DOWN, 0.0, 1e-3, 1e7)
-    body = discretise(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, support, tool, "p2")
+    body = pressed.on_base(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, "p2", 1e7, tool)
     path = solve(body, tissue, "neo-hookean")
     failure = path.failure
     if not path.converged:
@@ -124,7 +114,7 @@ def asked(
     element: str = "p2",
     nu: float = 0.0,
 ) -> Finding:
-    """A path that cannot be begun."""
+    """A path of large strain that cannot be begun."""
     tissue = replace(TISSUE, poisson_ratio=nu)
     given = tuple(float("nan") if factor is None else factor for factor in factors)
     path = solve(_column(0.1, element, tissue), tissue, law, given)
@@ -133,12 +123,10 @@ def asked(
 
 def _column(pressure: float, element: str = "p2", tissue: Tissue = TISSUE) -> Body:
     """A cube between smooth walls, by stiff springs that its exact solution leaves alone."""
-    tool = ToolPatch(np.full(3, EDGE), DOWN, WIDE, pressure * TISSUE.youngs_modulus * EDGE**2)
-    support = Foundation(DOWN, 0.0, 1e-3, FOUNDATION)
-    body = discretise(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, support, tool, element)
-    x = body.points
-    walls = ((x < 1e-9) | (x > EDGE - 1e-9)) & [True, True, False]
-    springs = diags_array(np.where(walls, TISSUE.youngs_modulus * EDGE, 0.0).ravel())
+    load = pressure * TISSUE.youngs_modulus
+    body = pressed.column(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, element, FOUNDATION, load)
+    held = np.where(pressed.walls(body.points), TISSUE.youngs_modulus * EDGE, 0.0)
+    springs = diags_array(held.ravel())
     return replace(body, support=csc_array(body.support + springs))
 
 

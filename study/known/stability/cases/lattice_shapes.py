@@ -8,7 +8,6 @@ step is the one at which motions grow; an organ scaled in size moves as the one 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +15,16 @@ from numpy.typing import NDArray
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import lame
 from msm.damping import NodalDamping
-from msm.integrators import INTEGRATORS
 from msm.laws import initial_stiffness
 from msm.model import critical_time_step, run
 from msm.relaxation import relax
 from msm.stability import DEFAULT
 from msm.statics import static_displacement
+from study.known.case import Case, Family
+from study.known.finding import Finding, beside, value
 from study.known.stability import energy
 from study.known.stability.bodies import Boxes, Make, lattice_of, watch
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, beside, value
-from study.known.stability.growth import longest_stable_step
+from study.known.stability.growth import measured_limit
 
 Floats = NDArray[np.float64]
 
@@ -50,47 +48,29 @@ PARTED: dict[str, tuple[list[Box], float]] = {
 """Shapes of which a share is left out: what hangs on less than a face, or hardly fills a cell."""
 ROUNDING, SOLVED, MEASURED = 1e-12, 1e-6, 5e-3
 SIZES = (1e-3, 1.0, 10.0)
-HERE = "study.known.stability.cases.lattice_shapes"
+FAMILY = Family("lattice shapes", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Every shape by every closed form; what is left out; similarity; nothing to fill."""
+    """Cases of every shape by every closed form; of parts left out; of scaled organs."""
     for shape in SHAPES:
         for nu in (0.25, 0.45, 0.4999):
             title = f"energy of an affine motion, nu {nu:g}: {shape}"
-            yield _case(title, "stores", {"shape": shape, "nu": nu}, ROUNDING, quick=nu > 0.49)
-        yield _case(f"rest: {shape}", "rests", {"shape": shape}, SOLVED, quick=True)
-        yield _case(f"critical step: {shape}", "steps", {"shape": shape}, MEASURED)
+            yield FAMILY.case(
+                title, "stores", {"shape": shape, "nu": nu}, ROUNDING, quick=nu > 0.49
+            )
+        yield FAMILY.case(f"rest: {shape}", "rests", {"shape": shape}, SOLVED, quick=True)
+        yield FAMILY.case(f"critical step: {shape}", "steps", {"shape": shape}, MEASURED)
     for shape in PARTED:
-        yield _case(
+        yield FAMILY.case(
             f"share left out: {shape}", "leaves_out", {"shape": shape}, ROUNDING, quick=True
         )
     for size in SIZES:
         title = f"motion of an organ of {size:g} m, scaled from 6 cm"
-        yield _case(title, "scales", {"size": size}, 1e-9, quick=size > 1.0)
+        yield FAMILY.case(title, "scales", {"size": size}, 1e-9, quick=size > 1.0)
     for spacing, says in ((1e-5, r"lattice\.spacing.*enlarge"), (0.4, "no lattice cell")):
-        yield Case(
-            family="lattice shapes",
-            name=f"spacing of {spacing:g} m over 6 cm",
-            function=f"{HERE}:fills",
-            arguments={"spacing": spacing},
-            expected="refused",
-            says=says,
-            quick=True,
-        )
-
-
-def _case(
-    title: str, function: str, settings: dict[str, Any], tolerance: float, *, quick: bool = False
-) -> Case:
-    return Case(
-        family="lattice shapes",
-        name=title,
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        tolerance=tolerance,
-        quick=quick,
-    )
+        title, settings = f"spacing of {spacing:g} m over 6 cm", {"spacing": spacing}
+        yield FAMILY.case(title, "fills", settings, says)
 
 
 def stores(shape: str, nu: float) -> Finding:
@@ -109,7 +89,7 @@ def stores(shape: str, nu: float) -> Finding:
 
 
 def rests(shape: str) -> Finding:
-    """Conjugate gradients against relaxation, under its own weight."""
+    """Rest of a shape under its own weight by conjugate gradients beside that by relaxation."""
     assembly, material = _shaped(shape, Make(poisson_ratio=0.45, gravity=0.5))
     found, ended = relax(material.law, arrays(assembly, material, linear=True), tolerance=1e-9)
     if ended.status != "at rest":
@@ -118,13 +98,10 @@ def rests(shape: str) -> Finding:
 
 
 def steps(shape: str) -> Finding:
-    """The critical step, predicted and measured."""
+    """The critical step of a shape, predicted and measured."""
     assembly, material = _shaped(shape, Make(poisson_ratio=0.45))
     predicted = critical_time_step(assembly, material)
-    net, method = arrays(assembly, material, linear=True), INTEGRATORS[DEFAULT]
-    still = np.zeros_like(net.load)
-    measured = longest_stable_step(material.law, net, method, predicted, still, 1000)
-    return value(predicted, measured)
+    return value(predicted, measured_limit(assembly, material, DEFAULT, predicted, 1000))
 
 
 def leaves_out(shape: str) -> Finding:
@@ -135,7 +112,7 @@ def leaves_out(shape: str) -> Finding:
 
 
 def scales(size: float) -> Finding:
-    """Displacements over the size, in times and under loads that similarity asks for."""
+    """Displacements over an organ's size, at times and under loads that similarity asks for."""
     return beside(_moved(0.06), _moved(size))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,10 @@ from msm.model import Fixed, critical_time_step, run
 from msm.network import Network
 from msm.relaxation import relax
 from msm.statics import static_displacement
+from study.known.case import Case, Family
+from study.known.finding import Ending, Finding, at_most, beside, value
 from study.known.stability import energy
 from study.known.stability.bodies import Make, lattice_of, watch
-from study.known.stability.case import Case
-from study.known.stability.finding import Ending, Finding, at_most, beside, value
 from study.problem.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
@@ -35,46 +35,27 @@ SOLVED = 1e-6
 """What Newton's method and relaxation leave of the displacement."""
 SHORT = 1e-3
 """(omega dt)^2 at 0.02 of the limit: the share of a force that a short step keeps back."""
-HERE = "study.known.stability.cases.long_steps"
+FAMILY = Family("long steps", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Each integrator without a limit, by the length of its steps."""
+    """Cases of each integrator without a limit, by the length of its steps."""
     for times in TIMES:
-        quick = times == 1e3
+        long, quick = f"{times:g} times the explicit limit", times == 1e3
+        bounded = partial(FAMILY.case, expected="bounded", quick=quick)
         for linear in (True, False):
             kind = "linear" if linear else "nonlinear"
             settings = {"times": times, "linear": linear}
-            yield _case(f"{kind}, to rest: implicit-euler", times, "to_rest", settings, SOLVED)
-            yield _case(f"{kind}: xpbd", times, "softened", settings, 0.0, "bounded", quick=quick)
-        settings = {"times": times}
-        title = "linear, energy kept: implicit-midpoint"
-        yield _case(title, times, "kept", settings, SOLVED, "bounded", quick=quick)
-    yield _case("linear, to rest: xpbd", 0.02, "to_rest_by_position", {"times": 0.02}, SHORT)
+            title = f"{long}, {kind}, to rest: implicit-euler"
+            yield FAMILY.case(title, "to_rest", settings, SOLVED)
+            yield bounded(f"{long}, {kind}: xpbd", "softened", settings, 0.0)
+        title = f"{long}, linear, energy kept: implicit-midpoint"
+        yield bounded(title, "kept", {"times": times}, SOLVED)
+    title = "0.02 times the explicit limit, linear, to rest: xpbd"
+    yield FAMILY.case(title, "to_rest_by_position", {"times": 0.02}, SHORT)
     for times in (1e3, 1e4):
-        title, settings = "moved by more than its size: xpbd", {"times": times}
-        yield _case(title, times, "called_lost", settings, SOLVED, "diverged")
-
-
-def _case(
-    title: str,
-    times: float,
-    function: str,
-    settings: dict[str, Any],
-    tolerance: float,
-    expected: Ending = "value",
-    *,
-    quick: bool = False,
-) -> Case:
-    return Case(
-        family="long steps",
-        name=f"{times:g} times the explicit limit, {title}",
-        function=f"{HERE}:{function}",
-        arguments=settings,
-        expected=expected,
-        tolerance=tolerance,
-        quick=quick,
-    )
+        title = f"{times:g} times the explicit limit, moved by more than its size: xpbd"
+        yield FAMILY.case(title, "called_lost", {"times": times}, SOLVED, expected="diverged")
 
 
 def to_rest(times: float, *, linear: bool) -> Finding:
@@ -133,7 +114,7 @@ def fastest_part(net: Network, k: float) -> float:
 
 
 def called_lost(times: float) -> Finding:
-    """The same in a run: a body moved by more than its size is called diverged, not a result."""
+    """A run that moves its body by more than its size is called diverged, not a result."""
     assembly, material = _loaded()
     dt = times * critical_time_step(assembly, material)
     seen = watch(assembly, 100 * dt, 101)

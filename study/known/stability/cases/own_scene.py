@@ -21,9 +21,9 @@ from msm.integrators import INTEGRATORS
 from msm.laws import Law, stiffness
 from msm.model import critical_time_step
 from msm.relaxation import relax
-from study.known.stability.case import Case
-from study.known.stability.finding import Finding, at_most, beside, value
-from study.known.stability.growth import longest_stable_step
+from study.known.case import Case
+from study.known.finding import Finding, at_most, beside, value
+from study.known.stability.growth import EXPLICIT, measured_limit
 from study.models.lattice import LatticeModel, PreparedLattice
 from study.models.model import Prepared
 from study.models.table import kind, model
@@ -53,7 +53,7 @@ def cases(scene: Scene) -> Iterator[Case]:
     for name in tried(scene):
         given = {"name": name, "scene": resolved(scene), "mesh": _digest(scene)}
         if isinstance(model(scene, name), LatticeModel):
-            if np.isfinite(INTEGRATORS[scene.lattice.integrator].oscillation):
+            if scene.lattice.integrator in EXPLICIT:
                 yield _case(f"{name}, critical step", "steps", given, MEASURED, quick=True)
             yield _case(f"{name}, rest under its load", "rests", given, SOLVED)
         for times in LOADS:
@@ -96,11 +96,8 @@ def steps(name: str, scene: dict[str, Any], mesh: str) -> Finding:
     integrator = one.model.lattice.integrator
     material = replace(one.springs.material, damping=UNDAMPED)
     predicted = float(critical_time_step(one.assembly, material, integrator))
-    net = arrays(one.assembly, material, linear=one.linear)
-    net, still = net._replace(load=np.zeros_like(net.load)), np.zeros_like(net.load)
-    watched = WATCHED.get(integrator, 1000)
-    method = INTEGRATORS[integrator]
-    measured = longest_stable_step(material.law, net, method, predicted, still, watched)
+    arguments = (one.assembly, material, integrator, predicted, WATCHED.get(integrator, 1000))
+    measured = measured_limit(*arguments, linear=one.linear)
     if _has_corner(material.law):
         return at_most(measured, predicted, "a law with a corner at rest", "value")
     return value(predicted, measured)

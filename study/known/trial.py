@@ -1,4 +1,4 @@
-"""One case, run so that it ends: in a finding, a refusal, an error, or at its time limit."""
+"""One case, run so that it ends: in findings, a refusal, an error, or at its time limit."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import ctypes
 import math
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import import_module
 from typing import Any
 
-from study.known.stability.finding import Finding
+from study.known.finding import Finding
 
 
 class OverrunError(Exception):
@@ -20,7 +20,12 @@ class OverrunError(Exception):
 
 
 def trial(function: str, arguments: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """The finding of a case as plain values; a number that is not finite is None.
+    """The findings of a case as plain values; a number that is not finite is None."""
+    return {"findings": [_plain(found) for found in attempted(function, arguments, seconds)]}
+
+
+def attempted(function: str, arguments: Mapping[str, Any], seconds: float) -> tuple[Finding, ...]:
+    """The findings of a case; what it found before it failed is left out.
 
     A ValueError is a refusal. Any other exception is an error, and so is a warning: who meets the
     case in a run would have been told of it by the machinery and not by the program.
@@ -30,15 +35,19 @@ def trial(function: str, arguments: dict[str, Any], seconds: float) -> dict[str,
             warnings.simplefilter("error")
             module, name = function.split(":")
             found = getattr(import_module(module), name)(**arguments)
+            return (found,) if isinstance(found, Finding) else tuple(found)
     except ValueError as error:
-        found = Finding("refused", message=str(error))
+        return (Finding("refused", message=str(error)),)
     except OverrunError:
-        found = Finding("error", message=f"did not end within {seconds:g} s")
+        return (Finding("error", message=f"did not end within {seconds:g} s"),)
     except Exception as error:  # whatever it is, it is what the case found
-        found = Finding("error", message=f"{type(error).__name__}: {error}")
+        return (Finding("error", message=f"{type(error).__name__}: {error}"),)
+
+
+def _plain(finding: Finding) -> dict[str, Any]:
     return {
         key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in asdict(found).items()
+        for key, value in asdict(finding).items()
     }
 
 
