@@ -17,7 +17,9 @@ TOP_LEVEL = {
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
+    "CITATION.cff",
     "LICENSE",
+    "MANIFEST.in",
     "requirements.lock",
 }
 
@@ -54,12 +56,16 @@ def test_top_level_holds_what_is_named_and_nothing_else():
 
 def test_every_dependency_is_pinned_in_the_lock_file():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = project["dependencies"] + project["optional-dependencies"]["test"]
+    extras = ("surface", "workers", "test", "docs")
+    wanted = project["dependencies"] + [
+        line for extra in extras for line in project["optional-dependencies"][extra]
+    ]
     names = {re.match(r"[A-Za-z0-9_-]+", line)[0].lower().replace("_", "-") for line in wanted}
+    names.remove(project["name"])  # test takes in the extras that tests need
     locked = set(re.findall(r"^([a-z0-9._-]+)==", (ROOT / "requirements.lock").read_text(), re.M))
     assert names <= {name.replace("_", "-") for name in locked}
 
 
-def test_the_tests_are_not_shipped():
+def test_the_tests_are_not_installed():
     include = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
     assert not any(name.startswith("tests") for name in include["packages"]["find"]["include"])
