@@ -20,6 +20,7 @@ TOP_LEVEL = {
     "CITATION.cff",
     "LICENSE",
     "MANIFEST.in",
+    "docs",
     "requirements.lock",
 }
 
