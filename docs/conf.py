@@ -1,5 +1,6 @@
 """Settings of the pages: `sphinx-build -W docs build/docs` builds them, without a network."""
 
+import ast
 import importlib
 import pkgutil
 import shutil
@@ -70,16 +71,29 @@ def api_page(name: str, title: str) -> str:
     return "\n".join(parts)
 
 
-def write_api_pages(folder: Path) -> None:
-    """Write a page for every package of FACES that there is."""
+def example_page(scripts: list[Path]) -> str:
+    """The page of the programs in gallery/, each under the sentence it opens with."""
+    parts = ["# Short programs\n"]
+    for script in scripts:
+        sentence = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8")))
+        parts += [f"## {script.stem.replace('_', ' ').capitalize()}\n", f"{sentence}\n"]
+        parts += [f"```{{literalinclude}} ../gallery/{script.name}", ":language: python", "```\n"]
+    return "\n".join(parts)
+
+
+def write_pages(folder: Path) -> None:
+    """Write a page for every package of FACES that there is, and one of the short programs."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for name, title in FACES.items():
         if (HERE.parent / name.replace(".", "/")).is_dir():
             (folder / f"{name}.md").write_text(api_page(name, title), encoding="utf-8")
+    scripts = sorted((HERE / "gallery").glob("*.py"))
+    if scripts:
+        (folder / "examples.md").write_text(example_page(scripts), encoding="utf-8")
 
 
-write_api_pages(HERE / "api")
+write_pages(HERE / "generated")
 
 
 def plain_text(
