@@ -40,6 +40,13 @@ def test_ci_runs_the_commands_of_the_readme_word_for_word():
         assert command in ci
 
 
+def test_hooks_before_a_commit_are_checks_of_ci():
+    ci = (ROOT / ".ci/run").read_text().splitlines()
+    hooks = re.findall(r"entry: (.+)", (ROOT / ".pre-commit-config.yaml").read_text())
+    assert len(hooks) == 4
+    assert {f".venv/bin/{hook}" for hook in hooks} <= set(ci)
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_packages_are_those_of_this_repository(package):
     """Unrelated published packages bear some of these names."""
