@@ -42,6 +42,7 @@ html_show_copyright = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {name: name for name in ("Floats", "Ints")}  # arrays of float64, of int64
 napoleon_google_docstring = False
 suppress_warnings = ["ref.python"]  # a short name in an annotation may stand in two packages
 
