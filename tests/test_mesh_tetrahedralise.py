@@ -83,3 +83,9 @@ def test_a_failing_mesher_is_an_error(mesher, answer):
     mesher(answer)
     with pytest.raises(MeshError, match="fTetWild"):
         tetrahedralise(ELLIPSOID, 0.05)
+
+
+def test_a_missing_mesher_is_named_with_its_remedy(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pytetwild", None)  # hidden: importing it fails
+    with pytest.raises(MeshError, match=r'pytetwild.*pip install -e "\.\[surface\]"'):
+        tetrahedralise(ELLIPSOID, 0.05)

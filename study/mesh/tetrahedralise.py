@@ -34,8 +34,8 @@ def tetrahedralise(
     Raises
     ------
     MeshError
-        If the size does not suit the surface, the mesher fails or it changes the volume by more
-        than 2 %.
+        If the size does not suit the surface, the mesher is not installed, fails, or changes the
+        volume by more than 2 %.
     """
     volume = enclosed_volume(surface.points, surface.triangles)
     _check_size(surface, element_size, volume)
@@ -76,8 +76,10 @@ def _diagonal(surface: SurfaceMesh) -> float:
 
 
 def _filled(surface: SurfaceMesh, element_size: float) -> Draft:
-    import pytetwild
-
+    try:
+        import pytetwild
+    except ImportError as error:
+        raise MeshError(_missing(error)) from error
     try:
         # It leaves a file behind in the working directory, which is therefore made a passing one.
         with TemporaryDirectory() as folder, chdir(folder):
@@ -95,3 +97,11 @@ def _filled(surface: SurfaceMesh, element_size: float) -> Draft:
         raise MeshError("fTetWild found nothing inside the surface: is it closed?")
     started = start_draft(np.asarray(points, dtype=float), tetrahedra.astype(np.int64), np.inf)
     return replace(started, notes=())
+
+
+def _missing(error: ImportError) -> str:
+    """What to do where there is no mesher, which is not built for every platform."""
+    return (
+        f"a closed surface is filled with tetrahedra by pytetwild, which cannot be imported "
+        f'({error}): install it with pip install -e ".[surface]", or give the organ as tetrahedra'
+    )
