@@ -5,11 +5,16 @@ liver.csv and the sensitivity of the estimates.
 """
 
 import csv
-import json
 import shutil
 import sys
 import tempfile
 from pathlib import Path
+
+import typst
+
+from reports.field_figures import field_figures, job, views
+from reports.renders import render
+from study.results import Results
 
 HERE = Path(__file__).parent
 COLUMNS = (
@@ -18,38 +23,32 @@ COLUMNS = (
 )
 
 
-def rows(folder: Path) -> list[list[object]]:
+def rows(results: Results) -> list[list[object]]:
     """A row per model, in the order of the run: columns as in COLUMNS, None where there is none."""
-    numbers = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    with (folder / "errors.csv").open(newline="", encoding="utf-8") as file:
-        errors = {tuple(line[:3]): float(line[3]) for line in list(csv.reader(file))[1:]}
+    shares = {
+        (one.model, one.reference, one.quantity): one.value for one in results.field_differences
+    }
     found = []
-    for record in numbers["models"]:
-        name = record["name"]
-        lower, upper = numbers["stiffness"].get(name[4:], {}).get("interval_pa", (None, None))
+    for model in results.record.models:
+        estimate = results.record.fuzzy.systems.get(model.system or "")
+        lower, upper = (estimate and estimate.interval_pa) or (None, None)
         found.append(
             [
-                *(name, record.get("small_strain_modulus_pa"), lower, upper),
-                errors.get((name, "fem", "field-relative-l2-peak")),
-                errors.get((name, "fem", "field-relative-l2-peak-at-best-factor")),
-                record.get("mesh_error", {}).get("field_peak"),
-                record.get("unknowns"),
+                *(model.name, model.small_strain_modulus_pa, lower, upper),
+                shares.get((model.name, "fem", "field-relative-l2-peak")),
+                shares.get((model.name, "fem", "field-relative-l2-peak-at-best-factor")),
+                model.mesh_error and model.mesh_error.field_peak,
+                model.elements and model.elements.unknowns,
             ]
         )
     return found
 
 
-def picture(folder: Path) -> bytes:
+def picture(results: Results) -> bytes:
     """PNG of the deformed organ in each model at peak load, as page one of the report has it."""
-    import typst
-
-    from reports.field_figures import field_figures, job, views
-    from reports.renders import render
-    from study.results.folder import read
-
-    seen = views(read(folder))
+    seen = views(results)
     if seen is None:
-        raise ValueError(f"{folder}: results without fields; run the liver with renders = true")
+        raise ValueError("results without fields: run the liver with renders = true")
     with tempfile.TemporaryDirectory() as name:
         page = Path(name) / "page.typ"
         (page.parent / "fields.svg").write_bytes(field_figures(seen, render(job(seen)))[0])
@@ -59,11 +58,12 @@ def picture(folder: Path) -> bytes:
 
 def main(folder: Path) -> None:
     """Write the tables and the picture of a results folder."""
+    results = Results.load(folder)
     with (HERE / "data" / "liver.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerows([COLUMNS, *rows(folder)])
+        writer.writerows([COLUMNS, *rows(results)])
     shutil.copyfile(folder / "sensitivity.csv", HERE / "data" / "sensitivity.csv")
-    (HERE / "liver.png").write_bytes(picture(folder))
+    (HERE / "liver.png").write_bytes(picture(results))
 
 
 if __name__ == "__main__":
