@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pkgutil import resolve_name
+from typing import TYPE_CHECKING
 
-from study.models.model import Estimates, Model, ModelKind, PointModel
-from study.scene import Scene
+if TYPE_CHECKING:
+    from study.models.model import Estimates, Model, ModelKind, PointModel
+    from study.scene import Scene
 
 MODELS = {
     "fem": "study.models.finite_elements:KIND",
