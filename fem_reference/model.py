@@ -24,7 +24,7 @@ from fem_reference.superposition import (
     Superposed,
     enough_modes,
     enough_ritz_vectors,
-    posing,
+    excitation_of,
     superposed,
 )
 from study.mesh.kinds import TetrahedralMesh
@@ -113,8 +113,8 @@ def _superposed(
 ) -> Solution:
     """In a subspace; its strain also where a control point is farthest out."""
     started = time.perf_counter()
-    posed = posing(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
-    found = superposed(posed, choose(body, posed, method.modes, advance))
+    excitation = excitation_of(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
+    found = superposed(excitation, choose(body, excitation, method.modes, advance))
     wall = time.perf_counter() - started
     for sample in range(len(recorder.observation.times)):
         recorder.motion(sample, *(curve[sample] for curve in found.curves))

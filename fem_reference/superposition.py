@@ -61,7 +61,7 @@ class Superposed:
 
 
 @dataclass(frozen=True)
-class Posing:
+class Excitation:
     """What the motion follows from beside the body; the load is linear between `times` [s].
 
     Every `every`-th of the times is a sample; `at_probes` takes nodal values to control points.
@@ -97,22 +97,24 @@ class Posing:
         )
 
 
-def posing(damping: RayleighDamping, factor: Factor, recorder: Recorder, every: int) -> Posing:
+def excitation_of(
+    damping: RayleighDamping, factor: Factor, recorder: Recorder, every: int
+) -> Excitation:
     """That of a recorder's samples, with so many steps of the load in each."""
     samples = recorder.observation.times
     times = np.linspace(samples[0], samples[-1], (len(samples) - 1) * every + 1)
-    return Posing(damping, factor, times, every, recorder.at_probes)
+    return Excitation(damping, factor, times, every, recorder.at_probes)
 
 
-def superposed(posed: Posing, subspace: Subspace) -> Superposed:
+def superposed(excitation: Excitation, subspace: Subspace) -> Superposed:
     """Motion in a subspace."""
     return Superposed(
         subspace,
-        *posed.coordinates(subspace),
-        posed.curves(subspace),
-        posed.change(subspace),
-        float(posed.times[1] - posed.times[0]),
-        len(posed.times) - 1,
+        *excitation.coordinates(subspace),
+        excitation.curves(subspace),
+        excitation.change(subspace),
+        float(excitation.times[1] - excitation.times[0]),
+        len(excitation.times) - 1,
     )
 
 
@@ -127,7 +129,7 @@ def subspace_trajectory(
     """What is observed of a body's motion in a given subspace, by so many steps of the load."""
     recorder = Recorder(body, observation)
     seen, V = recorder.at_probes, subspace.vectors
-    coordinates = posing(damping, factor, recorder, steps_per_sample).coordinates(subspace)
+    coordinates = excitation_of(damping, factor, recorder, steps_per_sample).coordinates(subspace)
     for sample, (y, rate) in enumerate(zip(*coordinates, strict=True)):
         u, v = V @ y, V @ rate
         recorder.motion(sample, at_points(seen, u), at_points(seen, v))
@@ -135,23 +137,25 @@ def subspace_trajectory(
     return recorder.trajectory
 
 
-Choose = Callable[[Body, Posing, int, Advance], Subspace]
+Choose = Callable[[Body, Excitation, int, Advance], Subspace]
 """A subspace for a body's motion, of so many modes where they are asked for."""
 
 
-def enough_modes(body: Body, posed: Posing, modes: int, advance: Advance) -> Subspace:
+def enough_modes(body: Body, excitation: Excitation, modes: int, advance: Advance) -> Subspace:
     """So many modes of vibration."""
-    del posed, advance
+    del excitation, advance
     return modal_subspace(body, modes)
 
 
-def enough_ritz_vectors(body: Body, posed: Posing, modes: int, advance: Advance) -> Subspace:
+def enough_ritz_vectors(
+    body: Body, excitation: Excitation, modes: int, advance: Advance
+) -> Subspace:
     """Load-dependent Ritz vectors, until the last ones change little."""
     del modes
     growing, limit = ritz_subspaces(body), min(MAX_VECTORS, body.stiffness.size)
     found, change = next(growing), np.inf
     while found.load.size < limit and change > TRUNCATION:
         *_, found = islice(growing, min(GROWTH, limit - found.load.size))
-        change = posed.change(found)
+        change = excitation.change(found)
         advance(found.load.size / limit)
     return found

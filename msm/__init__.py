@@ -5,12 +5,12 @@ A lattice over an organ, made of linear springs of E = 4 kPa, under the tool of 
 >>> import msm
 >>> from study.scene.file import read_scene
 >>> from study.scene.problem import problem_of
->>> posed = problem_of(read_scene("block"))
->>> organ = posed.geometry.body, posed.surface_rule
->>> body = msm.assemble(*organ, 1060.0, 0.02, posed.foundation, posed.tool)
+>>> problem = problem_of(read_scene("block"))
+>>> organ = problem.geometry.body, problem.surface_rule
+>>> body = msm.assemble(*organ, 1060.0, 0.02, problem.foundation, problem.tool)
 >>> springs = msm.Hooke(msm.calibration.reference_stiffness(4e3, 0.02))
 >>> material = msm.Material(springs, damping=msm.NodalDamping(30.0))
->>> found = msm.run(body, material, posed.factor, posed.observation)
+>>> found = msm.run(body, material, problem.factor, problem.observation)
 >>> found.trajectory.status, found.trajectory.displacement.shape
 ('finished', (101, 2, 3))
 

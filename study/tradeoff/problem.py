@@ -29,7 +29,7 @@ TIDY_DIGITS = 12
 
 @dataclass(frozen=True)
 class Stated:
-    """A scene posed on its organ; the field is looked at once in each tetrahedron.
+    """A scene and its problem; the field is looked at once in each tetrahedron.
 
     On the built-in liver that moves an error by 2 % of itself against eight points in each.
     """
