@@ -16,6 +16,7 @@ from study.run.study import run_study
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from tests.kept_results import ROOT, as_good_as_now
 
 SMALL = (
     'organ.size=["60 mm", "40 mm", "30 mm"]',
@@ -66,6 +67,18 @@ def paper_scene() -> Scene:
 @pytest.fixture(scope="session")
 def paper_results(paper_scene):
     return run_study(paper_scene)
+
+
+@pytest.fixture(scope="session")
+def liver_scene() -> Scene:
+    return read_scene("liver")
+
+
+@pytest.fixture(scope="session")
+def liver_results(liver_scene):
+    """Those that `liver-study run` has just left, or a run of its own."""
+    kept = as_good_as_now(ROOT / "results" / "liver", liver_scene)
+    return run_study(liver_scene) if kept is None else kept
 
 
 @pytest.fixture

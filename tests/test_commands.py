@@ -7,11 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from study import progress
+from study.__main__ import main
 from study.results import tables
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,6 +37,35 @@ def study(*arguments, cwd=None, **options):
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         **options,
     )
+
+
+@dataclass(frozen=True)
+class Ended:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def typed(monkeypatch, capsys, tmp_path):
+    """The program on words typed in an empty folder, without starting another Python."""
+
+    def enter(*words):
+        monkeypatch.setattr(sys, "argv", ["liver-study", *words])
+        code = 0
+        with warnings.catch_warnings():
+            # Our words are where the program looks for them; the library expects arguments.
+            warnings.filterwarnings("ignore", message="Cyclopts application invoked without tokens")
+            try:
+                main()
+            except SystemExit as left:
+                code = left.code or 0
+        return Ended(code, *capsys.readouterr())
+
+    handler = signal.getsignal(signal.SIGTERM)
+    monkeypatch.chdir(tmp_path)
+    yield enter
+    signal.signal(signal.SIGTERM, handler)
 
 
 @pytest.fixture(scope="module")
@@ -98,41 +130,49 @@ def test_the_report_is_made_again_byte_for_byte(paper_folder):
         (["rules", "--out", "liver.txt"], ".fis or a .json"),
     ],
 )
-def test_bad_input_ends_with_code_2_one_message_and_nothing_written(arguments, words, tmp_path):
-    done = study(*arguments, cwd=tmp_path)
+def test_bad_input_ends_with_code_2_one_message_and_nothing_written(
+    arguments, words, typed, tmp_path
+):
+    done = typed(*arguments)
     assert done.returncode == 2
     assert words in done.stderr
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_message_and_its_code_leave_the_process(tmp_path):
+    done = study("run", "livr", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("liver-study: ")
     assert "Traceback" not in done.stderr
-    assert not list(tmp_path.rglob("*.json"))
 
 
-def test_an_unknown_option_ends_with_code_2(tmp_path):
-    assert study("run", "paper", "--ouch", cwd=tmp_path).returncode == 2
+def test_an_unknown_option_ends_with_code_2(typed):
+    assert typed("run", "paper", "--ouch").returncode == 2
 
 
-def test_a_mesh_file_that_is_broken_is_refused_by_name(tmp_path):
+def test_a_mesh_file_that_is_broken_is_refused_by_name(typed, tmp_path):
     (tmp_path / "broken.stl").write_text("solid nothing")
-    done = study("check", "broken.stl", cwd=tmp_path)
+    done = typed("check", "broken.stl")
     assert done.returncode == 2
     assert "broken.stl" in done.stderr
 
 
-def test_check_tells_what_would_be_run(tmp_path):
-    done = study("check", "block", cwd=tmp_path)
+def test_check_tells_what_would_be_run(typed, tmp_path):
+    done = typed("check", "block")
     assert done.returncode == 0, done.stderr
     assert "msm-mamdani" in done.stdout
     assert "critical step" in done.stdout
     assert not list(tmp_path.iterdir())
 
 
-def test_scenes_are_listed_with_their_titles():
-    done = study("scenes")
+def test_scenes_are_listed_with_their_titles(typed):
+    done = typed("scenes")
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["liver", "block", "paper"]
 
 
-def test_estimate_speaks_kpa_to_people_and_si_to_programs():
-    shown = study("estimate", "--hcv", "9.5").stdout
-    numbers = json.loads(study("estimate", "--hcv", "9.5", "--json").stdout)
+def test_estimate_speaks_kpa_to_people_and_si_to_programs(typed):
+    shown = typed("estimate", "--hcv", "9.5").stdout
+    numbers = json.loads(typed("estimate", "--hcv", "9.5", "--json").stdout)
     assert "kPa" in shown
     value = numbers["mamdani"]["estimate_pa"]
     assert f"{value / 1e3:.2f}" in shown
@@ -181,8 +221,12 @@ def test_an_interrupted_run_leaves_nothing_behind(number, tmp_path):
 
 
 def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path):
-    arguments = ["run", "block", "--no-report", "--set", "models=['msm']", "--set"]
-    arguments.append("fuzzy.sensitivity_readings=0")
+    changes = (
+        "models=['msm']",
+        "fuzzy.systems=['mamdani', 'sugeno']",
+        "fuzzy.sensitivity_readings=0",
+    )
+    arguments = ["run", "block", "--no-report", *(w for c in changes for w in ("--set", c))]
     whole = study(*arguments, "--out", str(tmp_path / "whole"))
     assert whole.returncode == 0, whole.stderr
     process = subprocess.Popen(

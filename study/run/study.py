@@ -15,7 +15,13 @@ from study.problem.problem import Problem
 from study.problem.response import Response
 from study.results.folder import Arrays, Results
 from study.results.provenance import provenance
-from study.results.records import ControlPoint, Dimensionless, LatticeLimits, StudyRecord
+from study.results.records import (
+    ControlPoint,
+    Dimensionless,
+    LatticeLimits,
+    Provenance,
+    StudyRecord,
+)
 from study.run.assumptions import assumptions
 from study.run.dimensionless import dimensionless
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
@@ -44,12 +50,13 @@ def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
     Raises ValueError for an organ, support or tool that cannot be used.
     """
     started = time.perf_counter()
+    made_by = provenance(write_scene(scene), scene.organ.mesh)  # as it is now, not after the run
     with watch.progress.stage("fuzzy systems"):
         tuned = any(kind(name).is_tuned for name in named(scene))
         fuzzy = run_fuzzy(scene) if tuned else FuzzySide()
     compared = (_on_point if scene.is_point else _on_organ)(scene, fuzzy, watch)
     with watch.progress.stage("similarity"):
-        results = _results(scene, fuzzy, compared)
+        results = _results(scene, fuzzy, compared, made_by)
     record = replace(results.record, study_wall_s=time.perf_counter() - started)
     return replace(results, record=record)
 
@@ -97,7 +104,7 @@ def _fields(problem: Problem, runs: dict[str, ModelRun]) -> Arrays:
     } | {name: run.trajectory.surface_field for name, run in runs.items()}
 
 
-def _results(scene: Scene, fuzzy: FuzzySide, found: Compared) -> Results:
+def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenance) -> Results:
     runs, response = found.runs, found.response
     models = tuple(run.record for run in runs.values())
     # A lattice's mass is checked for each model on it, and is told once.
@@ -122,7 +129,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared) -> Results:
         ),
         strain_limit=STRAIN_LIMIT,
         study_wall_s=None,
-        provenance=provenance(write_scene(scene), scene.organ.mesh),
+        provenance=made_by,
         dimensionless=found.dimensionless,
         lattice_limits=found.lattice_limits,
         control_point=found.control_point,
