@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pkgutil import resolve_name
@@ -33,7 +34,9 @@ class Choice:
         if not isinstance(value, str) or value not in names:
             quoted = [repr(name) for name in names]
             listed = " or ".join(filter(None, [", ".join(quoted[:-1]), quoted[-1]]))
-            raise ValueError(f"should be {listed}")
+            near = difflib.get_close_matches(str(value), names, n=1)
+            hint = f", did you mean {near[0]!r}?" if near else ""
+            raise ValueError(f"should be {listed}{hint}")
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:

@@ -14,6 +14,7 @@ from msm import model as msm
 from msm import tetrahedra
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
+from msm.laws import LAWS, force_law_of
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
 from msm.stepper import Stepper as LatticeStepper
 from msm.timestep import whole_steps
@@ -129,11 +130,18 @@ class PreparedLattice:
         damping = self.springs.material.damping
         dashpots = f" and {1e3 * damping.beta:.4g} ms" if damping.beta > 0.0 else ""
         nodes, count = len(self.assembly.mass), len(self.assembly.springs.weight)
+        step = self.critical_time_step
+        limit = f"{1e3 * step:.3g} ms" if np.isfinite(step) else "none"
         return [
             f"{where}: {nodes} nodes, {count} springs",
-            f"{self.model.name}: modulus {self.springs.modulus / 1e3:.2f} kPa, critical step "
-            f"{1e3 * self.critical_time_step:.3g} ms, damping {damping.gamma_0:.4g} 1/s{dashpots}",
+            f"{self.model.name}: law {self._law()}, modulus {self.springs.modulus / 1e3:.2f} kPa, "
+            f"critical step {limit}, damping {damping.gamma_0:.4g} 1/s{dashpots}",
         ]
+
+    def _law(self) -> str:
+        """Name in the table of the law that the springs have."""
+        kind = force_law_of(self.springs.material.law)
+        return next(name for name, found in LAWS.items() if found is kind)
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion by the scene's steps, or by equal ones of at most `longest` [s]."""

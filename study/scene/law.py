@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import math
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ Numbers = float | tuple[float, ...]
 
 KINDS = Choice("msm.laws:LAWS")
 DEFAULT = "piecewise"
+FREE_OF_TENSION = 1e-9
+"""How far from zero the tension of a law at rest may round, relative to its stiffness."""
 
 
 class _Wrong(NamedTuple):
@@ -77,7 +80,7 @@ class SpringLaw:
         if wrong:
             raise _errors(wrong)
         law = cls(kind, {key: _numbers(value) for key, value in given.items()})
-        law.make(1.0)
+        _refuse_unsound(kind, law.make(1.0))
         return law
 
     @classmethod
@@ -86,6 +89,18 @@ class SpringLaw:
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(cls.read)
+
+
+def _refuse_unsound(kind: str, law: Law) -> None:
+    """ValueError for a law that no spring at rest can have, whatever its numbers are."""
+    from msm.laws import stiffness_at_rest, tension
+
+    pull, slopes = tension(law, 0.0), stiffness_at_rest(law)
+    if not abs(pull) <= FREE_OF_TENSION or not all(0.0 < k < math.inf for k in slopes):
+        raise ValueError(
+            f"the law {kind} has tension {pull:g} and slopes {slopes[0]:g} and {slopes[1]:g} at "
+            "rest, relative to a linear spring; they must be 0, and finite and above 0"
+        )
 
 
 def _wrong_keys(kind: str, given: Mapping[str, object]) -> Iterator[_Wrong]:
