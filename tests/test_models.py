@@ -66,6 +66,11 @@ def test_all_models_of_a_scene_have_names_of_their_own(small_scene):
     assert references() == ["fem", "basafa"]
 
 
+def test_a_point_takes_any_kind_that_has_a_form_for_it(monkeypatch):
+    monkeypatch.setitem(MODELS, "mine", MODELS["basafa"])
+    assert read_scene("paper", ['models=["mine"]']).models == ("mine",)
+
+
 def test_a_model_that_no_code_runs_is_refused_with_those_there_are():
     """It was once a name that the scene knew and nothing ran."""
     with pytest.raises(SceneError, match=r"models.*'rods'") as refusal:
