@@ -14,8 +14,9 @@ from study.annotation.choice import Choice
 from study.known.stability.cases import own_scene
 from study.models.estimates import estimates
 from study.models.finite_elements import PreparedElements
+from study.models.keeping import Keeping
 from study.models.lattice import LatticeModel
-from study.models.model import SILENT, ModelKind
+from study.models.model import SILENT, ModelKind, Watch
 from study.models.table import MODELS, kind, model, models_of, references
 from study.problem.history import HISTORIES
 from study.run import study as running
@@ -271,6 +272,14 @@ def tissue_error(scene):
 
 
 WAVE = ('tool.history={kind="sinusoid", frequency="1 Hz"}', "time.duration=2 s")
+
+
+def test_a_model_that_keeps_no_fields_says_so_where_they_are_wanted(small_scene, tmp_path):
+    ready = model(small_scene, "superposition").prepare(problem_of(small_scene))
+    wanted = Watch(SILENT.progress, Keeping(tmp_path, fields=tmp_path))
+    (note,) = ready.run(wanted).notes
+    assert "superposition" in note
+    assert not ready.run(SILENT).notes
 
 
 def test_a_superposition_in_a_scene_has_record_scores_and_an_error_by_steps():
