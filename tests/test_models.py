@@ -64,7 +64,7 @@ def test_all_models_of_a_scene_have_names_of_their_own(small_scene):
     assert len({one.name for one in found}) == len({one.label for one in found}) == len(found)
     assert len(found) == len(UNTUNED) + len(every.fuzzy.systems)
     assert [one.name for one in found if one.name in MODELS] == UNTUNED  # in the table's order
-    assert references() == ["fem", "basafa"]
+    assert references(every) == ["fem", "basafa"]
 
 
 def test_a_point_takes_any_kind_that_has_a_form_for_it(monkeypatch):
