@@ -314,7 +314,7 @@ STIFFER = "lattice.law={strain=[-0.5, 0, 0.5], relative_tension=[-2, 0, 2]}"
 def own(function, *overrides, **more):
     """What a case of the scene with these overrides finds."""
     scene = read_scene("block", (*SHORT, *overrides))
-    return getattr(own_scene, function)("tissue", resolved(scene), "", **more)
+    return getattr(own_scene, function)("tissue", resolved(scene), None, **more)
 
 
 def test_the_critical_step_that_is_tried_is_that_of_the_scene_s_law_and_integrator():
