@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from msm.model import Run, run
     from msm.stability import critical_time_step
     from msm.statics import static_displacement
-    from msm.stepper import Stepper
+    from msm.stepper import LatticeStepper
     from msm.timestep import Automatic, Counts, Fixed, Rate
     from msm.volume import volume_term
 
@@ -51,12 +51,12 @@ __all__ = [
     "ForceLaw",
     "Hooke",
     "Integrator",
+    "LatticeStepper",
     "Material",
     "NodalDamping",
     "Piecewise",
     "Rate",
     "Run",
-    "Stepper",
     "assemble",
     "calibration",
     "control_point",

@@ -18,7 +18,7 @@ from msm.network import Network, network
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
-from study.organ.occupancy import Body
+from study.organ.occupancy import SolidShape
 from study.problem.contact import Foundation, ToolPatch
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Material:
 
 
 def assemble(
-    body: Body,
+    body: SolidShape,
     surface: SurfaceRule,
     density: float,
     spacing: float,

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from msm.kinematics import inverted_cells
-from study.organ.occupancy import Body
+from study.organ.occupancy import SolidShape
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -75,7 +75,7 @@ class CellLattice:
         return int(inverted_cells(self.cells, self.spacing, displacement))
 
 
-def build(body: Body, lower: Floats, upper: Floats, spacing: float) -> CellLattice:
+def build(body: SolidShape, lower: Floats, upper: Floats, spacing: float) -> CellLattice:
     """Lattice of a body within the box `lower`, `upper` [m].
 
     The cells start at the lower corner. Only the largest set of cells joined by faces is kept, for
@@ -107,7 +107,7 @@ def _strides(shape: Ints) -> Ints:
     return np.array([shape[1] * shape[2], shape[2], 1])
 
 
-def _fill_fractions(body: Body, origin: Floats, shape: Ints, spacing: float) -> Floats:
+def _fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: float) -> Floats:
     """Share of each cell inside the body, from a regular grid of points in it."""
     s = SAMPLES_PER_EDGE
     axes = [origin[i] + spacing * (np.arange(shape[i] * s) + 0.5) / s for i in range(3)]

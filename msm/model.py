@@ -18,7 +18,7 @@ from msm.linearised import largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, critical_time_step
 from msm.statics import static_displacement
-from msm.stepper import Stepper
+from msm.stepper import LatticeStepper
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
@@ -29,11 +29,11 @@ __all__ = [
     "Checkpoint",
     "Counts",
     "Fixed",
+    "LatticeStepper",
     "Material",
     "Rate",
     "Run",
     "Step",
-    "Stepper",
     "arrays",
     "assemble",
     "critical_time_step",
@@ -103,7 +103,7 @@ def run(
     many steps, if the step does not suit the samples, the integrator the springs, or the
     checkpoint the run.
     """
-    stepper = Stepper(assembly, material, factor, integrator, linear=linear)
+    stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear)
     interval = float(observation.times[1] - observation.times[0])
     pace = Pace(step, interval, len(observation.times) - 1, stepper.limit_at_rest)
     _refuse_too_many_steps(pace)
@@ -119,7 +119,11 @@ def run(
 
 
 def _identity(
-    assembly: Assembly, stepper: Stepper, integrator: str, step: Step, observation: Observation
+    assembly: Assembly,
+    stepper: LatticeStepper,
+    integrator: str,
+    step: Step,
+    observation: Observation,
 ) -> str:
     """Of all that the trajectory follows from; the load's history at samples and between them."""
     times = observation.times
@@ -130,7 +134,9 @@ def _identity(
     return identity(runs, body, integrator, step, seen, history)
 
 
-def _parts(motion: _Motion, stepper: Stepper, pace: Pace, recorder: _Recorder) -> dict[str, object]:
+def _parts(
+    motion: _Motion, stepper: LatticeStepper, pace: Pace, recorder: _Recorder
+) -> dict[str, object]:
     """What changes in a run, by the names of `msm.checkpoint`."""
     return {
         "motion": motion,
@@ -171,7 +177,7 @@ class _Motion:
 
 
 def _march(
-    stepper: Stepper,
+    stepper: LatticeStepper,
     pace: Pace,
     recorder: _Recorder,
     motion: _Motion,
@@ -213,7 +219,7 @@ def _lost(pace: Pace, recorder: _Recorder, sample: int, taken: int, node: int) -
 
 
 def _pass_interval(
-    stepper: Stepper, pace: Pace, recorder: _Recorder, sample: int
+    stepper: LatticeStepper, pace: Pace, recorder: _Recorder, sample: int
 ) -> tuple[int, int | None]:
     """Steps taken from a sample to the next; a node where they failed, and then not all of them."""
     count = pace.choose(sample)

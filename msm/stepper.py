@@ -17,7 +17,7 @@ from msm.timestep import LOOK
 Floats = NDArray[np.float64]
 
 
-class Stepper:
+class LatticeStepper:
     """The motion of a lattice, from rest, under the load times `factor` of the time [s].
 
     `u` [m] and `v` [m/s] (n, 3): where it is, at the time `t` [s]; `limit_at_rest` [s]: the

@@ -18,7 +18,7 @@ def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
 
         return [*lines, f"one control mass point of {point_problem_of(scene).mass:.4g} kg"]
     from study.models.estimates import estimates
-    from study.models.table import kind, models_of, named
+    from study.models.table import is_tuned, models_of
     from study.run.dimensionless import dimensionless
     from study.scene.problem import problem_of
 
@@ -26,8 +26,7 @@ def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
     lines += [f"note: {note}" for note in problem.geometry.notes]
     numbers = asdict(dimensionless(scene, problem))
     lines += [f"{key} = {value:.4g}" for key, value in numbers.items()]
-    tuned = any(kind(name).is_tuned for name in named(scene))
-    models = models_of(scene, estimates(scene) if tuned else {})
+    models = models_of(scene, estimates(scene) if is_tuned(scene) else {})
     described = (line for model in models for line in model.prepare(problem).describe())
     return [*lines, *dict.fromkeys(described)]
 

@@ -31,7 +31,7 @@ PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class EstimationRequest:
     """What the command line asked of `estimate`.
 
     `readings` [kPa] by aetiology; `systems` empty for all three; `settings` the given fields of
@@ -67,7 +67,7 @@ def settings_of(given: Mapping[str, Any]) -> LiverSettings:
     return LiverSettings(**liver, options=options)
 
 
-def answer(request: Request) -> Answer:
+def answer(request: EstimationRequest) -> Answer:
     """Do what the request asks. ValueError for what does not fit together, with the remedy."""
     for name in request.systems:
         if name not in SYSTEMS:
@@ -87,7 +87,7 @@ def answer(request: Request) -> Answer:
 # --- one patient -------------------------------------------------------------------------------
 
 
-def _patient(request: Request) -> Answer:
+def _patient(request: EstimationRequest) -> Answer:
     settings = settings_of(request.settings)
     for name, value in request.readings.items():
         _check_plausible(value, f"--{name} {value:g}")
@@ -132,7 +132,9 @@ def _numbers(found: StiffnessEstimate) -> dict[str, object]:
     return numbers | ({"interval_pa": list(found.interval)} if found.interval else {})
 
 
-def _explained(request: Request, system: FuzzySystem, x: NDArray[np.float64]) -> Iterator[str]:
+def _explained(
+    request: EstimationRequest, system: FuzzySystem, x: NDArray[np.float64]
+) -> Iterator[str]:
     from fuzzy.systems.explain import explain
     from fuzzy.systems.explanation_text import explanation_lines
 
@@ -146,7 +148,7 @@ def _explained(request: Request, system: FuzzySystem, x: NDArray[np.float64]) ->
 # --- a table -----------------------------------------------------------------------------------
 
 
-def _table(request: Request, inputs: Path) -> Answer:
+def _table(request: EstimationRequest, inputs: Path) -> Answer:
     from fuzzy.systems.table import evaluate_table
 
     _check_table(request)
@@ -164,7 +166,7 @@ def _table(request: Request, inputs: Path) -> Answer:
     return Answer(tuple(lines), notes)
 
 
-def _check_table(request: Request) -> None:
+def _check_table(request: EstimationRequest) -> None:
     if request.readings:
         raise ValueError(f"--{next(iter(request.readings))}: the table gives the readings")
     for flag, given in (("--json", request.as_json), ("--figures", request.figures)):
@@ -208,7 +210,7 @@ def _table_row(inputs: Path, row: int | None, system: FuzzySystem) -> NDArray[np
 
 
 def _draw(
-    folder: Path, request: Request, readings: Mapping[str, float], settings: LiverSettings
+    folder: Path, request: EstimationRequest, readings: Mapping[str, float], settings: LiverSettings
 ) -> Iterator[str]:
     """Write the figures into the folder; their paths."""
     from reports.fuzzy_figures import draw_sets, draw_surfaces

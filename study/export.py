@@ -20,7 +20,7 @@ from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed
 from fem_reference.solvers import solve_static
 from study.folders import replacing
-from study.models.finite_elements import FINER, FiniteElements, models
+from study.models.finite_elements import FINER, reference_of
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -143,12 +143,6 @@ def _discretised(target: _Target, progress: Progress) -> tuple[Body, Problem]:
         level = _level(problem, target.elements)
     with progress.stage("assembly"):
         return reference_of(target.scene).prepare(problem).body(level), problem
-
-
-def reference_of(scene: Scene) -> FiniteElements:
-    """The finite elements of a scene."""
-    (found,) = models(scene, {})
-    return found
 
 
 def _level(problem: Problem, elements: int | None) -> Level:

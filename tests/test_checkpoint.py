@@ -16,7 +16,16 @@ from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
-from msm.model import FOLLOWED, Automatic, Counts, Fixed, Rate, Stepper, critical_time_step, run
+from msm.model import (
+    FOLLOWED,
+    Automatic,
+    Counts,
+    Fixed,
+    LatticeStepper,
+    Rate,
+    critical_time_step,
+    run,
+)
 from msm.springs import connect
 from msm.timestep import LOOK
 from msm.volume import volume_term
@@ -332,7 +341,7 @@ def test_a_lattice_that_is_stepped_goes_where_the_run_goes():
     """By steps with looks or without, from rest and from rest again; times round differently."""
     body, material = press()
     found = run(body, material, ramp, watch(body), Fixed(1e-3)).trajectory.displacement[:, 0]
-    stepper = Stepper(body, material, ramp)
+    stepper = LatticeStepper(body, material, ramp)
     assert stepper.limit_at_rest == pytest.approx(critical_time_step(body, material), rel=5e-3)
     for _ in range(200):
         stepper.take_step(1e-3)
@@ -350,7 +359,7 @@ def test_a_lattice_that_is_stepped_goes_where_the_run_goes():
 
 def test_a_stepper_looks_at_the_limit_as_often_as_a_run():
     body, material = press()
-    stepper = Stepper(body, material, ramp)
+    stepper = LatticeStepper(body, material, ramp)
     seen = []
     for _ in range(2 * LOOK + 1):
         stepper.take_step(1e-3)

@@ -15,7 +15,6 @@ from fuzzy.liver.sensitivity import (
     LARGEST_READING,
     Screening,
     Sensitivity,
-    matters,
     sensitivity,
     spread_readings,
 )
@@ -185,18 +184,3 @@ def test_more_readings_give_nearly_the_same_rms():
         rms.append(np.sqrt(np.mean(change**2)))
     # An SD of 0.75 kPa over 250 readings leaves about 2 % if they were independent.
     assert rms[1] == pytest.approx(rms[0], rel=0.03)
-
-
-def made_up(choice: str, rms: float) -> Sensitivity:
-    return Sensitivity(choice, "a", "b", "sugeno", 0.0, rms, 2 * rms, 1)
-
-
-def test_choices_are_ranked_against_the_choice_of_system():
-    rows = [made_up("reading", 5.0), made_up("samples", 0.1), made_up("consequent", 20.0)]
-    rows += [made_up("system", 2.0), made_up("system", 10.0), made_up("system", 3.0)]
-    ranking = matters(rows)
-    assert (ranking.smallest, ranking.largest) == (2.0, 10.0)
-    assert [row.choice for row in ranking.above_largest] == ["consequent"]
-    assert [row.choice for row in ranking.above_smallest] == ["consequent", "reading"]
-    calm = matters([replace(row, rms=min(row.rms, 9.0)) for row in rows[:3]] + rows[3:])
-    assert calm.above_largest == ()

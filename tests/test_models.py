@@ -14,8 +14,9 @@ from study.annotation.choice import Choice
 from study.known.stability.cases import own_scene
 from study.models.estimates import estimates
 from study.models.finite_elements import PreparedElements
+from study.models.keeping import Keeping
 from study.models.lattice import LatticeModel
-from study.models.model import SILENT, ModelKind
+from study.models.model import SILENT, ModelKind, Watch
 from study.models.table import MODELS, kind, model, models_of, references
 from study.problem.history import HISTORIES
 from study.run import study as running
@@ -63,7 +64,12 @@ def test_all_models_of_a_scene_have_names_of_their_own(small_scene):
     assert len({one.name for one in found}) == len({one.label for one in found}) == len(found)
     assert len(found) == len(UNTUNED) + len(every.fuzzy.systems)
     assert [one.name for one in found if one.name in MODELS] == UNTUNED  # in the table's order
-    assert references() == ["fem", "basafa"]
+    assert references(every) == ["fem", "basafa"]
+
+
+def test_a_point_takes_any_kind_that_has_a_form_for_it(monkeypatch):
+    monkeypatch.setitem(MODELS, "mine", MODELS["basafa"])
+    assert read_scene("paper", ['models=["mine"]']).models == ("mine",)
 
 
 def test_a_model_that_no_code_runs_is_refused_with_those_there_are():
@@ -268,6 +274,14 @@ def tissue_error(scene):
 WAVE = ('tool.history={kind="sinusoid", frequency="1 Hz"}', "time.duration=2 s")
 
 
+def test_a_model_that_keeps_no_fields_says_so_where_they_are_wanted(small_scene, tmp_path):
+    ready = model(small_scene, "superposition").prepare(problem_of(small_scene))
+    wanted = Watch(SILENT.progress, Keeping(tmp_path, fields=tmp_path))
+    (note,) = ready.run(wanted).notes
+    assert "superposition" in note
+    assert not ready.run(SILENT).notes
+
+
 def test_a_superposition_in_a_scene_has_record_scores_and_an_error_by_steps():
     words = ('models=["fem", "superposition"]', "superposition.count=6")
     scene = read_scene("block", (*SMALL, *WAVE, "time.samples=33", *words))
@@ -300,7 +314,7 @@ STIFFER = "lattice.law={strain=[-0.5, 0, 0.5], relative_tension=[-2, 0, 2]}"
 def own(function, *overrides, **more):
     """What a case of the scene with these overrides finds."""
     scene = read_scene("block", (*SHORT, *overrides))
-    return getattr(own_scene, function)("tissue", resolved(scene), "", **more)
+    return getattr(own_scene, function)("tissue", resolved(scene), None, **more)
 
 
 def test_the_critical_step_that_is_tried_is_that_of_the_scene_s_law_and_integrator():

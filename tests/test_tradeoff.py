@@ -434,6 +434,7 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
     ("words", "told"),
     [
         (("tradeoff", "block", "--contender", "rods"), "choose from springs"),
+        (("tradeoff", "block", "--contender", "msm"), "choose from springs"),
         (("tradeoff", "paper"), "organ.shape"),
         (("tradeoff", "block", "--workers", "-1"), "workers: -1 is negative"),
         (("recommend", "block"), "give --rate"),

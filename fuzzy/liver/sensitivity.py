@@ -4,7 +4,7 @@ One choice at a time is changed from the base settings. The change is taken at t
 and over a spread of readings, all in Pa.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -84,20 +84,6 @@ class Screening:
 
     rows: tuple[Sensitivity, ...]
     left_out: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Ranking:
-    """Rows that move the estimate more, in rms, than the choice of system does, largest first.
-
-    `smallest` and `largest` rms difference [Pa] between two systems; `above_smallest` holds
-    `above_largest` too.
-    """
-
-    smallest: float
-    largest: float
-    above_largest: tuple[Sensitivity, ...]
-    above_smallest: tuple[Sensitivity, ...]
 
 
 class _Case(NamedTuple):
@@ -242,17 +228,3 @@ def spread_readings(rows: int, present: Collection[str] = AETIOLOGIES) -> Array:
     low = parameters()["input_low"] * PA_PER_KPA
     X[:, columns] = low * (LARGEST_READING / low) ** spread(rows, len(columns))
     return X
-
-
-def matters(rows: Iterable[Sensitivity]) -> Ranking:
-    """Which choices move the estimate more than the choice of system does."""
-    rows = tuple(rows)
-    between = [row.rms for row in rows if row.choice == SYSTEM]
-    smallest, largest = min(between), max(between)
-    ranked = sorted((row for row in rows if row.choice != SYSTEM), key=lambda row: -row.rms)
-    return Ranking(
-        smallest=smallest,
-        largest=largest,
-        above_largest=tuple(row for row in ranked if row.rms > largest),
-        above_smallest=tuple(row for row in ranked if row.rms > smallest),
-    )

@@ -45,11 +45,6 @@ def records_in_use(settings: LiverSettings) -> tuple[SetRecord, ...]:
     return (*(record for found in inputs for record in found), *output_records())
 
 
-def unsourced(settings: LiverSettings) -> tuple[SetRecord, ...]:
-    """Records in use whose centre or within-stage spread is not published for that very stage."""
-    return tuple(record for record in records_in_use(settings) if record.sourced != "yes")
-
-
 def _input_records(settings: LiverSettings) -> dict[str, tuple[SetRecord, ...]]:
     counts = reading_named(settings.reading).counts
     return {

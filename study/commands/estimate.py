@@ -61,11 +61,11 @@ def estimate(
     as_json
         Print JSON in SI units instead of a table.
     """
-    from study.estimation import Request, answer
+    from study.estimation import EstimationRequest, answer
 
     given = {"hcv": hcv, "hbv": hbv, "ald": ald, "cld": cld, "nafld": nafld}
     found = answer(
-        Request(
+        EstimationRequest(
             readings={name: value for name, value in given.items() if value is not None},
             systems=system or (),
             settings=given_flags(liver, inference),

@@ -34,7 +34,7 @@ def run(
     report
         Whether to make report.pdf.
     fields
-        Keep the motion of all lattice nodes as MODEL.vtkhdf, which ParaView reads.
+        Keep the motion of all nodes of lattices and fem as MODEL.vtkhdf, which ParaView reads.
     resume
         Go on from where an interrupted run into the same folder last kept its state.
     """

@@ -13,13 +13,14 @@ from importlib import import_module
 from typing import Any
 
 from study.known.finding import Finding
+from study.sweep.canonical import Plain
 
 
 class OverrunError(Exception):
     """A case did not end in its time."""
 
 
-def trial(function: str, arguments: dict[str, Any], seconds: float) -> dict[str, Any]:
+def trial(function: str, arguments: Plain, seconds: float) -> Plain:
     """The findings of a case as plain values; a number that is not finite is None."""
     return {"findings": [_plain(found) for found in attempted(function, arguments, seconds)]}
 
@@ -44,7 +45,7 @@ def attempted(function: str, arguments: Mapping[str, Any], seconds: float) -> tu
         return (Finding("error", message=f"{type(error).__name__}: {error}"),)
 
 
-def _plain(finding: Finding) -> dict[str, Any]:
+def _plain(finding: Finding) -> Plain:
     return {
         key: None if isinstance(value, float) and not math.isfinite(value) else value
         for key, value in asdict(finding).items()

@@ -68,7 +68,8 @@ def estimated_run(
 ) -> ModelRun:
     """The motion of a model as it simulates itself, with what can be said of any model.
 
-    With the `order` of its steps, their error is estimated by half as long ones.
+    With the `order` of its steps, their error is estimated by half as long ones. Of its fields
+    nothing is kept, and a note says so where they are wanted.
     """
     started = time.perf_counter()
     with watch.progress.stage(model.name):
@@ -92,4 +93,6 @@ def estimated_run(
         wall_s=wall,
         time_step_errors=errors,
     )
-    return ModelRun(found.trajectory, record, checks)
+    wanted = watch.keeping is not None and watch.keeping.fields is not None
+    notes = (f"Fields of {model.name} are not kept: only lattices and fem keep them.",)
+    return ModelRun(found.trajectory, record, checks, notes if wanted else ())

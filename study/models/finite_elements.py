@@ -295,9 +295,14 @@ def _subspace_checks(solved: MeshSolution) -> Iterator[Check]:
         yield Check(name="fem: subspace", value=error, limit=TRUNCATION_LIMIT, meaning=meaning)
 
 
+def reference_of(scene: Scene) -> FiniteElements:
+    """The finite elements of a scene."""
+    return FiniteElements(reference=scene.reference, damping=reference_damping(scene))
+
+
 def models(scene: Scene, _: Estimates) -> Iterator[FiniteElements]:
     """The one reference."""
-    yield FiniteElements(reference=scene.reference, damping=reference_damping(scene))
+    yield reference_of(scene)
 
 
 def assumptions(scene: Scene) -> list[str]:

@@ -16,7 +16,7 @@ from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import LAWS, force_law_of
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
-from msm.stepper import Stepper as LatticeStepper
+from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.models.errors import place, step_checks, time_step_errors
 from study.models.keeping import OnSample, checkpoint, recorded

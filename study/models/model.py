@@ -154,8 +154,8 @@ class ModelKind:
     for a scene that is a single control mass point, None where the kind needs an organ.
     `assumptions`: sentences on what was read into the paper or left out. `is_reference`: whether
     the others are compared with it; `any_load`: whether it follows a load whose place was not known
-    beforehand; `is_tuned`: whether
-    its models are those of the fuzzy estimates.
+    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates. A model that is a
+    reference has the name of its kind.
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]

@@ -49,14 +49,21 @@ def point_models_of(scene: Scene, estimates: Estimates) -> Iterator[PointModel]:
 
 
 def model(scene: Scene, name: str) -> Model:
-    """The model of a kind that has one, whatever the fuzzy estimates."""
-    (found,) = kind(name).models(scene, {})
-    return found
+    """The model of a kind that has one. ValueError for a kind of several, as of fuzzy estimates."""
+    found = list(kind(name).models(scene, {}))
+    if len(found) != 1:
+        raise ValueError(f"models: {name} stands for several models; name a kind that is one model")
+    return found[0]
 
 
-def references() -> list[str]:
-    """Names of the kinds that the others are compared with."""
-    return [name for name in MODELS if kind(name).is_reference]
+def references(scene: Scene) -> list[str]:
+    """Names of the kinds in a scene that the others are compared with."""
+    return [name for name in named(scene) if kind(name).is_reference]
+
+
+def is_tuned(scene: Scene) -> bool:
+    """Whether a scene has models that need fuzzy estimates."""
+    return any(kind(name).is_tuned for name in named(scene))
 
 
 def assumptions(scene: Scene) -> list[str]:

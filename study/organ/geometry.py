@@ -15,7 +15,7 @@ from study.mesh.tetrahedra import boundary, mean_edge, refined, volumes
 from study.organ import liver
 from study.organ.block import block_of_cells, cell_counts
 from study.organ.isosurface_stuffing import stuff
-from study.organ.occupancy import Body, ImplicitBody, MeshBody
+from study.organ.occupancy import ImplicitBody, MeshBody, SolidShape
 from study.organ.projection import onto_surface
 
 Projection = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -50,7 +50,7 @@ class Geometry:
     mesh: TetrahedralMesh
     level: Callable[[int], Level | None]
     surface: SurfaceMesh
-    body: Body
+    body: SolidShape
     volume: float
     notes: tuple[str, ...] = ()
     project: Projection | None = None
@@ -154,7 +154,7 @@ def _can_refine(mesh: TetrahedralMesh) -> bool:
 
 def _geometry(
     level: Callable[[int], Level | None],
-    body: Body | None = None,
+    body: SolidShape | None = None,
     notes: tuple[str, ...] = (),
     project: Projection | None = None,
 ) -> Geometry:

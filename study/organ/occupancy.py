@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
 
-class Body(Protocol):
+class SolidShape(Protocol):
     """Anything that can say which points of a regular grid lie inside it."""
 
     def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
@@ -30,7 +30,7 @@ class ImplicitBody:
     signed: Callable[[Floats], Floats]
 
     def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
-        """See Body. Evaluated layer by layer to bound the memory."""
+        """See SolidShape. Evaluated layer by layer to bound the memory."""
         layer = np.stack(np.broadcast_arrays(y[:, None], z[None, :]), axis=-1)
         return np.stack([self._layer(value, layer) for value in x])
 
@@ -46,7 +46,7 @@ class MeshBody:
     mesh: TetrahedralMesh
 
     def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
-        """See Body."""
+        """See SolidShape."""
         inside = np.zeros((x.size, y.size, z.size), dtype=np.bool_)
         origin = np.array([x[0], y[0], z[0]])
         step = np.array([axis[1] - axis[0] if axis.size > 1 else 1.0 for axis in (x, y, z)])

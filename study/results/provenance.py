@@ -36,8 +36,13 @@ def provenance(scene: str, mesh: str | None) -> Provenance:
         processor=_processor(),
         seed=None,
         scene_sha256=hashlib.sha256(scene.encode()).hexdigest(),
-        mesh_sha256=hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None,
+        mesh_sha256=mesh_sha256(mesh),
     )
+
+
+def mesh_sha256(mesh: str | None) -> str | None:
+    """SHA-256 of the mesh file of a scene, if it has one: another mesh makes another result."""
+    return hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None
 
 
 def _version(package: str) -> str | None:

@@ -184,11 +184,6 @@ class ModelRecord:
         """How many cells of a lattice turned inside out, zero of other models."""
         return 0 if self.lattice is None else self.lattice.inverted_cells
 
-    @property
-    def is_scored(self) -> bool:
-        """Whether its motion means something: it finished, and nothing turned inside out."""
-        return self.status == "finished" and not self.inverted_cells
-
 
 def largest(errors: dict[str, CurveErrors]) -> CurveErrors:
     """The largest errors of any control point."""

@@ -10,7 +10,7 @@ import numpy as np
 from study.models.estimates import FuzzySide, run_fuzzy
 from study.models.large_strain import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Prepared, Watch
-from study.models.table import kind, models_of, named, point_models_of
+from study.models.table import is_tuned, models_of, point_models_of, references
 from study.problem.problem import Problem
 from study.problem.response import Response
 from study.results.folder import Arrays, Results
@@ -52,8 +52,7 @@ def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
     started = time.perf_counter()
     made_by = provenance(write_scene(scene), scene.organ.mesh)  # as it is now, not after the run
     with watch.progress.stage("fuzzy systems"):
-        tuned = any(kind(name).is_tuned for name in named(scene))
-        fuzzy = run_fuzzy(scene) if tuned else FuzzySide()
+        fuzzy = run_fuzzy(scene) if is_tuned(scene) else FuzzySide()
     compared = (_on_point if scene.is_point else _on_organ)(scene, fuzzy, watch)
     with watch.progress.stage("similarity"):
         results = _results(scene, fuzzy, compared, made_by)
@@ -109,10 +108,10 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
     models = tuple(run.record for run in runs.values())
     # A lattice's mass is checked for each model on it, and is told once.
     checks = tuple(dict.fromkeys(check for run in runs.values() for check in run.checks))
-    references = [name for name in named(scene) if kind(name).is_reference]
+    compared_with = references(scene)
     # One that diverged leaves a note in place of its scores.
     sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}
-    scores, unscored = similarity_rows(response, sound, references)
+    scores, unscored = similarity_rows(response, sound, compared_with)
     record = StudyRecord(
         title=scene.title,
         probes=response.probes,
@@ -146,7 +145,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             for row in band_rows(response, name, run.bounds)
         ),
         scores,
-        tuple(difference_rows(response, sound, references)) if has_field else (),
+        tuple(difference_rows(response, sound, compared_with)) if has_field else (),
         fuzzy.sensitivity,
         found.fields,
         fuzzy.arrays,

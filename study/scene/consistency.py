@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pkgutil import resolve_name
 from typing import Any
 
 from msm.calibration import SPRING_POISSON_RATIO
@@ -14,7 +15,6 @@ from study.scene.schema import Lattice, Scene
 MODELS = Choice("study.models.table:MODELS")
 Table = dict[str, Any]
 """A parsed table of TOML, not yet checked."""
-_ON_POINT = ("basafa", "msm")
 _OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
 # What a scene without a mesh cannot use.
 MESH_ONLY = (
@@ -179,8 +179,9 @@ def _unseen_load(scene: Scene) -> Iterator[str]:
 
 
 def _point_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    kind = resolve_name("study.models.table:kind")  # as Choice does: models are made of scenes
     for name in scene.models:
-        if name not in _ON_POINT:
+        if kind(name).on_point is None:
             yield f"models: {name} needs an organ with a mesh; a point has none"
     if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
         yield (

@@ -14,7 +14,7 @@ from msm.calibration import SPRING_POISSON_RATIO
 from msm.integrators import INTEGRATORS
 from msm.stability import DEFAULT
 from study.models.model import Model
-from study.models.table import kind, model
+from study.models.table import MODELS, kind, model
 from study.scene import Scene
 
 Settings = Mapping[str, str | float | int | bool]
@@ -156,17 +156,15 @@ class Configuration:
 def contender(name: str) -> Contender:
     """The contender of a name, or the model of that name as it is.
 
-    ValueError with those there are.
+    ValueError with those there are; models of fuzzy estimates are the lattice at other moduli.
     """
     if name in CONTENDERS:
         return CONTENDERS[name]
-    try:
-        kind(name)
-    except ValueError:
+    if name not in MODELS or kind(name).is_tuned:
         raise ValueError(
             f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}, or a model of "
-            "the scene"
-        ) from None
+            "the scene that needs no estimate"
+        )
     return Contender(name, lambda _: iter([{}]))
 
 

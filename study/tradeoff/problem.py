@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.quadrature import over_volume
 from study.problem.problem import Problem
+from study.results.provenance import mesh_sha256
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
@@ -59,12 +58,7 @@ def sampled(scene: Scene) -> Scene:
 
 def arguments(scene: Scene) -> Plain:
     """The scene as plain values, with the SHA-256 of its mesh file if it has one."""
-    mesh = scene.organ.mesh
-    return {"scene": resolved(scene), "mesh_sha256": None if mesh is None else _sha256(mesh)}
-
-
-def _sha256(path: str) -> str:
-    return sha256(Path(path).read_bytes()).hexdigest()
+    return {"scene": resolved(scene), "mesh_sha256": mesh_sha256(scene.organ.mesh)}
 
 
 def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
@@ -74,9 +68,9 @@ def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
 
 
 @lru_cache(maxsize=2)
-def _stated(scene: str, mesh_sha256: str | None) -> Stated:
+def _stated(scene: str, mesh: str | None) -> Stated:
     found = validate(json.loads(scene), "scene")
-    if found.organ.mesh is not None and _sha256(found.organ.mesh) != mesh_sha256:
+    if mesh_sha256(found.organ.mesh) != mesh:
         raise ValueError(f"organ.mesh: {found.organ.mesh} has changed since the runs were planned")
     problem = problem_of(found)
     rule = over_volume(problem.geometry.mesh, 1)

@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.models.finite_elements import FiniteElements
+from study.models.finite_elements import reference_of
 from study.models.model import SILENT
-from study.models.table import model
 from study.results.records import ElementsRecord, MeshLevel
 from study.sweep.canonical import Plain, restored
 from study.tradeoff.problem import Stated, plain, stated
@@ -53,9 +52,8 @@ class Truth:
 def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     """The reference of a scene, as plain values of `SolvedReference`."""
     given = stated(scene, mesh_sha256)
-    reference = model(given.scene, "fem")
-    assert isinstance(reference, FiniteElements)  # noqa: S101 - the model of that name
-    run = reference.varied(large_strain="none").prepare(given.problem).run(SILENT)
+    reference = reference_of(given.scene).varied(large_strain="none")
+    run = reference.prepare(given.problem).run(SILENT)
     elements, steps = run.record.elements, run.record.time_step_errors
     assert isinstance(elements, ElementsRecord)  # noqa: S101 - finite elements have one
     rest = (elements.truncation_error or 0.0) + max(one.displacement for one in steps.values())

@@ -30,7 +30,7 @@ from study.mesh.tetrahedra import boundary
 from study.organ import liver as implicit
 from study.organ.block import block_mesh
 from study.organ.isosurface_stuffing import stuff
-from study.organ.occupancy import Body, MeshBody
+from study.organ.occupancy import MeshBody, SolidShape
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.tissue import Tissue
 from study.scene.file import read_scene
@@ -79,7 +79,7 @@ class Case:
 
     name: str
     youngs_modulus: float
-    body: Body
+    body: SolidShape
     meshes: tuple[TetrahedralMesh, ...]
     sizes: tuple[float, ...]
     foundation: Foundation

@@ -29,7 +29,7 @@ class Boxes:
     corners: Floats
 
     def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
-        """Inside or not on the grid of three axes, as `study.organ.occupancy.Body` has it."""
+        """Inside or not on the grid of three axes, as `study.organ.occupancy.SolidShape` has it."""
         inside = np.zeros((x.size, y.size, z.size), dtype=np.bool_)
         for lower, upper in self.corners:
             along = [(a > lo) & (a < up) for a, lo, up in zip((x, y, z), lower, upper, strict=True)]

@@ -7,11 +7,8 @@ same lattice at other moduli.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,9 +25,11 @@ from study.models.lattice import LatticeModel, PreparedLattice
 from study.models.model import Prepared
 from study.models.table import kind, model
 from study.problem.problem import Problem
+from study.results.provenance import mesh_sha256
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
+from study.sweep.canonical import Plain
 
 FRACTIONS = (0.5, 0.2)
 """Of the limit at rest, or of the model's own step, of the equal ones."""
@@ -51,7 +50,7 @@ def cases(scene: Scene) -> Iterator[Case]:
     if scene.is_point:
         raise ValueError("organ.shape: a single point has no lattice; give a scene with a body")
     for name in tried(scene):
-        given = {"name": name, "scene": resolved(scene), "mesh": _digest(scene)}
+        given = {"name": name, "scene": resolved(scene), "mesh": mesh_sha256(scene.organ.mesh)}
         if isinstance(model(scene, name), LatticeModel):
             if scene.lattice.integrator in EXPLICIT:
                 yield _case(f"{name}, critical step", "steps", given, MEASURED, quick=True)
@@ -67,14 +66,8 @@ def tried(scene: Scene) -> list[str]:
     return list(dict.fromkeys(("tissue", *others)))
 
 
-def _digest(scene: Scene) -> str:
-    """Of the organ's mesh file, if it has one: with another mesh it is another case."""
-    path = scene.organ.mesh
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
-
-
 def _case(
-    title: str, function: str, settings: dict[str, Any], tolerance: float, *, quick: bool = False
+    title: str, function: str, settings: Plain, tolerance: float, *, quick: bool = False
 ) -> Case:
     return Case(
         family="scene",
@@ -87,7 +80,7 @@ def _case(
     )
 
 
-def steps(name: str, scene: dict[str, Any], mesh: str) -> Finding:
+def steps(name: str, scene: Plain, mesh: str | None) -> Finding:
     """The critical step at rest, predicted and measured, without damping.
 
     Of a law with a corner at rest the predicted one may be the shorter: motions feel both slopes.
@@ -107,7 +100,7 @@ def _has_corner(law: Law) -> bool:
     return not np.isclose(stiffness(law, -NEAR_REST), stiffness(law, NEAR_REST), rtol=1e-6)
 
 
-def rests(name: str, scene: dict[str, Any], mesh: str) -> Finding:
+def rests(name: str, scene: Plain, mesh: str | None) -> Finding:
     """Rest under the full load by relaxation beside that by long implicit steps."""
     one, _ = _lattice(name, scene, mesh)
     material = replace(one.springs.material, damping=UNDAMPED)  # which the rest does not depend on
@@ -125,7 +118,7 @@ def _explicit_limit(one: PreparedLattice) -> float:
     return float(critical_time_step(one.assembly, one.springs.material, "velocity-verlet"))
 
 
-def moves(name: str, scene: dict[str, Any], mesh: str, times: float) -> Finding:
+def moves(name: str, scene: Plain, mesh: str | None, times: float) -> Finding:
     """Motion of the control points by the model's own steps beside that by the finest equal ones.
 
     If no equal step completes, its own may not either, and are to lose the body when the finest do,
@@ -150,18 +143,18 @@ def moves(name: str, scene: dict[str, Any], mesh: str, times: float) -> Finding:
     return Finding("value", finest, found.diverged_at, late, f"lost by its load: {told}")
 
 
-def _lattice(name: str, scene: dict[str, Any], mesh: str) -> tuple[PreparedLattice, Problem]:
+def _lattice(name: str, scene: Plain, mesh: str | None) -> tuple[PreparedLattice, Problem]:
     found, problem = _prepared(name, scene, mesh)
     assert isinstance(found, PreparedLattice)  # noqa: S101 - only lattices have these cases
     return found, problem
 
 
 def _prepared(
-    name: str, table: dict[str, Any], mesh: str, times: float = 1.0
+    name: str, table: Plain, mesh: str | None, times: float = 1.0
 ) -> tuple[Prepared, Problem]:
     """A model of a scene whose steps follow the limit, under so many times the load."""
     scene = validate(table, "scene")
-    if _digest(scene) != mesh:
+    if mesh_sha256(scene.organ.mesh) != mesh:
         raise ValueError(f"organ.mesh: {scene.organ.mesh} has changed since the cases were listed")
     lattice = replace(scene.lattice, time_step=None, step_rate=None)
     scene = replace(
