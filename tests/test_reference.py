@@ -472,7 +472,7 @@ def test_the_ends_of_the_support_give_a_rest(small_scene, stiffness):
 
 
 def test_a_slender_rod_is_solved(small_scene):
-    organ = dataclasses.replace(short.organ, size=(0.12, 0.005, 0.005))
+    organ = dataclasses.replace(small_scene.organ, size=(0.12, 0.005, 0.005))
     support = dataclasses.replace(small_scene.support, side="right")
     place = dataclasses.replace(small_scene.tool.place, at=(0.9, 0.5))
     tool = dataclasses.replace(small_scene.tool, place=place, radius=0.004, force=1e-4)
