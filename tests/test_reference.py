@@ -476,7 +476,7 @@ def test_a_slender_rod_is_solved(small_scene):
     support = dataclasses.replace(small_scene.support, side="right")
     place = dataclasses.replace(small_scene.tool.place, at=(0.9, 0.5))
     tool = dataclasses.replace(small_scene.tool, place=place, radius=0.004, force=1e-4)
-    scene = dataclasses.replace(short, organ=organ, support=support, tool=tool)
+    scene = dataclasses.replace(small_scene, organ=organ, support=support, tool=tool)
     posed = problem_of(with_reference(scene, element_size=0.006))
     one = discretise(posed.geometry.mesh, Tissue(), posed.foundation, posed.tool)
     u = iterative(one, 1e-10)(one.load)
