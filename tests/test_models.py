@@ -12,6 +12,7 @@ import pytest
 
 from study.annotation.choice import Choice
 from study.known.stability.cases import own_scene
+from study.models import tissue
 from study.models.estimates import estimates
 from study.models.finite_elements import PreparedElements
 from study.models.keeping import Keeping
@@ -410,3 +411,31 @@ def test_an_entry_added_to_a_table_is_a_choice(monkeypatch):
     monkeypatch.setitem(MODELS, "rods", MODELS["tissue"])
     scene = read_scene("block", ['models=["rods"]'])
     assert [one.name for one in models_of(scene, {})] == ["tissue"]
+
+
+# --- kinds of one's own ------------------------------------------------------------------------
+
+LAW = "lattice.law={kind = 'piecewise', strain = [-1, 0, 1], relative_tension = [-1, 0, 1]}"
+
+
+@pytest.fixture
+def second_tissue(monkeypatch):
+    """The tissue's lattice under another name of the table."""
+    monkeypatch.setitem(MODELS, "mine", "study.models.tissue:KIND")
+
+
+@pytest.mark.usefixtures("second_tissue")
+def test_a_kind_of_ones_own_that_follows_the_law_may_be_given_one(monkeypatch):
+    models = "models=['fem', 'mine']"
+    assert read_scene("block", [models, LAW]).lattice.law.kind == "piecewise"
+    deaf = dataclasses.replace(tissue.KIND, follows_law=False)
+    monkeypatch.setattr(tissue, "KIND", deaf)
+    with pytest.raises(SceneError, match=r"lattice\.law: only springs"):
+        read_scene("block", [models, LAW])
+
+
+@pytest.mark.usefixtures("second_tissue")
+def test_two_models_of_one_name_are_refused():
+    scene = read_scene("block", ["models=['tissue', 'mine']"])
+    with pytest.raises(ValueError, match="second model named tissue"):
+        list(models_of(scene, {}))

@@ -66,4 +66,6 @@ def assumptions(scene: Scene) -> list[str]:
     return [*on_organ, *springs(scene), *fuzzy_assumptions(settings(scene))]
 
 
-KIND = ModelKind(models=models, on_point=on_point, assumptions=assumptions, is_tuned=True)
+KIND = ModelKind(
+    models=models, on_point=on_point, assumptions=assumptions, is_tuned=True, follows_law=True
+)

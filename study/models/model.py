@@ -154,8 +154,9 @@ class ModelKind:
     for a scene that is a single control mass point, None where the kind needs an organ.
     `assumptions`: sentences on what was read into the paper or left out. `is_reference`: whether
     the others are compared with it; `any_load`: whether it follows a load whose place was not known
-    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates. A model that is a
-    reference has the name of its kind.
+    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates; `follows_law`:
+    whether its springs have the law and damping of the scene. A model that is a reference has the
+    name of its kind.
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
@@ -163,4 +164,5 @@ class ModelKind:
     assumptions: Callable[[Scene], list[str]] = lambda _: []
     is_reference: bool = False
     is_tuned: bool = False
+    follows_law: bool = False
     any_load: bool = True

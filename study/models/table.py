@@ -34,9 +34,14 @@ def named(scene: Scene) -> list[str]:
 
 
 def models_of(scene: Scene, estimates: Estimates) -> Iterator[Model]:
-    """All models that a scene with an organ names."""
+    """All models that a scene with an organ names. ValueError for two of the same name."""
+    seen: set[str] = set()
     for name in named(scene):
-        yield from kind(name).models(scene, estimates)
+        for found in kind(name).models(scene, estimates):
+            if found.name in seen:
+                raise ValueError(f"models: {name} makes a second model named {found.name}")
+            seen.add(found.name)
+            yield found
 
 
 def point_models_of(scene: Scene, estimates: Estimates) -> Iterator[PointModel]:

@@ -50,4 +50,4 @@ def assumptions(scene: Scene) -> list[str]:
     return [*layout(scene), *springs(scene)]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions)
+KIND = ModelKind(models=models, assumptions=assumptions, follows_law=True)

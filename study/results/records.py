@@ -96,7 +96,7 @@ class ElementsRecord:
     method: str
     subspace_vectors: int | None = None
     truncation_error: float | None = None
-    largest_rotation_rad: float = 0.0
+    largest_rotation_rad: float | None = None
     levels: tuple[MeshLevel, ...] = ()
     mesh_error: DiscretisationError | None = None
     accuracy_missed: float | None = None

@@ -65,7 +65,10 @@ def _on_point(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
     models = point_models_of(scene, fuzzy.estimates)
     runs = {model.name: model.run(problem, watch) for model in models}
     point = ControlPoint(mass_kg=problem.mass, rest_length_m=problem.rest_length)
-    return Compared(problem.response, runs, control_point=point)
+    keeping = watch.keeping
+    wanted = keeping is not None and keeping.fields is not None
+    notes = ("No fields are kept: a single point has none.",) if wanted else ()
+    return Compared(problem.response, runs, notes, control_point=point)
 
 
 def _on_organ(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:

@@ -45,7 +45,7 @@ def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]
             f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(elements)}. "
             "Reduce tool.force or enlarge tool.radius."
         )
-    if rotation > ROTATION_LIMIT:
+    if rotation is not None and rotation > ROTATION_LIMIT:
         yield (
             f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
             "it should not be trusted. Reduce tool.force or hold the organ better."

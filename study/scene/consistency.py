@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pkgutil import resolve_name
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
 from study.scene.law import SpringLaw
 from study.scene.schema import Lattice, Scene
 
+if TYPE_CHECKING:
+    from study.models.model import ModelKind
+
 MODELS = Choice("study.models.table:MODELS")
 Table = dict[str, Any]
 """A parsed table of TOML, not yet checked."""
-_OWN_LAW = {"msm", "tissue"}  # lattices whose law and damping are those of the scene
 # What a scene without a mesh cannot use.
 MESH_ONLY = (
     ("organ", "volume"),
@@ -98,8 +100,8 @@ def _integrator_contradictions(scene: Scene) -> Iterator[str]:
         yield (
             f"lattice.law: {name} takes linear springs only; remove it or change lattice.integrator"
         )
-    own_law = _OWN_LAW & set(scene.models)
-    if scene.damping.stiffness > 0.0 and own_law and not method.stiffness_damping:
+    unfit = scene.damping.stiffness > 0.0 and not method.stiffness_damping
+    if unfit and _has_law(scene):
         yield (
             f"damping.stiffness: {name} has only the mass part of Rayleigh damping; set it to 0, "
             "or lattice.integrator to symplectic-euler"
@@ -118,7 +120,7 @@ def _mesh_springs_contradictions(lattice: Lattice, table: Table) -> Iterator[str
 
 
 def _law_contradictions(scene: Scene, law: SpringLaw) -> Iterator[str]:
-    if not _OWN_LAW & set(scene.models):
+    if not _has_law(scene):
         yield (
             "lattice.law: only springs tuned by an estimate, or of the tissue, follow it; add msm "
             "or tissue to models, or remove it"
@@ -178,10 +180,20 @@ def _unseen_load(scene: Scene) -> Iterator[str]:
         yield f"time.samples: a load of {loaded:g} s needs 8 samples in it, here {needed}"
 
 
+def _kind(name: str) -> ModelKind:
+    """The kind of a model; found as Choice finds its table, for models are made of scenes."""
+    found: ModelKind = resolve_name("study.models.table:kind")(name)
+    return found
+
+
+def _has_law(scene: Scene) -> bool:
+    """Whether a model has the law and damping of the scene's lattice."""
+    return any(_kind(name).follows_law for name in scene.models)
+
+
 def _point_contradictions(scene: Scene, table: Table) -> Iterator[str]:
-    kind = resolve_name("study.models.table:kind")  # as Choice does: models are made of scenes
     for name in scene.models:
-        if kind(name).on_point is None:
+        if _kind(name).on_point is None:
             yield f"models: {name} needs an organ with a mesh; a point has none"
     if scene.organ.mass is None and scene.damping.ratio * scene.basafa.gamma_0 == 0.0:
         yield (
