@@ -41,8 +41,15 @@ def provenance(scene: str, mesh: str | None) -> Provenance:
 
 
 def mesh_sha256(mesh: str | None) -> str | None:
-    """SHA-256 of the mesh file of a scene, if it has one: another mesh makes another result."""
-    return hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh else None
+    """SHA-256 of a scene's mesh file, None without one. ValueError if it cannot be read."""
+    if mesh is None:
+        return None
+    try:
+        return hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
+    except OSError as error:
+        raise ValueError(
+            f"organ.mesh: {mesh} cannot be read ({error.strerror}); name a mesh file"
+        ) from None
 
 
 def _version(package: str) -> str | None:
