@@ -43,3 +43,16 @@ def test_numba_is_imported_by_what_needs_it_only(statement, compiles):
         [sys.executable, "-c", asked], capture_output=True, check=True, text=True
     )
     assert found.stdout == f"{compiles}\n"
+
+
+def test_a_point_is_run_without_finite_elements():
+    asked = (
+        "import sys; from study.run.study import run_study;"
+        "from study.scene.file import read_scene;"
+        "run_study(read_scene('paper', ['fuzzy.sensitivity_readings=0']));"
+        "print(sorted({'skfem', 'vtk', 'matplotlib', 'pyamg', 'meshio'} & set(sys.modules)))"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", asked], capture_output=True, check=True, text=True
+    )
+    assert found.stdout == "[]\n"

@@ -18,7 +18,8 @@ from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors
 from study.models.keeping import recorded
-from study.models.large_strain import compare, is_large
+from study.models.large_strain import compare
+from study.models.linear_limits import is_large
 from study.models.mesh_error import MeshSolution, is_too_coarse, mesh_error, next_size, why_unknown
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level

@@ -11,16 +11,6 @@ from study.problem.problem import Problem
 from study.results.records import LargeStrain
 from study.similarity.fields import relative_l2
 
-STRAIN_LIMIT = 0.05
-"""Largest strain of the linear reference above which it is not to be trusted."""
-ROTATION_LIMIT = 0.2
-"""Largest rotation [rad] of it: half its square is a strain that linear elasticity invents."""
-
-
-def is_large(strain: float, rotation: float) -> bool:
-    """Whether a largest strain or rotation [rad] is more than linear elasticity is good for."""
-    return strain > STRAIN_LIMIT or rotation > ROTATION_LIMIT
-
 
 def compare(problem: Problem, body: Body, law: str) -> LargeStrain | str:
     """What finite strain changes at rest under the full load, or why that is not known.

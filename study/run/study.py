@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from study.models.estimates import FuzzySide, run_fuzzy
-from study.models.large_strain import STRAIN_LIMIT
+from study.models.linear_limits import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Prepared, Watch
 from study.models.table import is_tuned, models_of, point_models_of, references
 from study.problem.problem import Problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from study.models.large_strain import ROTATION_LIMIT, STRAIN_LIMIT
+from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.results.records import Check, ElementsRecord, ModelRecord
 from study.scene import Scene
 
