@@ -191,6 +191,13 @@ def test_the_file_written_is_the_file_read(tipper):
     assert fis_text(tipper) == TIPPER
 
 
+def _beside(text, sets):
+    """The tipper's file with a second output, which no rule names."""
+    another = "[Output2]\nName='service charge'\nRange=[0 1]\n" + sets + "\n[Rules]"
+    text = text.replace("NumOutputs=1", "NumOutputs=2").replace("[Rules]", another)
+    return re.sub(r"(\d, \d) \(", r"\1 0 (", text)
+
+
 QUIRKS = {
     "byte order mark": lambda text: b"\xef\xbb\xbf" + text.encode(),
     "Windows line ends": lambda text: text.replace("\n", "\r\n"),
@@ -215,6 +222,21 @@ QUIRKS = {
         + text[text.index("[Rules]") :]
     ),
     "zeros filling parameters up": lambda text: text.replace("[1.5 0]", "[1.5 0 0 0]"),
+    "double quotes": lambda text: text.replace("'", '"'),
+    "statements of MATLAB": lambda text: text.replace("[0 10]\n", "[0 10];\n"),
+    "kinds in capitals": lambda text: text.replace("'gaussmf'", "'GaussMF'"),
+    "keys in capitals": lambda text: text.replace("Range=", "RANGE=").replace("MF1=", "mf1="),
+    "expressions": lambda text: text.replace("[1.5 0]", "[3/2 sqrt(4) - 2]").replace(
+        "[5 ", "[(1 + 2) * 2 - 1 "
+    ),
+    "a count with decimals": lambda text: text.replace("NumMFs=2", "NumMFs=2.0"),
+    "an output without sets": lambda text: _beside(text, "NumMFs=0\n"),
+    "an output that no rule names": lambda text: _beside(
+        text, "NumMFs=1\nMF1='all':'trimf',[0 1 2]\n"
+    ),
+    "a rule that names no output": lambda text: (
+        text.replace("Rules=3", "Rules=4") + "1 1, 0 (1) : 1\n"
+    ),
 }
 
 
@@ -226,6 +248,39 @@ def test_quirks_of_real_files_are_read(read, tipper, quirk):
 def test_names_may_hold_blanks_percent_and_number_signs(read):
     system = read(TIPPER.replace("'poor'", "'poor # 100 % '"))
     assert system.inputs[0].sets[0].name == "poor # 100 % "
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("'chef''s choice'", "chef's choice"),
+        ("'chef's choice'", "chef's choice"),
+        ('"chef\'s choice"', "chef's choice"),
+        ("'say \"hi\"'", 'say "hi"'),
+        ("'a [b], (c) : d'", "a [b], (c) : d"),
+    ],
+)
+def test_names_may_hold_quotes_brackets_and_commas(read, written, name):
+    system = read(TIPPER.replace("'poor'", written).replace("'tipper'", written))
+    assert (system.name, system.inputs[0].sets[0].name) == (name, name)
+
+
+def test_names_in_latin_1_are_read(read):
+    for encoding in ("utf-8", "latin-1"):
+        system = read(TIPPER.replace("poor", "mäßig").encode(encoding))
+        assert system.inputs[0].sets[0].name == "mäßig"
+
+
+def test_two_outputs_that_rules_name_are_refused(read):
+    text = _beside(TIPPER, "NumMFs=1\nMF1='all':'trimf',[0 1 2]\n")
+    with pytest.raises(FisError, match=r"fis:37: a second output that rules name; write one file"):
+        read(text.replace("1 1, 1 0", "1 1, 1 1"))
+
+
+def test_one_output_of_two_may_be_the_second(read, tipper):
+    first = "[Output1]\nName='x'\nRange=[0 1]\nNumMFs=0\n\n[Output2]"
+    text = TIPPER.replace("NumOutputs=1", "NumOutputs=2").replace("[Output1]", first)
+    assert read(re.sub(r", (\d) \(", r", 0 \1 (", text)) == tipper
 
 
 def test_negation_weight_and_connective_are_read(read):
@@ -279,7 +334,6 @@ REFUSALS = {
     "an aggregation": ("AggMethod='max'", "AggMethod='sum'", 11, "aggregation 'sum' .* set max"),
     "a defuzzification": ("'centroid'", "'mom'", 12, "defuzzification 'mom' .* set centroid"),
     "an operator": ("OrMethod='max'", "OrMethod='sum'", 9, "disjunction 'sum': use one of max"),
-    "two outputs": ("[Rules]", "[Output2]\n[Rules]", 37, "a second output; write one file"),
     "the number of outputs": ("NumOutputs=1", "NumOutputs=2", 6, "NumOutputs is 2, .* are 1"),
     "the number of inputs": ("NumInputs=2", "NumInputs=3", 5, "NumInputs is 3, .* are 2 inputs"),
     "the number of rules": ("NumRules=3", "NumRules=4", 7, "NumRules is 4, .* are 3 rules"),
@@ -301,11 +355,16 @@ REFUSALS = {
     "a range of one number": ("Range=[0 30]", "Range=[0]", 31, r"give two numbers, \[low high\]"),
     "a range without brackets": ("Range=[0 30]", "Range=0 30", 31, r"one pair of \[ \]"),
     "a range upside down": ("Range=[0 30]", "Range=[30 0]", 29, "low 30.0 must be below 0.0"),
-    "an expression": ("Range=[0 30]", "Range=[0 pi]", 31, "'pi' is no finite number"),
+    "an unknown word": ("Range=[0 30]", "Range=[0 tip]", 31, "'tip' is no finite number"),
+    "an expression of a variable": ("Range=[0 30]", "Range=[0 3*x]", 31, r"'3\*x' is no finite"),
+    "a division by 0": ("Range=[0 30]", "Range=[0 1/0]", 31, "'1/0' is no finite number"),
+    "an open parenthesis": ("Range=[0 30]", "Range=[0 (3]", 31, r"a \( without its \)"),
+    "a closed parenthesis": ("Range=[0 30]", "Range=[0 3)]", 31, r"a \) without its \("),
+    "no width": ("Range=[0 30]", "Range=[9 9]", 1, "universe 9 to 9 has no width"),
     "an unwritten number": ("[1.5 0]", "[NaN 0]", 18, "'NaN' is no finite number"),
-    "a number beyond doubles": ("[1.5 0]", "[1.5 1e999]", 18, "give finite numbers"),
+    "a number beyond doubles": ("[1.5 0]", "[1.5 1e999]", 18, "'1e999' is no finite number"),
     "an underscore": ("[1.5 0]", "[1_5 0]", 18, "'1_5' is no finite number"),
-    "an unknown kind": ("'gaussmf',[1.5 0]", "'rampmf',[1 0]", 18, "kind 'rampmf'; use gaussmf"),
+    "an unknown kind": ("'gaussmf',[1.5 0]", "'rampmf',[1 0]", 18, "'rampmf' is none of MATLAB's"),
     "a parameter too few": ("[1.5 0]", "[1.5]", 18, r"takes 2 parameters \(sd, centre\), got 1"),
     "a parameter too many": ("[1.5 0]", "[1.5 0 7]", 18, "takes 2 parameters .* got 3"),
     "a shapeless set": ("[0 5 10]", "[5 0 10]", 33, "do not form a trimf"),
@@ -319,7 +378,7 @@ REFUSALS = {
     "a rule too short": ("1 1, 1 (1) : 2", "1, 1 (1) : 2", 38, "2 sets for 2 inputs .* give 3"),
     "a set that is not there": ("1 1, 1", "1 3, 1", 38, "set 3 of 'food', which has 2"),
     "a consequent not there": ("1 1, 1", "1 1, 4", 38, "set 4 of 'tip', which has 3"),
-    "a negated consequent": ("1 1, 1", "1 1, -1", 38, "consequent -1: give the number"),
+    "a negated consequent": ("1 1, 1", "1 1, -1", 38, "consequent -1: NOT on the output"),
     "no antecedent": ("1 1, 1", "0 0, 1", 38, "the rule uses no input"),
     "a hedge": ("1 1, 1", "1.3 1, 1", 38, "1.3: hedges, Octave's decimals, are not computed"),
     "a weight above 1": ("1 1, 1 (1)", "1 1, 1 (1.5)", 38, "rule weight 1.5"),
@@ -357,8 +416,8 @@ def test_a_missing_section_is_named(read, section):
 def test_a_file_that_cannot_be_read_is_named(tmp_path, read):
     with pytest.raises(FisError, match=r"none\.fis: cannot be read \(No such file"):
         read_fis(tmp_path / "none.fis")
-    with pytest.raises(FisError, match=r"rules\.fis: is not UTF-8 text"):
-        read(TIPPER.encode().replace(b"poor", b"m\xe4\xdfig"))
+    with pytest.raises(FisError, match=r"rules\.fis: is UTF-16 text; save it as UTF-8"):
+        read(TIPPER.encode("utf-16"))
 
 
 def test_what_a_fis_file_cannot_hold_is_not_written(tmp_path, tipper):

@@ -46,7 +46,11 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class Variable:
-    """An input or the output on the universe [low, high], with its sets."""
+    """An input or the output on the universe [low, high], with its sets.
+
+    A universe without width, low = high, is one that nobody gave: `reach` is then the whole line.
+    An input without sets takes part in linear consequents only.
+    """
 
     name: str
     low: float
@@ -54,13 +58,19 @@ class Variable:
     sets: tuple[FuzzySet, ...]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
-            raise ValueError(f"variable {self.name!r}: low {self.low} must be below {self.high}")
-        if not self.sets:
-            raise ValueError(f"variable {self.name!r}: has no set; give at least one")
+        if not (np.isfinite([self.low, self.high]).all() and self.low <= self.high):
+            raise ValueError(
+                f"variable {self.name!r}: low {self.low} must be below {self.high}, which MATLAB "
+                "and Octave ask for too; exchange them"
+            )
         names = [one.name for one in self.sets]
         if len(set(names)) < len(names):
             raise ValueError(f"variable {self.name!r}: two sets share a name; rename one")
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Where a reading is expected: the universe, and anywhere if that has no width."""
+        return (self.low, self.high) if self.low < self.high else (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -115,6 +125,7 @@ class FuzzySystem:
         names = [variable.name for variable in self.inputs]
         if not names or len(set(names)) < len(names):
             raise ValueError("inputs: give at least one, each with a name of its own")
+        _check_output(self.output)
         if not self.rules:
             raise ValueError("the system has no rules: give at least one")
         for number, rule in enumerate(self.rules, start=1):
@@ -136,6 +147,16 @@ def _fits(rule: Rule, system: FuzzySystem) -> bool:
         for term in rule.antecedents
     )
     return bool(rule.antecedents) and known and 0 <= rule.consequent < len(system.output.sets)
+
+
+def _check_output(output: Variable) -> None:
+    if not output.sets:
+        raise ValueError(f"output {output.name!r}: has no set; give at least one")
+    if output.low == output.high and output.sets[0].kind not in FUNCTION_KINDS:
+        raise ValueError(
+            f"output {output.name!r}: the universe {output.low:g} to {output.high:g} has no width, "
+            "and so no area whose centroid could be the answer (Octave's is no number); widen it"
+        )
 
 
 def _check_kinds(system: FuzzySystem) -> None:
