@@ -6,14 +6,15 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.settings import ABSENT, LiverSettings
 from fuzzy.liver.stiffness import (
+    NORMAL_LIVER,
     PA_PER_KPA,
     UNIT,
     StiffnessEstimate,
@@ -25,6 +26,9 @@ from fuzzy.liver.system import liver_system
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
+
+if TYPE_CHECKING:
+    from fuzzy.systems.table import Blanks
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
@@ -159,10 +163,11 @@ def _table(request: EstimationRequest, inputs: Path) -> Answer:
     if request.out is not None:
         (kind,) = request.systems
         range_ = PLAUSIBLE if request.rule_base is None else (-np.inf, np.inf)
-        notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_)
+        blanks = _blanks(request)
+        notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_, blanks)
         lines.append(str(request.out))
     if request.explain:
-        lines += _explained(request, system, _table_row(inputs, request.row, system))
+        lines += _explained(request, *_table_row(request, inputs, system))
     return Answer(tuple(lines), notes)
 
 
@@ -196,14 +201,36 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[FuzzySystem
     return read_rule_base(path), ""
 
 
-def _table_row(inputs: Path, row: int | None, system: FuzzySystem) -> NDArray[np.float64]:
+def _blanks(request: EstimationRequest) -> Blanks | None:
+    """What a blank cell of the table means; None for a rule base that does not say."""
+    if request.rule_base is not None:
+        return None
+    from fuzzy.systems.table import Blanks
+
+    settings, normal = settings_of(request.settings), NORMAL_LIVER / PA_PER_KPA
+    return Blanks(
+        value=normal,
+        system=lambda names: patient_system(dict.fromkeys(names, normal), settings),
+        note=ABSENT[settings.absent].note.format(normal=normal),
+    )
+
+
+def _table_row(
+    request: EstimationRequest, inputs: Path, system: FuzzySystem
+) -> tuple[FuzzySystem, NDArray[np.float64]]:
+    """The system that answers for the row to explain, and its readings."""
     from fuzzy.systems.table import read_readings
 
-    X = read_readings(inputs, system)
-    number = 1 if row is None else row
+    blanks = _blanks(request)
+    X = read_readings(inputs, system, blanks=blanks is not None)
+    number = 1 if request.row is None else request.row
     if not 1 <= number <= len(X):
         raise ValueError(f"--row {number}: the table has rows 1 to {len(X)}")
-    return np.asarray(X[number - 1])
+    x = np.asarray(X[number - 1])
+    if blanks is None or not np.isnan(x).any():
+        return system, x
+    named = (one.name for one, value in zip(system.inputs, x, strict=True) if np.isfinite(value))
+    return blanks.system(tuple(named)), np.where(np.isnan(x), blanks.value, x)
 
 
 # --- figures and rule bases --------------------------------------------------------------------

@@ -620,7 +620,9 @@ def table(tmp_path):
         source.write_bytes(text if isinstance(text, bytes) else text.encode())
         notes = evaluate_table(system, source, target, kind, options)
         with target.open(newline="", encoding="utf-8") as file:
-            return notes, list(csv.reader(file))
+            parted = next((one for one in ";\t" if one in file.readline()), ",")
+            file.seek(0)
+            return notes, list(csv.reader(file, delimiter=parted))
 
     return evaluate
 
@@ -650,18 +652,53 @@ def test_type_2_adds_the_ends_of_its_interval(table, tipper):
         "service, food\n 2 , 1\n",
         "\nservice,food\n\n2,1\n\n",
         '"service","food"\n"2","1e0"',
+        "service;food\r\n2;1\r\n",
+        "service;food\n2,0;1\n;\n\n",
+        "sep=;\r\nservice;food\r\n2,0;1,0\r\n",
+        '"service"\t"food"\n"2,0"\t1\n',
+        b"\xef\xbb\xbfservice;food;;\r\n2;1;;\r\n;;;\r\n",
+        "service,food,,\n2,1,,\n,,,\n\n",
+        "service,food\n2,1,\n",
     ],
 )
 def test_quirks_of_spreadsheets_are_read(table, tipper, text):
     _, rows = table(tipper, text)
-    assert [f"{float(row[-1]):.4f}" for row in rows[1:]] == MATLABS_TIPS[:1]
+    assert [f"{float(row[-1].replace(',', '.')):.4f}" for row in rows[1:]] == MATLABS_TIPS[:1]
+
+
+def test_a_table_of_another_locale_is_answered_in_its_own(tmp_path, tipper):
+    source, target = tmp_path / "in.csv", tmp_path / "out.csv"
+    source.write_text("food;guest;service\n1;Ada, Countess;2,0\n5;Alan;4\n")
+    evaluate_table(tipper, source, target, "mamdani")
+    header, *lines = target.read_text().splitlines()
+    assert header == "food;guest;service;estimate"
+    tips = infer(tipper, READINGS, "mamdani").value.tolist()
+    expected = [repr(tip).replace(".", ",") for tip in tips]
+    assert lines == [f"1;Ada, Countess;2,0;{expected[0]}", f"5;Alan;4;{expected[1]}"]
+    # Columns that are no readings say nothing about the readings' decimals.
+    source.write_text("food;guest;service\n1;Ada, Countess;2\n")
+    evaluate_table(tipper, source, target, "mamdani")
+    answer = target.read_text().splitlines()[1].split(";")[-1]
+    assert float(answer) == pytest.approx(tips[0], rel=1e-12)
 
 
 TABLE_FLAWS = {
     "no such column": ("service,Food\n1,2", 1, "no column 'food' among .* did you mean 'Food'"),
     "no column alike": ("service,x\n1,2", 1, "no column 'food' among 'service', 'x'; add it"),
     "a column twice": ("food,service,food\n1,2,3", 1, "column 'food' stands there twice"),
-    "semicolons": ("service;food\n1;2", 1, "parted by semicolons"),
+    "decimal commas between commas": (
+        'service,food\n"1,5",2',
+        2,
+        "service: '1,5' is no number; write a point, or part columns by semicolons",
+    ),
+    "points beside decimal commas": (
+        "service;food\n1,5;2\n1.234;3",
+        3,
+        "service: '1.234' stands beside decimal commas",
+    ),
+    "groups of thousands": ("service;food\n1.234,5;2", 2, "'1.234,5' stands beside"),
+    "two decimal commas": ("service;food\n1,234,5;2", 2, "'1,234,5' is no number"),
+    "a decimal comma in one column": ("service\n2,5", 2, "2 cells under 1 columns"),
     "an estimate already": ("service,food,estimate\n1,2,3", 1, "a column 'estimate' already"),
     "a word": ("service,food\n1,2\n3,abc", 3, "food: 'abc' is no number"),
     "an empty cell": ("service,food\n1,2\n\n,3", 4, "service: the cell is empty"),
