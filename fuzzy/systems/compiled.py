@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fuzzy.systems import kernel
-from fuzzy.systems.kinds import SYSTEMS, check_kind
+from fuzzy.systems.kinds import SYSTEMS, check_kind, is_compiled
 from fuzzy.systems.options import OUT_OF_RANGE, InferenceOptions
 from fuzzy.systems.policy import LEAST_STRENGTH, answered, require_readings
 from fuzzy.systems.quadrature import Output, is_exact, sampled
@@ -147,6 +147,11 @@ def compiled(
         raise ValueError(
             "sampling = 'exact' is not compiled: evaluate it with infer, or choose matlab or "
             "octave sampling with more samples"
+        )
+    if not is_compiled(system, kind):
+        raise ValueError(
+            f"{system.name}: aggregation {system.operators.aggregation} and defuzzification "
+            f"{system.operators.defuzzification} are not compiled: evaluate it with infer"
         )
     return _compiled(system, kind, options, pruned)
 

@@ -20,10 +20,10 @@ from fuzzy.systems.system import (
     MERGES,
     FuzzySystem,
     Rule,
+    aggregated,
     firing_strengths,
     memberships,
     merged,
-    union,
 )
 
 
@@ -250,10 +250,10 @@ def _outputs(
 
 def _curve(system: FuzzySystem, fired: _Fired, kind: str, samples: int) -> OutputCurve:
     y = sampled(system.output, samples, "matlab").y
-    heights = (fired.lower_heights, fired.upper_heights)
+    strengths = (fired.lower, fired.upper)
     lower, upper = (
-        union(level[:, np.newaxis], memberships(system.output, y, bound), system.operators)[0]
-        for level, bound in zip(heights, SYSTEMS[kind].bounds, strict=True)
+        aggregated(system, level[:, np.newaxis], memberships(system.output, y, bound))[0]
+        for level, bound in zip(strengths, SYSTEMS[kind].bounds, strict=True)
     )
     return OutputCurve(y, lower, upper)
 

@@ -25,7 +25,7 @@ from fuzzy.systems.fis_sections import (
     words,
 )
 from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
-from fuzzy.systems.system import Connective, FuzzySystem, Operators, Rule, Term, Variable
+from fuzzy.systems.system import OPERATORS, Connective, FuzzySystem, Operators, Rule, Term, Variable
 
 SYSTEM_KEYS = (
     "Name",
@@ -41,10 +41,18 @@ SYSTEM_KEYS = (
     "DefuzzMethod",
 )
 VARIABLE_KEYS = ("Name", "Range", "NumMFs")
-OPERATORS = {"AndMethod": "conjunction", "OrMethod": "disjunction", "ImpMethod": "implication"}
+METHODS = {
+    "AndMethod": "conjunction",
+    "OrMethod": "disjunction",
+    "ImpMethod": "implication",
+    "AggMethod": "aggregation",
+    "DefuzzMethod": "defuzzification",
+}
 # By type. A weighted average has nothing to aggregate: `sum` is MATLAB's word for that.
-AGGREGATIONS = {"mamdani": ("max",), "sugeno": ("sum", "max")}
-DEFUZZIFICATIONS = {"mamdani": ("centroid",), "sugeno": ("wtaver",)}
+DEFUZZIFICATIONS = {
+    "mamdani": {one: one for one in OPERATORS["defuzzification"] if one != "wtsum"},
+    "sugeno": {"wtaver": "centroid", "wtsum": "wtsum"},
+}
 # Octave's names for what MATLAB calls otherwise.
 SYNONYMS = {"algebraic_product": "prod", "algebraic_sum": "probor"}
 
@@ -80,29 +88,34 @@ def _kind(values: Values) -> str:
     kind = values["Type"].unquoted().lower()
     if "type2" in kind:
         raise values["Type"].fault(f"Type {kind!r} {TYPE_2}")
-    if kind not in AGGREGATIONS:
+    if kind not in DEFUZZIFICATIONS:
         raise values["Type"].fault(f"Type {kind!r}: use mamdani or sugeno")
     return kind
 
 
 def _operators(values: Values, kind: str) -> Operators:
-    _check_method(values["AggMethod"], "aggregation", AGGREGATIONS[kind])
-    _check_method(values["DefuzzMethod"], "defuzzification", DEFUZZIFICATIONS[kind])
     operators = Operators()
-    for key, field in OPERATORS.items():
+    for key, field in METHODS.items():
         name = values[key].unquoted().lower()
-        chosen: Any = {field: SYNONYMS.get(name, name)}
         with values[key].blamed():
-            operators = replace(operators, **chosen)
+            operators = replace(operators, **_method(field, SYNONYMS.get(name, name), kind))
     return operators
 
 
-def _check_method(line: Line, what: str, allowed: tuple[str, ...]) -> None:
-    if line.unquoted().lower() not in allowed:
-        raise line.fault(
-            f"{what} {line.text} is not computed here; if the answers may differ, set "
-            f"{' or '.join(allowed)}"
-        )
+def _method(field: str, name: str, kind: str) -> Any:
+    """The operator of a field, by name; that of an aggregation in vain is checked and dropped."""
+    if field == "defuzzification":
+        known = DEFUZZIFICATIONS[kind]
+        if name not in known:
+            raise ValueError(
+                f"{field} {name!r}: functions of one's own are no part of the file; in a {kind} "
+                f"system use one of {', '.join(known)}"
+            )
+        return {field: known[name]}
+    if field == "aggregation" and kind == "sugeno":
+        Operators(aggregation=cast(Any, name))
+        return {}
+    return {field: name}
 
 
 def _output(section: Section, kind: str, input_count: int) -> Variable:
@@ -280,11 +293,17 @@ def _system_lines(system: FuzzySystem) -> list[str]:
         f"{len(system.inputs)}",
         "1",
         f"{len(system.rules)}",
-        *(f"'{getattr(system.operators, field)}'" for field in OPERATORS.values()),
-        f"'{AGGREGATIONS[kind][0]}'",
-        f"'{DEFUZZIFICATIONS[kind][0]}'",
+        *(f"'{method}'" for method in _methods(system)),
     )
     return ["[System]", *(f"{k}={v}" for k, v in zip(SYSTEM_KEYS, values, strict=True))]
+
+
+def _methods(system: FuzzySystem) -> list[str]:
+    methods: list[str] = [getattr(system.operators, field) for field in METHODS.values()]
+    if not system.is_sugeno:
+        return methods
+    names = {one: name for name, one in DEFUZZIFICATIONS["sugeno"].items()}
+    return [*methods[:-2], "sum", names[methods[-1]]]
 
 
 def _variable_lines(header: str, variable: Variable) -> list[str]:
