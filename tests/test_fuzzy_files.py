@@ -318,6 +318,16 @@ def test_linear_consequents_are_read(read):
     assert infer(alone, X, "sugeno").value == pytest.approx([35.0], abs=1e-12)
 
 
+def test_zeros_filling_consequents_up_are_dropped(read):
+    padded = read(
+        SUGENO.replace("'constant',[25]", "'linear',[2 -0.5 20 0]").replace("[5]", "[5 0 0 0]")
+    )
+    plain = read(SUGENO.replace("'constant',[25]", "'linear',[2 -0.5 20]"))
+    assert padded == plain
+    with pytest.raises(FisError, match="a constant takes 1 parameter"):
+        read(SUGENO.replace("'constant',[5]", "'constant',[5 1]"))
+
+
 # --- .fis: what is refused --------------------------------------------------------------------
 
 REFUSALS = {

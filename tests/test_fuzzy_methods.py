@@ -139,6 +139,16 @@ def test_no_rule_is_dominated_where_every_rule_adds():
     assert abs(found[0] - found[1]) > 0.01
 
 
+def test_no_rule_sets_a_height_where_curves_are_added():
+    for aggregation, sets in (("max", True), ("sum", False), ("probor", False)):
+        shown = explain(system("min", aggregation), X[0], "mamdani")
+        assert any(firing.sets_upper for firing in shown.rules) == sets
+        assert any(one.upper_rules for one in shown.outputs) == sets
+        area = np.trapezoid(shown.curve.upper, shown.curve.y)
+        centre = np.trapezoid(shown.curve.upper * shown.curve.y, shown.curve.y) / area
+        assert shown.answer == pytest.approx(centre, abs=0.02)
+
+
 def test_sets_become_constants_by_the_defuzzification():
     one = system("min", "sum", "lom")
     constants = [s.parameters[0] for s in sugeno_of(one).output.sets]

@@ -56,8 +56,9 @@ class Firing(NamedTuple):
 class OutputSet(NamedTuple):
     """An output set and the height at which it is implied.
 
-    `lower_rules` and `upper_rules`: numbers of the rules that set it; empty where strengths are
-    added. A Sugeno system gives each set a `constant` and its `share` of the total weight.
+    `lower_rules` and `upper_rules`: numbers of the rules that set it; empty where strengths or
+    curves are added. A Sugeno system gives each set a `constant` and its `share` of the total
+    weight.
     """
 
     name: str
@@ -174,10 +175,11 @@ def _fire(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -
     low, high = SYSTEMS[kind].bounds
     lower, upper = firing_strengths(system, X, low, high), firing_strengths(system, X, high, low)
     adds = kind == "sugeno" and MERGES[options.sugeno_aggregation].adds
+    every_counts = adds or (kind != "sugeno" and system.operators.aggregation != "max")
     consequents = np.array([rule.consequent for rule in system.rules])
     heights = [merged(system, strengths, "sum" if adds else "max") for strengths in (lower, upper)]
     sets = [
-        (strengths > 0) & (strengths == height[consequents]) & (not adds)
+        (strengths > 0) & (strengths == height[consequents]) & (not every_counts)
         for strengths, height in zip((lower, upper), heights, strict=True)
     ]
     columns = (part[:, 0] for part in (lower, upper, *sets, *heights))
