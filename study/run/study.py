@@ -120,6 +120,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         probes=response.probes,
         fuzzy=fuzzy.record,
         models=models,
+        references=tuple(compared_with),
         checks=checks,
         warnings=warnings(scene, models, checks),
         assumptions=assumptions(scene, found.control_point),
