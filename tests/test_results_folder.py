@@ -159,7 +159,7 @@ def test_fields_of_all_nodes_that_are_cut_are_refused(damaged_organ):
     assert "fem.vtkhdf: is missing" in refusal(damaged_organ)
 
 
-def test_checksums_made_again_do_not_mix_two_runs(damaged_organ, organ, tmp_path):
+def test_checksums_made_again_do_not_mix_two_runs(damaged_organ, tmp_path):
     """A table of the same rows with other numbers."""
     other = whole()
     other = replace(other, scores=tuple(row._replace(score=0.5) for row in other.scores))

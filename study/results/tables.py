@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
@@ -118,17 +118,21 @@ def _text(path: Path, data: bytes) -> str:
 
 
 def _rows(path: Path, kind: type[Entry], reader: Iterable[list[str]]) -> Iterator[Entry]:
-    hints = get_type_hints(kind)
-    number = 1
+    hints, number = get_type_hints(kind), 1
     try:
-        for number, cells in enumerate(reader, 2):  # noqa: B007 - named in the message
-            if len(cells) != len(kind._fields):
-                raise ValueError(f"{len(cells)} cells, not {len(kind._fields)}")
-            yield kind._make(map(_value, kind._fields, hints.values(), cells))
+        for cells in reader:
+            number += 1
+            yield kind._make(_values(kind._fields, hints, cells))
     except csv.Error as error:
         raise ValueError(f"{path.name}, line {number + 1}: {error}") from None
     except ValueError as error:
         raise ValueError(f"{path.name}, line {number}: {error}") from None
+
+
+def _values(names: Sequence[str], kinds: Mapping[str, type], cells: list[str]) -> list[object]:
+    if len(cells) != len(names):
+        raise ValueError(f"{len(cells)} cells, not {len(names)}")
+    return [_value(name, kinds[name], text) for name, text in zip(names, cells, strict=True)]
 
 
 def _value(name: str, kind: type, text: str) -> object:
