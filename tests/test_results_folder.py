@@ -19,6 +19,9 @@ from study.results import manifest
 from study.results.content import check
 from study.results.folder import ResultsError, read, write
 from study.results.tables import QUANTITIES
+from study.run.study import run_study
+from study.scene.file import read_scene
+from tests.conftest import SMALL
 from tests.report_samples import whole, with_model, with_record
 
 TABLES = ("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv")
@@ -332,6 +335,27 @@ def test_a_model_that_diverged_has_rows_up_to_then_and_no_others():
     check(replace(found, fields=found.fields | {"basafa": field}))
     with pytest.raises(ValueError, match=r"curves.csv, line 61: sample 10 of 10 of basafa at far"):
         check(replace(found, curves=rows[:-1]))
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("models=['basafa','msm']", "lattice.time_step=20 ms", "fuzzy.systems=['interval-type-2']"),
+        (
+            "models=['msm','basafa']",
+            "fuzzy.systems=['sugeno']",
+            'control_points={"a,\\"b\\"\\n c"={side="superior",at=[0.5,0.5]}}',
+        ),
+    ],
+    ids=["some of it diverged", "names with commas, quotes and ends of lines"],
+)
+def test_whatever_a_run_leaves_is_whole(overrides, tmp_path):
+    """Also a model that diverged, whose band ends, and one with inverted cells."""
+    quick = ("time.duration=0.5 s", "time.samples=26", "fuzzy.sensitivity_readings=0")
+    results = run_study(read_scene("block", (*SMALL, *quick, *overrides)))
+    assert {model.status for model in results.record.models} <= {"finished", "diverged"}
+    write(results, tmp_path)
+    assert read(tmp_path).record == results.record
 
 
 # --- arrays -------------------------------------------------------------------------------------
