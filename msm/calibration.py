@@ -4,6 +4,10 @@ from __future__ import annotations
 
 SPRING_POISSON_RATIO = 0.25
 """Of every lattice of central springs, whatever their stiffness."""
+LARGEST_POISSON_RATIO = 0.4999
+"""Of a lattice with a volume term, up to which it is verified. A cell then resists a change of its
+volume 5000 times as much as one of its shape; beyond, the steps that its solvers leave unexplained
+are no longer small beside the shape's."""
 
 
 def reference_stiffness(

@@ -23,6 +23,7 @@ from fuzzy.liver.stiffness import (
     patient_system,
 )
 from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
 
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
+SHAPES = ("footprint", "footprint_factor")
+"""Settings of the type-2 sets, which are drawn and written, too."""
+ONLY_OF = dict.fromkeys((*SHAPES, "reducer"), "interval-type-2") | {"sugeno_aggregation": "sugeno"}
+"""Settings that only one of the systems has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +81,7 @@ def answer(request: EstimationRequest) -> Answer:
     for name in request.systems:
         if name not in SYSTEMS:
             raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
+    _refuse_idle(request)
     if request.inputs is not None:
         return _table(request, request.inputs)
     if request.rule_base is not None:
@@ -86,6 +92,23 @@ def answer(request: EstimationRequest) -> Answer:
                 f"{flag}: only with a table of readings; give --inputs or leave it out"
             )
     return _patient(request)
+
+
+def _refuse_idle(request: EstimationRequest) -> None:
+    """ValueError for a setting that cannot change the answer."""
+    given, systems = request.settings, request.systems or tuple(SYSTEMS)
+    drawn = SHAPES if request.figures is not None else ()
+    for key, system in ONLY_OF.items():
+        if key in given and system not in systems and key not in drawn:
+            raise ValueError(f"{_flag(key)}: only {system} has it; leave it out or add the system")
+    if given.get("sampling") == "exact" and "samples" in given:
+        raise ValueError("--samples: has no effect with exact sampling; leave it out")
+    if "absent" in given and request.inputs is None and len(request.readings) == len(AETIOLOGIES):
+        raise ValueError("--absent: no reading is absent; leave it out")
+
+
+def _flag(key: str) -> str:
+    return "--" + key.replace("_", "-")
 
 
 # --- one patient -------------------------------------------------------------------------------
@@ -194,9 +217,8 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[FuzzySystem
     options = {one.name for one in fields(InferenceOptions)}
     for key in given:
         if key not in options:
-            flag = "--" + key.replace("_", "-")
             raise ValueError(
-                f"{flag}: shapes the liver's rules only; leave it out with --rule-base"
+                f"{_flag(key)}: shapes the liver's rules only; leave it out with --rule-base"
             )
     return read_rule_base(path), ""
 
@@ -256,6 +278,15 @@ def _draw(
         yield str(path)
 
 
+def _refuse_idle_rules(given: Mapping[str, Any], out: Path | None) -> None:
+    """ValueError for a setting that neither the audit nor the file depends on."""
+    if "absent" in given:
+        raise ValueError("--absent: is of a patient, not of the rules; leave it out")
+    for key in SHAPES:
+        if key in given and (out is None or out.suffix.lower() == ".fis"):
+            raise ValueError(f"{_flag(key)}: only a .json file holds it; leave it out or write one")
+
+
 def rule_base_lines(
     path: Path | None, given: Mapping[str, Any], out: Path | None, *, sugeno: bool
 ) -> Sequence[str]:
@@ -265,6 +296,7 @@ def rule_base_lines(
     from fuzzy.systems.files import write_rule_base
 
     system, _ = _rule_base(path, given)
+    _refuse_idle_rules(given, out)
     if out is None:
         if sugeno:
             raise ValueError("--sugeno: only with --out; constants are no part of the audit")

@@ -16,7 +16,16 @@ from msm.integrators import INTEGRATORS, UNBOUNDED
 from msm.kinematics import inverted_cells
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke, piecewise
-from msm.model import Automatic, Counts, Fixed, LatticeStepper, Rate, critical_time_step, run
+from msm.model import (
+    Automatic,
+    Counts,
+    Fixed,
+    LatticeStepper,
+    Rate,
+    critical_time_step,
+    refuse,
+    run,
+)
 from msm.springs import Springs, connect
 from msm.stability import Follower, cell_bound, frequency_bound, largest_frequency, longest_step
 from msm.statics import stiffness_at_rest
@@ -370,3 +379,16 @@ def test_the_step_at_rest_is_that_of_the_steeper_side_of_a_corner():
         assert stepper.limit_at_rest == pytest.approx(steep, rel=2e-3)
     soft = critical_time_step(body, Material(piecewise(strain, [-1.0, 0.0, 1.0])))
     assert soft > 1.05 * steep
+
+
+def test_steps_are_limited_as_they_are_asked_for_and_not_where_they_are_halved(monkeypatch):
+    """A run that was let through is not refused when its error is to be told."""
+    body, material = column((2, 2, 3))
+    seen = watch(body, 0.1, 17)
+    asked = run(body, material, np.ones_like, seen)
+    monkeypatch.setattr("msm.model.MAX_STEPS", asked.steps)
+    halved = run(body, material, np.ones_like, seen, Counts(2 * asked.substeps))
+    assert halved.steps == 2 * asked.steps
+    for step, remedy in ((Fixed(0.1 / 16 / 64), "time_step"), (Rate(64 * 160.0), "step_rate")):
+        with pytest.raises(ValueError, match=f"lattice.{remedy}"):
+            refuse(body, material, seen, step)

@@ -259,6 +259,16 @@ def replacing(folder: Path) -> AbstractContextManager[Path]:
     return folders.replacing(folder, _foreign, "run")
 
 
+def refuse_unwritable(folder: Path) -> None:
+    """FolderError if `replacing` would refuse the folder; nothing is left behind."""
+    folders.refuse_unwritable(folder, _foreign, "run")
+
+
+def default_folder(scene: str) -> Path:
+    """Where a run of a scene by name or file puts its results."""
+    return Path("results") / Path(scene).stem
+
+
 def _foreign(present: set[str]) -> str | None:
     found = sorted(n for n in present - FILES if not n.startswith(OURS) and not n.endswith(FIELDS))
     if not found and MARK not in present:
