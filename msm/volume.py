@@ -66,7 +66,7 @@ def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: floa
 def _why(poisson_ratio: float) -> str:
     if poisson_ratio < SPRING_POISSON_RATIO:
         return "below, the term would be negative and a swollen body gain energy"
-    return "above, it is not verified, for the term outweighs the springs more than 5000 times"
+    return "above, the term outweighs the springs more than 50 000 times and is not verified"
 
 
 def divergence(term: VolumeTerm, node_count: int) -> csr_array:

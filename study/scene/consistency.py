@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from msm.calibration import LARGEST_POISSON_RATIO, SPRING_POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
 from study.scene.law import SpringLaw
 from study.scene.schema import Lattice, Scene
@@ -88,12 +88,6 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield (
             f"lattice.volume_term: needs tissue.poisson_ratio of {SPRING_POISSON_RATIO} or more, "
             f"not {nu:g}; leave it out or raise the ratio"
-        )
-    if lattice.volume_term and nu > LARGEST_POISSON_RATIO:
-        yield (
-            f"lattice.volume_term: is verified up to tissue.poisson_ratio {LARGEST_POISSON_RATIO}, "
-            f"not {nu:g}, where it outweighs the springs more than 5000 times; leave it out or "
-            "lower the ratio"
         )
     if _has(table, ("lattice", "integrator")):
         yield from _integrator_contradictions(scene)
