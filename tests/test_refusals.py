@@ -139,7 +139,7 @@ LEGAL = [
         "|lattice.integrator=split-volume",
     ),
     ("block", f"{TISSUE}|lattice.time_step=2.5 ms"),
-    ("block", f"{TISSUE}|lattice.integrator=implicit-euler|lattice.step_fraction=10"),
+    ("block", f"{TISSUE}|lattice.integrator=velocity-verlet|lattice.step_fraction=10"),
     ("block", f"{TISSUE}|lattice.spacing=20 mm"),
     ("block", f"{TISSUE}|lattice.springs=tetrahedra"),
     ("block", f"{TISSUE}|support.stiffness=1 Pa/m|support.depth=1 um"),
