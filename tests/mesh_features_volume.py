@@ -2,48 +2,272 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 from tests.mesh_features import Feature, Treatment
-from tests.mesh_samples import cube
+from tests.mesh_samples import SIDE, cube, cube_surface
 
 ABAQUS = "Abaqus and CalculiX (.inp)"
 
+Edit = Callable[[str], str]
 
-def abaqus(edit: Callable[[str], str] = str) -> Callable[[Path], Path]:
+# ---- Abaqus ------------------------------------------------------------------------------------
+
+
+def keyword_file(edit: Edit = str) -> Callable[[Path], Path]:
     """Writer of the cube as a keyword file after an edit of its text."""
-    points, tetrahedra = cube(2)
-    rows = ["*HEADING", "cube", "*NODE"]
-    rows += [f"{i}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(points.tolist(), start=1)]
-    rows += ["*ELEMENT, TYPE=C3D4"]
-    rows += [f"{i}, " + ", ".join(map(str, t + 1)) for i, t in enumerate(tetrahedra, start=1)]
-    text = "\n".join([*rows, ""])
 
     def write(folder: Path) -> Path:
         path = folder / "cube.inp"
-        path.write_text(edit(text))
+        path.write_text(edit(keyword_text()))
         return path
 
     return write
 
 
-def _after(keyword: str, *lines: str) -> Callable[[str], str]:
-    return lambda text: text.replace(f"{keyword}\n", "\n".join([keyword, *lines, ""]), 1)
+def keyword_text() -> str:
+    points, tetrahedra = cube(2)
+    rows = ["*HEADING", "cube", "*NODE"]
+    rows += [f"{i}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(points.tolist(), start=1)]
+    rows += ["*ELEMENT, TYPE=C3D4"]
+    rows += [f"{i}, " + ", ".join(map(str, t + 1)) for i, t in enumerate(tetrahedra, start=1)]
+    return "\n".join([*rows, ""])
 
 
-def _at_end(*lines: str) -> Callable[[str], str]:
+def swap(old: str, new: str, count: int = 1) -> Edit:
+    """Put one text for another, which has to be there."""
+
+    def edit(text: str) -> str:
+        assert old in text
+        return text.replace(old, new, count)
+
+    return edit
+
+
+def after(keyword: str, *lines: str) -> Edit:
+    return swap(f"{keyword}\n", "\n".join([keyword, *lines, ""]))
+
+
+def at_end(*lines: str) -> Edit:
     return lambda text: "\n".join([text + lines[0], *lines[1:], ""])
 
 
-def _abaqus(
-    name: str, treatment: Treatment, edit: Callable[[str], str] = str, words: str = ""
-) -> Feature:
-    return Feature(ABAQUS, name, treatment, abaqus(edit), words)
+def every(pattern: str, new: str) -> Edit:
+    return lambda text: re.sub(pattern, new, text, flags=re.MULTILINE)
 
+
+def both(*edits: Edit) -> Edit:
+    def edit(text: str) -> str:
+        for one in edits:
+            text = one(text)
+        return text
+
+    return edit
+
+
+def part(*instance: str, inside: Edit = str, beside: str = "") -> Edit:
+    """The whole mesh as a part, and the lines of an instance of it."""
+
+    def edit(text: str) -> str:
+        rows = ["*PART, NAME=Organ", inside(text.removeprefix("*HEADING\ncube\n")).strip()]
+        rows += ["*END PART", *filter(None, [beside])]
+        rows += ["*ASSEMBLY, NAME=A", *instance, "*END ASSEMBLY", ""]
+        return "\n".join(["*Heading", *rows])
+
+    return edit
+
+
+def renumbered(text: str) -> str:
+    """Every node and element by another number, the order being that of the old ones backwards."""
+    return "\n".join(
+        re.sub(r"\b\d+\b", lambda found: str(999 - 7 * int(found[0])), row, count="." in row)
+        if row[:1].isdigit()
+        else row
+        for row in text.split("\n")
+    )
+
+
+def quadratic(name: str) -> Edit:
+    """Elements of ten nodes; those in the middle of the edges are new."""
+    points, tetrahedra = cube(2)
+    edges = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]
+    middles = points[tetrahedra[:, edges]].mean(axis=2).reshape(-1, 3)
+
+    def edit(text: str) -> str:
+        first = len(points) + 1
+        more = "\n".join(f"{first + i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(middles))
+        head, _, body = text.partition("*ELEMENT, TYPE=C3D4\n")
+        rows = [
+            f"{row}, " + ", ".join(str(first + 6 * e + i) for i in range(6))
+            for e, row in enumerate(body.split("\n")[:-1])
+        ]
+        return head + more + f"\n*ELEMENT, TYPE={name}\n" + "\n".join([*rows, ""])
+
+    return edit
+
+
+def _abaqus(name: str, treatment: Treatment, edit: Edit = str, words: str = "") -> Feature:
+    return Feature(ABAQUS, name, treatment, keyword_file(edit), words)
+
+
+_SKIN = "\n".join(
+    f"{1000 + i}, " + ", ".join(map(str, 1 + 2 * (t // 4 * 9 + t // 2 % 2 * 3 + t % 2)))
+    for i, t in enumerate(cube_surface()[1])
+)
+_INSTANCE = ("*Instance, name=Organ-1, part=Organ",)
+_END = ("*End Instance",)
+_REFUSED = {
+    "`*INCLUDE`": (at_end("*INCLUDE, INPUT=other.inp"), "line 80: *INCLUDE"),
+    "`*NODE, INPUT=`": (at_end("*NODE, INPUT=other.inp"), "line 80: *NODE, INPUT="),
+    "`*ELEMENT, INPUT=`": (
+        at_end("*ELEMENT, TYPE=C3D4, INPUT=other.inp"),
+        "line 80: *ELEMENT, INPUT=",
+    ),
+    "`*NODE, SYSTEM=C` or `S`": (swap("*NODE", "*Node, system=c"), "line 3: *NODE, SYSTEM=C"),
+    "`*SYSTEM` with a point": (after("cube", "*SYSTEM", "1., 0., 0."), "line 3: *SYSTEM"),
+    "`*NGEN`, `*NFILL`, `*NCOPY`, `*NMAP`": (
+        at_end("*NSET, NSET=A", "1", "*NGEN", "1, 3, 1"),
+        "line 82: *NGEN",
+    ),
+    "`*ELGEN`, `*ELCOPY`": (at_end("*ELGEN", "1, 2, 1, 1"), "line 80: *ELGEN"),
+    "`*MODEL CHANGE` of elements": (
+        at_end("*STEP", "*MODEL CHANGE, REMOVE", "SET", "*END STEP"),
+        "line 81: *MODELCHANGE",
+    ),
+    "`*IMPERFECTION`, `*ADJUST`": (at_end("*IMPERFECTION, FILE=a, STEP=1"), "*IMPERFECTION"),
+    "`*IMPORT`, `*RESTART, READ`": (at_end("*RESTART, READ"), "line 80: *RESTART, READ"),
+    "an expression for a coordinate (`<x>`)": (
+        both(after("cube", "*PARAMETER", "x = 0.12"), swap("\n27, 0.12", "\n27, <x>")),
+        "line 32: expected 4 numbers",
+    ),
+    "an unknown keyword": (at_end("*NODES", "1, 0., 0., 0."), "line 80: *NODES is not known"),
+    "an unknown option of `*NODE` or `*ELEMENT`": (
+        swap("TYPE=C3D4", "TYPE=C3D4, OFFSET=3"),
+        "line 31: *ELEMENT, OFFSET is not known",
+    ),
+    "an unknown element type": (swap("TYPE=C3D4", "TYPE=U1"), "line 31: *ELEMENT, TYPE=U1"),
+    "hexahedra, wedges, pyramids": (
+        at_end("*ELEMENT, TYPE=C3D8R", "49, 1,2,5,4,10,11,14,13"),
+        "1 hexahedron cells beside 48 tetrahedra",
+    ),
+    "a node given twice": (after("*NODE", "27, 0., 0., 0."), "line 31: node 27"),
+    "an element given twice": (at_end("1, 1, 2, 5, 14"), "line 80: element 1 is given a second"),
+    "an element with a node that is missing": (at_end("49, 1, 2, 5, 99"), "line 80: element 49"),
+    "an element with too few or too many nodes": (
+        at_end("49, 1, 2, 5"),
+        "line 80: element 49 has 3 nodes, C3D4 needs 4",
+    ),
+    "node numbers that are not positive": (after("*NODE", "0, 1., 1., 1."), "line 4: 0 is no node"),
+    "a last line that is not ended": (str.rstrip, "line 79 is the last one and not ended"),
+    "several instances with a body": (
+        part(*_INSTANCE, *_END, "*Instance, name=B, part=Organ", "1.", *_END),
+        "2 bodies: instance ORGAN-1 (line 82), instance B (line 84)",
+    ),
+    "an instance of a part that is missing": (
+        part("*Instance, name=B, part=Bone", *_END),
+        "line 82: there is no part BONE",
+    ),
+    "a part without an instance": (part(), "line 2: part ORGAN has no *INSTANCE"),
+    "a part that is not ended": (swap("*NODE", "*PART, NAME=P\n*NODE"), "no *END PART"),
+}
+
+_READ = {
+    "nodes, linear tetrahedra": str,
+    "names of hybrid and other elements (`C3D4H`)": swap("C3D4", "C3D4H"),
+    "lower case, blanks, quoted names": both(
+        swap("*NODE", "*node , nset = all"),
+        swap("*ELEMENT, TYPE=C3D4", ' *Element,  type = c3d4 ,elset="my set, a"'),
+    ),
+    "comments (`**`) anywhere, blank lines": both(
+        after("*NODE", "** a", ""),
+        after("*ELEMENT, TYPE=C3D4", "**, b"),
+        swap("\n9, ", "\n**\n9, "),
+    ),
+    "several `*NODE` and `*ELEMENT` blocks, in any order": both(
+        swap("\n9, ", "\n*NODE, NSET=B\n9, "),
+        every(r"^(20, \d+, )", r"*ELEMENT, TYPE=C3D4H\n\1"),
+        lambda text: "*ELEMENT" + text.partition("*ELEMENT")[2] + text.partition("*ELEMENT")[0],
+    ),
+    "keyword lines that go on after a comma": swap("*ELEMENT, ", "*ELEMENT, ELSET=A,\n** a\n"),
+    "elements in several lines, each ending with a comma": every(
+        r"^(\d+, \d+, \d+,) (\d+, \d+)$", r"\1\n\2"
+    ),
+    "commas at the end of complete lines": every(r"^(\d.*)$", r"\1,"),
+    "Fortran's exponents (`6.D-2`)": every(r"0\.06\b", "6.D-2"),
+    "components of normals behind the coordinates": after("*NODE", "28, 0., 0., 0., 0., 0., 1."),
+    "numbers in any order and with gaps": renumbered,
+    "lines ended by CR LF": swap("\n", "\r\n", -1),
+    "a part and its instance": part(*_INSTANCE, *_END),
+    "an instance with translation and rotation": part(
+        *_INSTANCE, "1., 2.", "1., 2., 0., 1., 2., 1., 30.", *_END
+    ),
+    "nodes and elements in the instance": lambda text: part(
+        *_INSTANCE, text.removeprefix("*HEADING\ncube\n").strip(), *_END, inside=lambda _: ""
+    )(text),
+}
+
+_IGNORED = {
+    "`*NSET`, `*ELSET`, generated ones too": at_end(
+        "*NSET, NSET=ALL, GENERATE", "1, 27, 1", "*ELSET, ELSET=E", "1, 2, 3,", "4"
+    ),
+    "`*SURFACE`, `*ORIENTATION`, `*TRANSFORM`, `*DISTRIBUTION`": at_end(
+        "*SURFACE, NAME=S", "E, S1", "*ORIENTATION, NAME=O", "1,0,0,0,1,0",
+        "*TRANSFORM, NSET=ALL", "0.,1.,0.,-1.,0.,0.", "*DISTRIBUTION, NAME=D", "1, 0."
+    ),
+    "materials and sections": at_end(
+        "*Solid Section, elset=E, material=M", ",", "*Material, name=M",
+        "*Hyperelastic, neo hooke", "1., 2.", "*DENSITY", "1000.", "*USER MATERIAL", "1."
+    ),
+    "boundary conditions, constraints, contact, amplitudes": at_end(
+        "*BOUNDARY", "1, 1, 3", "*RIGID BODY, REF NODE=1", "*TIE, NAME=T", "A, B", "*EQUATION", "1",
+        "1, 1, 1.", "*AMPLITUDE, NAME=A", "0., 0., 1., 1.", "*CONTACT PAIR, INTERACTION=I", "A, B"
+    ),
+    "steps, loads and output": at_end(
+        "*STEP, NLGEOM=YES", "*STATIC", "*CLOAD", "1, 1, 1.",
+        "*MODEL CHANGE, TYPE=CONTACT PAIR, ADD",
+        "A, B", "*NODE FILE", "U", "*NODE OUTPUT", "U", "*EL PRINT", "S", "*ELEMENT OUTPUT", "S",
+        "*RESTART, WRITE", "*END STEP",
+    ),
+    "`*PARAMETER`, used elsewhere": at_end("*PARAMETER", "E = 3000.", "*ELASTIC", "<E>, 0.45"),
+    "a last line that is not ended, of another keyword": lambda text: text + "*PREPRINT, ECHO=NO",
+    "trusses, springs, masses, connectors": at_end(
+        "*ELEMENT, TYPE=T3D2", "60, 1, 2", "*ELEMENT, TYPE=MASS, ELSET=M", "61, 1",
+        "*ELEMENT, TYPE=SPRINGA", "62, 1, 2"
+    ),
+}  # fmt: skip
+
+_NOTED = {
+    "quadratic tetrahedra (`C3D10HS`, `C3D10M`, ...): their corners": (
+        quadratic("C3D10HS"),
+        "48 cells of type tetra10: mid-side nodes not used",
+    ),
+    "shells, membranes, rigid faces beside tetrahedra": (
+        at_end("*ELEMENT, TYPE=S3R", *_SKIN.split("\n")),
+        "12 triangles beside the tetrahedra not used",
+    ),
+    "a node's missing coordinates: zero": (
+        swap("\n1, 0.0, 0.0, 0.0", "\n1"),
+        "1 nodes lack coordinates",
+    ),
+    "nodes of the assembly, which no element uses": (
+        part(*_INSTANCE, *_END, "*NODE, NSET=REFERENCE", f"1, {SIDE}, 0., 0."),
+        "1 nodes that no element uses dropped",
+    ),
+    "an instance of faces beside that of the body": (
+        part(
+            *_INSTANCE, *_END, "*INSTANCE, NAME=T, PART=TOOL", *_END,
+            beside="*PART, NAME=TOOL\n*NODE\n1, 0., 0.,0.\n2,1.,0.,0.\n3,0.,1.,0.\n"
+            "*ELEMENT, TYPE=R3D3\n1,1,2,3\n*END PART",
+        ),
+        "1 triangles beside the tetrahedra",
+    ),
+}  # fmt: skip
 
 FEATURES: list[Feature] = [
-    _abaqus("nodes, linear tetrahedra", "read"),
-    _abaqus("`*NSET`, `*ELSET`", "ignored", _at_end("*NSET, NSET=ALL", "1, 2, 3")),
-    _abaqus("`*INCLUDE`", "refused", _at_end("*INCLUDE, INPUT=other.inp"), "*INCLUDE"),
+    *(_abaqus(name, "read", edit) for name, edit in _READ.items()),
+    *(_abaqus(name, "ignored", edit) for name, edit in _IGNORED.items()),
+    *(_abaqus(name, "ignored with a note", edit, words) for name, (edit, words) in _NOTED.items()),
+    *(_abaqus(name, "refused", edit, words) for name, (edit, words) in _REFUSED.items()),
 ]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from study.mesh.kinds import MeshError
+from study.mesh.listing import one_per_kind
 from study.mesh.load import load_mesh
+from study.mesh.raw import raw_mesh
 from tests.mesh_samples import (
     CUBE_VOLUME,
     SIDE,
@@ -376,3 +378,24 @@ def test_a_surface_that_touches_itself_at_a_node_is_reported(load_surface):
 def test_a_star_shaped_solid_and_its_surface_agree(load_solid, load_surface):
     solid, surface = load_solid(*ellipsoid())[1], load_surface(*ellipsoid_surface())[1]
     assert solid.volume == pytest.approx(surface.volume, rel=ROUNDING)
+
+
+# ---- Notes -------------------------------------------------------------------------------------
+
+
+def test_what_happens_to_many_blocks_of_cells_is_one_note():
+    points = np.zeros((9, 3))
+    triangle, quad, curved = [[0, 1, 2]], [[0, 1, 2, 3]], [list(range(8))]
+    blocks = [("triangle", triangle), ("quad", quad), ("quad8", curved)] * 90
+    mesh = raw_mesh(points, [(name, np.array(rows)) for name, rows in blocks])
+    assert len(mesh.triangles) == 90 * 5
+    assert mesh.notes == (
+        "90 cells of type quad8: mid-side nodes not used, edges straight",
+        "180 faces of types quad, quad8 cut into triangles from their first corner; first "
+        "(0-based): 1, 2, 4, 5, 7, ...; triangles are numbered after that",
+    )
+
+
+def test_notes_that_differ_in_numbers_only_are_one():
+    notes = ["a quad at 3", "no number", "a quad at 4.5", "a quad at -1e-3"]
+    assert one_per_kind(notes) == ("a quad at 3 (and 2 more such notes)", "no number")

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.mesh.draft import Draft, drop_duplicates, listing, weld
+from study.mesh.draft import Draft, drop_duplicates, weld
 from study.mesh.kinds import FloatArray, IndexArray, MeshError, TetrahedralMesh
+from study.mesh.listing import listing
 from study.mesh.tetrahedra import EDGES, volumes
 from study.mesh.topology import (
     RowGroups,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
+from study.mesh.listing import listing
 from study.mesh.topology import components, group_rows
 
 WELD_TOLERANCE = 1e-6
@@ -104,12 +105,6 @@ def element_map(draft: Draft, file_count: int) -> IndexArray:
     numbers = np.full(file_count, -1, dtype=np.int64)
     numbers[draft.element_ids] = np.arange(len(draft.element_ids))
     return numbers
-
-
-def listing(numbers: IndexArray, most: int = 5) -> str:
-    """First few numbers as text."""
-    shown = ", ".join(str(number) for number in numbers[:most].tolist())
-    return shown + (", ..." if len(numbers) > most else "")
 
 
 def _check_points(points: FloatArray, limit: float) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from study.mesh.abaqus import read_abaqus
 from study.mesh.check import repair_tetrahedra
 from study.mesh.draft import Draft, element_map, start_draft
 from study.mesh.gmsh import is_gmsh_text, read_gmsh
@@ -20,6 +21,7 @@ from study.mesh.kinds import (
     TetrahedralMesh,
     TetrahedronQuality,
 )
+from study.mesh.listing import one_per_kind
 from study.mesh.obj import read_obj
 from study.mesh.polydata import read_polydata
 from study.mesh.quality import sliver_notes, surface_quality, tetrahedron_quality
@@ -34,11 +36,11 @@ MAX_BYTES = 2**30
 MAX_ELEMENTS = 5_000_000
 
 _MAX_COORDINATE = 1e6  # metres; anything beyond is a misread number
+_OWN = {".inp": read_abaqus, ".obj": read_obj, ".stl": read_stl}
 _MESHIO = {
     ".vtu": "vtu",
     ".vtk": "vtk",
     ".msh": "gmsh",
-    ".inp": "abaqus",
     ".mesh": "medit",
     ".meshb": "medit",
     ".ply": "ply",
@@ -88,10 +90,8 @@ def _content(source: Path) -> bytes:
 
 def _read(source: Path, data: bytes) -> RawMesh:
     suffix = source.suffix.lower()
-    if suffix == ".stl":
-        return read_stl(data)
-    if suffix == ".obj":
-        return read_obj(data)
+    if suffix in _OWN:
+        return _OWN[suffix](data)
     if suffix == ".msh" and is_gmsh_text(data):
         return read_gmsh(data)
     if suffix == ".msh" and is_gmsh_4(data):
@@ -128,7 +128,9 @@ def _checked(
         node_map=draft.node_map,
         element_map=element_map(draft, len(raw.tetrahedra if solid else raw.triangles)),
         quality=quality,
-        notes=(*raw.notes, *_unused(raw, solid), *draft.notes, *unit_notes, *shape_notes),
+        notes=one_per_kind(
+            (*raw.notes, *_unused(raw, solid), *draft.notes, *unit_notes, *shape_notes)
+        ),
     )
     return mesh, report
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
+from study.mesh.listing import listing
 
 Block = tuple[str, NDArray[Any]]
 """A cell type by its usual name (tetra, tetra10, triangle, quad, hexahedron, ...) and its cells."""
@@ -17,7 +18,8 @@ Block = tuple[str, NDArray[Any]]
 # Type -> corner nodes, which come first in every row; the rest of the row is mid-side nodes.
 _TETRAHEDRA = {"tetra": 4, "tetra10": 4}
 _FACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-_ROW = {"tetra": 4, "tetra10": 10, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
+ROW = {"tetra": 4, "tetra10": 10, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
+"""Nodes of a cell, for every type that can be used."""
 _SOLID = ("hexahedron", "wedge", "pyramid", "polyhedron", "tetra", "VTK_LAGRANGE")
 
 
@@ -44,27 +46,64 @@ def raw_mesh(points: NDArray[Any], blocks: Iterable[Block], notes: Sequence[str]
     tetrahedra: list[NDArray[Any]] = []
     triangles: list[NDArray[Any]] = []
     solids: dict[str, int] = {}
-    found = list(notes)
+    curved, cut = _Tally(), _Tally()
     for name, cells in blocks:
         if len(cells) == 0:
             continue
         if name in _TETRAHEDRA:
-            tetrahedra.append(_corners(name, cells, _TETRAHEDRA[name], found))
-        elif name in _FACES:
-            triangles.append(fan(_corners(name, cells, _FACES[name], found)))
-            _note_fan(name, cells, found)
-        elif name == "polygon" and np.ndim(cells) == 2:
-            triangles.append(fan(np.asarray(cells)))
-            _note_fan(name, cells, found)
-        elif name.startswith(_SOLID):
+            tetrahedra.append(_corners(name, cells, _TETRAHEDRA[name]))
+            curved.add(name, len(cells), name != "tetra")
+        elif name in _FACES or (name == "polygon" and np.ndim(cells) == 2):
+            corners = _corners(name, cells, _FACES[name]) if name in _FACES else np.asarray(cells)
+            triangles.append(fan(corners))
+            curved.add(name, len(cells), ROW.get(name, 0) > _FACES.get(name, 0))
+            cut.add(name, len(cells), not name.startswith("triangle"))
+        elif is_solid(name):
             solids[name] = solids.get(name, 0) + len(cells)
     return RawMesh(
         np.asarray(points, dtype=float),
         _stack(tetrahedra, 4),
         _stack(triangles, 3),
         solids,
-        tuple(found),
+        (*notes, *_notes(curved, cut)),
     )
+
+
+def is_solid(name: str) -> bool:
+    """Whether cells of this type have a volume."""
+    return name.startswith(_SOLID)
+
+
+class _Tally:
+    """How many cells of which types something was done to, and the first of them."""
+
+    def __init__(self) -> None:
+        self.types: dict[str, int] = {}
+        self.first: list[int] = []
+        self.seen = 0
+
+    def add(self, name: str, count: int, concerned: bool) -> None:
+        """Count the cells of a block, to all or none of which it is done."""
+        if concerned:
+            self.types[name] = self.types.get(name, 0) + count
+            self.first += range(self.seen, self.seen + min(count, 6 - len(self.first)))
+        self.seen += count
+
+    def text(self, what: str) -> str:
+        """Number of cells, their types and the first of them, as `12 faces of type quad`."""
+        names = ", ".join(self.types)
+        kind = "type" if len(self.types) == 1 else "types"
+        return f"{sum(self.types.values())} {what} of {kind} {names}"
+
+
+def _notes(curved: _Tally, cut: _Tally) -> Iterator[str]:
+    if curved.types:
+        yield f"{curved.text('cells')}: mid-side nodes not used, edges straight"
+    if cut.types:
+        yield (
+            f"{cut.text('faces')} cut into triangles from their first corner; first (0-based): "
+            f"{listing(np.array(cut.first))}; triangles are numbered after that"
+        )
 
 
 def fan(polygons: NDArray[Any]) -> NDArray[Any]:
@@ -89,23 +128,13 @@ def by_corner_count(polygons: Sequence[Sequence[int]]) -> list[Block]:
     ]
 
 
-def _corners(name: str, cells: NDArray[Any], corners: int, notes: list[str]) -> NDArray[Any]:
-    if np.ndim(cells) != 2 or cells.shape[1] != _ROW[name]:
+def _corners(name: str, cells: NDArray[Any], corners: int) -> NDArray[Any]:
+    if np.ndim(cells) != 2 or cells.shape[1] != ROW[name]:
         raise MeshError(
-            f"cells of type {name} have shape {np.shape(cells)} instead of (n, {_ROW[name]}): "
+            f"cells of type {name} have shape {np.shape(cells)} instead of (n, {ROW[name]}): "
             "damaged or truncated file; export it again"
         )
-    if cells.shape[1] > corners:
-        notes.append(f"{len(cells)} cells of type {name}: mid-side nodes not used, edges straight")
     return cells[:, :corners]
-
-
-def _note_fan(name: str, cells: NDArray[Any], notes: list[str]) -> None:
-    if not name.startswith("triangle"):
-        notes.append(
-            f"{len(cells)} faces of type {name} cut into triangles from their first corner; "
-            "triangles are numbered after that"
-        )
 
 
 def _stack(rows: list[NDArray[Any]], width: int) -> IndexArray:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.mesh.draft import Draft, drop_duplicates, drop_unused_nodes, listing, weld
+from study.mesh.draft import Draft, drop_duplicates, drop_unused_nodes, weld
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
+from study.mesh.listing import listing
 from study.mesh.topology import (
     components,
     edges_of,

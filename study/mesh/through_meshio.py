@@ -20,8 +20,7 @@ def read_with_meshio(path: Path, data: bytes, file_format: str) -> RawMesh:
     """Read with one of meshio's readers, quietly.
 
     The content is looked at first for what these readers get wrong: they wait for ever on a
-    truncated PLY or OFF header, take a cut-off file for complete, believe any announced count,
-    and lose all but the last node block of an Abaqus file.
+    truncated PLY or OFF header, take a cut-off file for complete and believe any announced count.
 
     Raises
     ------
@@ -89,16 +88,6 @@ def _check_gmsh(data: bytes) -> None:
     _check_announced(data, rb"^\$(?:Nodes|Elements)\s+(\d+)")
 
 
-def _check_abaqus(data: bytes) -> None:
-    if re.search(rb"^\s*\*\s*INCLUDE\b", data, re.MULTILINE | re.IGNORECASE):
-        raise MeshError("*INCLUDE refers to another file; put the mesh into one file")
-    blocks = re.findall(rb"^\s*\*\s*NODE\s*(?:,|$)", data, re.MULTILINE | re.IGNORECASE)
-    if len(blocks) > 1:
-        raise MeshError(f"{len(blocks)} *NODE blocks; export one part with all its nodes in one")
-    if not data.endswith((b"\n", b"\r")):
-        raise MeshError("the last line is not ended: truncated? If it is complete, add a newline")
-
-
 def _check_medit(data: bytes) -> None:
     if data[:4] in {b"\1\0\0\0", b"\0\0\0\1"}:
         return  # the binary form ends with a code that only its reader can find
@@ -131,7 +120,6 @@ _PRECHECKS = {
     "vtu": _check_vtu,
     "vtk": _check_vtk,
     "gmsh": _check_gmsh,
-    "abaqus": _check_abaqus,
     "medit": _check_medit,
     "ply": _check_ply,
     "off": _check_off,

@@ -1,0 +1,112 @@
+"""What Abaqus and CalculiX call elements, and which of their keywords leave the mesh alone."""
+
+from __future__ import annotations
+
+import re
+
+_SOLIDS = {
+    4: "tetra",
+    5: "pyramid",
+    6: "wedge",
+    8: "hexahedron",
+    10: "tetra10",
+    13: "pyramid13",
+    15: "wedge15",
+    20: "hexahedron20",
+    27: "hexahedron27",
+}
+_FACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+# D, A, E, F before C3D: heat transfer, acoustic, Eulerian, fluid. Letters behind the number tell
+# the formulation (hybrid, reduced, modified, with temperature ...), and nothing of the shape.
+_SOLID = re.compile(r"(?:[DAEF]|CIN|ACIN)?C?3D(\d+)[A-Z]*")
+_OTHER_SOLID = re.compile(r"(?:COH3D|GK3D|SC|CSS|Q3D|CAXA|EMC3D|PC3D|CCL)\d+.*")
+# Plane elements too: mesh generators write the triangles of a surface as CPS3.
+_FACE = re.compile(
+    r"(?:S|DS|STRI|R3D|M3D|SFM3D|EMSFM3D|[DAE]?C(?:PS|PE|PEG|AX|GAX|2D)|[DA]CAX)(\d)[A-Z]*\d?"
+)
+_NO_BODY = re.compile(
+    r"(?:T[23]D|B2|B3|PIPE|ELBOW|FRAME|RB[23]D|SAX|MAX|MGAX|RAX|SFMAX|SFMGAX|ASI|SPRING|DASHPOT|MASS"
+    r"|ROTARYI|HEATCAP|CONN|GAP|GAPUNI|ITS|JOINTC|DCOUP|DC1D|AC1D|DCC1D|LS3S|LS6|DGAP|PSI|F[23]D2|D$)"
+    r".*"
+)
+
+
+def cell_type(element_type: str) -> tuple[str, int]:
+    """Usual name of an element type's cells (tetra, triangle, ...) and how many nodes one has.
+
+    The type is in capitals without blanks. What has neither volume nor area is a line, with any
+    number of nodes; an unknown type has no name.
+    """
+    solid = _SOLID.fullmatch(element_type)
+    face = _FACE.fullmatch(element_type)
+    if solid:
+        return _SOLIDS.get(int(solid[1]), ""), int(solid[1])
+    if _OTHER_SOLID.fullmatch(element_type):
+        return f"polyhedron {element_type}", 99
+    if element_type == "STRI65":
+        return "triangle6", 6
+    if face:
+        return _FACES.get(int(face[1]), ""), int(face[1])
+    return ("line" if _NO_BODY.fullmatch(element_type) else "", 0)
+
+
+# Stems of keywords, without blanks. Materials, sections, sets, surfaces, loads, steps, contact,
+# constraints and output neither make nor move nodes; whatever begins otherwise is refused, since
+# nobody knows what it does.
+_STEMS = """
+ACOUSTIC ALLOWABLESTRESS AMPLITUDE ANISOTROPIC ANNEAL AQUA AXIAL BASEMOTION BASELINE BEAM BIAXIAL
+BLOCKAGE BOND BOUNDARY BRITTLE BUCKL BULKVISCOSITY BUOYANCY CADDEDMASS CAP CASTIRON CAVITY CECHARGE
+CECURRENT CENTROID CFD CFILM CFLOW CFLUX CHANGE CHARACTERISTICLENGTH CLAY CLEARANCE CLOAD COHESIVE
+COMBIN COMPLEX COMPOSITE CONCENTRATION CONCRETE CONDUCTIVITY CONDUCTORBEHAVIOR CONNECTOR CONSTRAINT
+CONTACT CONTOUR CONTROLS CORRELATION CO-SIMULATION COUPLED COUPLING CRACKPROPAGATION CRADIATE CREEP
+CRUSHABLEFOAM CRUSHSTRESS CYCLED CYCLIC DADDEDMASS DAMAGE DAMPING DASHPOT DEBOND DECHARGE DECURRENT
+DEFORMATIONPLASTICITY DENSITY DEPVAR DESIGN DETONATION DFLOW DFLUX DIAGNOSTIC DIELECTRIC
+DIFFUSIVITY DIRECTCYCLIC DISCRETESECTION DISPLAYBODY DISTRIBUT DLOAD DRAG DRUCKER DSECHARGE
+DSECURRENT DSFLOW DSFLUX DSLOAD DYNAMIC EDGELOAD ELASTIC ELECTRIC ELECTROMAGNETIC ELEMENTOUTPUT
+ELEMENTOPERATOROUTPUT ELEMENTRECOVERY ELEMENTRESPONSE ELEMENTUSEROUTPUT ELFILE ELPRINT ELSET
+EMBEDDEDELEMENT EMISSIVITY ENDLOADCASE ENDSTEP ENERGY ENRICHMENT EOS EPJOINT EQUATION EQUIVALENT
+EULERIAN EXPANSION EXTERNALFIELD EXTREME FABRIC FAIL FASTENER FATIGUE FEASIBLEDIRECTION FIELD FILE
+FILM FILTER FIXEDMASS FLEXIBLE FLOW FLUID FOUNDATION FRACTURE FRAME FREQUENCY FRICTION GAP GAS GEL
+GEOMETRIC GEOSTATIC GLOBALDAMPING GREEN HCF HEADING HEATCAP HEATGEN HEATTRANSFER HOURGLASS
+HYDROSTATIC HYPER HYPO HYSTERESIS IMPEDANCE IMPORTCONTROLS INCIDENT INELASTIC INERTIA
+INITIALCONDITIONS INTEGRATED INTERACTION INTERFACE JOINT JOULE KAPPA KINEMATIC LATENT LOAD
+LOWDENSITY MAGNETIC MASS MATERIAL MATRIX MEAN MEDIA MEMBRANE MODAL MOHR MOISTURE MOLECULAR MONITOR
+MOTION MPC MULLINS MULTIPHYSICS NETWORK NOANALYSIS NOCOMPRESSION NOTENSION NODALENERGYRATE
+NODALTHICKNESS NODEFILE NODEOUTPUT NODEPRINT NODERESPONSE NONLINEARBH NONSTRUCTURALMASS NORMAL NSET
+OBJECTIVE ORIENTATION ORNL OUTPUT PARAMETER PERIODIC PERMEABILITY PERMITTIVITY PHYSICALCONSTANTS
+PIEZO PIPESOIL PLANAR PLASTIC PLY PORE POROUS POROSITY POST POTENTIAL PREPRINT PRESSURE PRE-TENSION
+PRINT PROBABILITY PROPERTY PSD-DEFINITION RADIATE RADIATION RANDOM RATE RATIOS REACTION REBAR
+REFLECTION RELEASE RESPONSE RESTART RETAINED RIGID ROBUSTDESIGN ROTARY SECTION SELECT SENSITIVITY
+SFILM SFLOW SHEAR SHELL SIMPEDANCE SLIDE SLOSH SMEARED SOILS SOLID SOLUBILITY SOLUTION SOLVER
+SORPTION SPECIFICHEAT SPECTRUM SPECIFY SPRING SRADIATE STATIC STEADY STEP STRESS SUBMODEL
+SUBSTRUCTURE SURFACE SWELLING TEMPERATURE TENSILE TENSION THERMAL TIE TIME TORQUE TRACER TRANSFORM
+TRANSPORT TRANSVERSE TRIAXIAL TRS UELPROPERTY UNCOUPLED UNDEX UNIAXIAL UNITSYSTEM USER
+VALUESATINFINITY VARIABLE VIEWFACTOR VISCO VISCOUS VOID VOLUMETRIC WAVE WIND
+"""
+_HARMLESS = re.compile("|".join(_STEMS.split()))
+
+REFUSED = {
+    "ADJUST": "moves nodes",
+    "ACTIVATEELEMENTS": "leaves elements out",
+    "ELCOPY": "makes elements",
+    "ELGEN": "makes elements",
+    "IMPERFECTION": "moves nodes",
+    "IMPORT": "takes the mesh from another analysis",
+    "INCLUDE": "refers to another file",
+    "MODELCHANGE": "takes elements out of the model",
+    "NCOPY": "makes nodes",
+    "NFILL": "makes nodes",
+    "NGEN": "makes nodes",
+    "NMAP": "moves nodes",
+    "PARAMETERSHAPEVARIATION": "moves nodes",
+    "REFINEMESH": "changes the mesh",
+    "SUBSTRUCTUREPATH": "refers to another model",
+    "SYMMETRICMODELGENERATION": "makes the mesh from another one",
+    "SYSTEM": "moves and turns the nodes after it",
+}
+"""Keywords that change the mesh in a way that is not followed here, and what they do."""
+
+
+def is_harmless(keyword: str) -> bool:
+    """Whether the keyword, in capitals without blanks, leaves nodes and elements as they are."""
+    return keyword not in REFUSED and bool(_HARMLESS.match(keyword))

@@ -1,0 +1,32 @@
+"""Many things of one kind told in one line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from study.mesh.kinds import IndexArray
+
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+
+
+def listing(numbers: IndexArray, most: int = 5) -> str:
+    """First few numbers as text."""
+    return some(numbers[: most + 1].tolist(), most)
+
+
+def some(things: Sequence[object], most: int = 5) -> str:
+    """First few things as text."""
+    shown = ", ".join(str(thing) for thing in things[:most])
+    return shown + (", ..." if len(things) > most else "")
+
+
+def one_per_kind(notes: Iterable[str]) -> tuple[str, ...]:
+    """The notes, but only the first of those that differ in nothing but numbers, with a count."""
+    kinds: dict[str, list[str]] = {}
+    for note in notes:
+        kinds.setdefault(_NUMBER.sub("0", note), []).append(note)
+    return tuple(
+        same[0] if len(same) == 1 else f"{same[0]} (and {len(same) - 1} more such notes)"
+        for same in kinds.values()
+    )
