@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import re
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import meshio
+import numpy as np
+
 from tests.mesh_features import Feature, Treatment
-from tests.mesh_samples import SIDE, cube, cube_surface
+from tests.mesh_samples import SIDE, Ints, cube, cube_surface, gmsh_1, gmsh_2
 
 ABAQUS = "Abaqus and CalculiX (.inp)"
+GMSH = "Gmsh (.msh)"
 
 Edit = Callable[[str], str]
 
@@ -265,9 +271,184 @@ _NOTED = {
     ),
 }  # fmt: skip
 
+# ---- Gmsh --------------------------------------------------------------------------------------
+
+
+def gmsh_bytes(version: str, binary: bool = False, **data: object) -> bytes:
+    """The cube with its skin and an edge in a format of Gmsh, written by meshio from 2.2 on."""
+    points, tetrahedra = cube(2)
+    if version in {"1", "2"}:
+        return (gmsh_1 if version == "1" else gmsh_2)(points, tetrahedra).encode()
+    cells = [("triangle", SKIN), ("line", np.array([[0, 1]])), ("tetra", tetrahedra)]
+    mesh = meshio.Mesh(points, cells, **data)
+    path = Path(tempfile.mkdtemp()) / "cube.msh"
+    for name in ("gmsh:physical", "gmsh:geometrical"):  # meshio wants these of several cell types
+        mesh.cell_data[name] = [np.full(len(block.data), 7) for block in mesh.cells]
+    if version == "4.1":
+        mesh.point_data["gmsh:dim_tags"] = np.tile([3, 7], (len(points), 1))
+    meshio.gmsh.write(path, mesh, version, binary)
+    written = path.read_bytes()
+    shutil.rmtree(path.parent)
+    return written
+
+
+def numbered_4(is_4_1: bool, first: int = 1, step: int = 1) -> bytes:
+    """Text of format 4 with a parametric block of nodes and numbers that have gaps."""
+    points, tetrahedra = cube(2)
+    number = first + step * np.arange(len(points))
+    rows = ["$MeshFormat", "4.1 0 8" if is_4_1 else "4 0 8", "$EndMeshFormat", "$Nodes"]
+    rows += [f"2 27 {first} {number[-1]}" if is_4_1 else "2 27"]
+    for dimension, part in ((2, slice(9)), (3, slice(9, 27))):
+        more = " 0.5 0.5" if dimension == 2 else ""
+        entity = f"{dimension} 1" if is_4_1 else f"1 {dimension}"
+        rows.append(f"{entity} {int(dimension == 2)} {len(points[part])}")
+        places = [" ".join(map(repr, place)) + more for place in points[part].tolist()]
+        tags = [str(tag) for tag in number[part]]
+        rows += (
+            [*tags, *places] if is_4_1 else [f"{t} {p}" for t, p in zip(tags, places, strict=True)]
+        )
+    rows += ["$EndNodes", "$Elements", "1 48 1 48" if is_4_1 else "1 48"]
+    rows += ["3 1 4 48" if is_4_1 else "1 3 4 48"]
+    rows += [f"{e} " + " ".join(map(str, number[t])) for e, t in enumerate(tetrahedra, start=1)]
+    return "\n".join([*rows, "$EndElements", ""]).encode()
+
+
+def _gmsh(name: str, treatment: Treatment, data: Callable[[], bytes], words: str = "") -> Feature:
+    def write(folder: Path) -> Path:
+        path = folder / "cube.msh"
+        path.write_bytes(data())
+        return path
+
+    return Feature(GMSH, name, treatment, write, words)
+
+
+def _skin(tetrahedra: Ints) -> Ints:
+    """Faces that belong to one tetrahedron."""
+    faces = np.sort(tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3))
+    unique, count = np.unique(faces, axis=0, return_counts=True)
+    return unique[count == 1]
+
+
+SKIN = _skin(cube(2)[1])
+
+OTHER_SECTIONS = {
+    "PhysicalNames": b'$PhysicalNames\n1\n3 7 "$Nodes of the liver"\n$EndPhysicalNames\n',
+    "Comments": b"$Comments\n$Nodes\n1\n$Elements\n$EndComments\n",
+    "Periodic": b"$Periodic\n1\n2 1 2\n1\n1 3\n$EndPeriodic\n",
+    "PartitionedEntities": b"$PartitionedEntities\n2\n0\n0 0 0 0\n$EndPartitionedEntities\n",
+    "Parametrizations": b"$Parametrizations\n0 0\n$EndParametrizations\n",
+    "GhostElements": b"$GhostElements\n1\n1 1 1 2\n$EndGhostElements\n",
+    "InterpolationScheme": b'$InterpolationScheme\n"a"\n0\n$EndInterpolationScheme\n',
+    "NodeData": b'$NodeData\n1\n"u"\n1\n0.5\n3\n0\n1\n2\n1 0.1\n27 nan\n$EndNodeData\n',
+    "ElementData": b'$ElementData\n1\n"E"\n1\n0\n4\n0\n9\n1\n0\n'
+    b"60 1 2 3 4 5 6 7 8 9\n$EndElementData\n",
+    "ElementNodeData": b'$ElementNodeData\n1\n"s"\n0\n3\n0\n1\n1\n60 4 1 2 3 4\n'
+    b"$EndElementNodeData\n",
+    "a section of a name unknown": b"$Whatever\n$Nod\n$EndWhatever\n",
+    "binary ElementData": b'$ElementData\n1\n"E"\n1\n0\n3\n0\n1\n2\n'
+    + np.array([(60, 0.5), (61, 1e9)], "<i4,<f8").tobytes()
+    + b"\n$EndElementData\n",
+}
+
+GMSH_FILES: dict[str, Callable[[], bytes]] = {
+    "format 1": lambda: gmsh_bytes("1"),
+    "format 2.2, text": lambda: gmsh_bytes("2.2"),
+    "format 2.2, binary": lambda: gmsh_bytes("2.2", binary=True),
+    "format 4.0, text": lambda: gmsh_bytes("4.0"),
+    "format 4.0, binary": lambda: gmsh_bytes("4.0", binary=True),
+    "format 4.1, text": lambda: gmsh_bytes("4.1"),
+    "format 4.1, binary": lambda: gmsh_bytes("4.1", binary=True),
+}
+
+
+def elements_first(data: bytes) -> bytes:
+    """The section of the nodes at the end."""
+    a, b = data.index(b"$Nodes"), data.index(b"$EndNodes\n") + len(b"$EndNodes\n")
+    return data[:a] + data[b:] + data[a:b]
+
+
+def _second_section() -> bytes:
+    data = gmsh_bytes("4.1")
+    return data + data[data.index(b"$Nodes") : data.index(b"$Elements")]
+
+
+def _order_2(version: str) -> bytes:
+    """Tetrahedra of ten nodes, those in the middle of the edges being their corners again."""
+    points, tetrahedra = cube(2)
+    edges = [[0, 1], [1, 2], [2, 0], [0, 3], [2, 3], [1, 3]]
+    middles = points[tetrahedra[:, edges]].mean(axis=2).reshape(-1, 3)
+    rows = np.hstack([tetrahedra, len(points) + np.arange(len(middles)).reshape(-1, 6)])
+    path = Path(tempfile.mkdtemp()) / "cube.msh"
+    mesh = meshio.Mesh(np.vstack([points, middles]), [("tetra10", rows)])
+    meshio.gmsh.write(path, mesh, version, False)
+    written = path.read_bytes()
+    shutil.rmtree(path.parent)
+    return written
+
+
+_NOT_USED = "48 triangles beside the tetrahedra not used"
+
+_GMSH = [
+    *(
+        _gmsh(f"{name}: tetrahedra, triangles, lines", "read", make)
+        for name, make in GMSH_FILES.items()
+    ),
+    _gmsh("node numbers with gaps, in any order", "read", lambda: numbered_4(True, 10, 7)),
+    _gmsh("format 4.0: node numbers with gaps", "read", lambda: numbered_4(False, 10, 7)),
+    _gmsh("parametric coordinates of nodes", "read", lambda: numbered_4(True)),
+    _gmsh("sections in another order", "read", lambda: elements_first(gmsh_bytes("4.1", True))),
+    *(
+        _gmsh(f"`${name}`" if " " not in name else name, "ignored",
+              lambda more=more: numbered_4(True) + more)
+        for name, more in OTHER_SECTIONS.items()
+    ),
+    _gmsh(
+        "tags of physical groups, partitions (negative ones too)", "ignored",
+        lambda: gmsh_bytes("2").replace(b" 4 2 7 1 ", b" 4 4 -7 1 1 -2 "),
+    ),
+    _gmsh(
+        "triangles beside tetrahedra", "ignored with a note", lambda: gmsh_bytes("4.1"), _NOT_USED
+    ),
+    _gmsh(
+        "tetrahedra of higher order: their corners", "ignored with a note", lambda: _order_2("4.1"),
+        "48 cells of type tetra10: mid-side nodes not used",
+    ),
+    _gmsh(
+        "hexahedra, prisms, pyramids", "refused",
+        lambda: gmsh_bytes("2").replace(b"1 15 2 0 1 1", b"1 5 2 0 1 1 2 5 4 10 11 14 13"),
+        "1 hexahedron cells beside 48 tetrahedra",
+    ),
+    _gmsh(
+        "an element type that is not known", "refused",
+        lambda: gmsh_bytes("2").replace(b"1 15 2 0 1 1", b"1 99 2 0 1 1"),
+        "line 36: Gmsh element type 99",
+    ),
+    _gmsh(
+        "a second section of nodes or elements", "refused", _second_section,
+        "a second section $Nodes",
+    ),
+    _gmsh(
+        "a section that is not ended", "refused",
+        lambda: numbered_4(True) + b"$NodeData\n1\n", "section $NodeData ... $EndNodeData",
+    ),
+    _gmsh(
+        "a node that is missing", "refused",
+        lambda: gmsh_bytes("2").replace(b" 4 2 7 1 1 ", b" 4 2 7 1 99 "), "node number 99",
+    ),
+    _gmsh(
+        "other numbers than announced", "refused",
+        lambda: numbered_4(True).replace(b"\n3 1 4 48\n", b"\n3 1 4 47\n"), "expected $EndElements",
+    ),
+    _gmsh(
+        "formats 3 and others", "refused",
+        lambda: gmsh_bytes("2").replace(b"2.2 0 8", b"3 0 8"), "Gmsh format 3",
+    ),
+]  # fmt: skip
+
 FEATURES: list[Feature] = [
     *(_abaqus(name, "read", edit) for name, edit in _READ.items()),
     *(_abaqus(name, "ignored", edit) for name, edit in _IGNORED.items()),
     *(_abaqus(name, "ignored with a note", edit, words) for name, (edit, words) in _NOTED.items()),
     *(_abaqus(name, "refused", edit, words) for name, (edit, words) in _REFUSED.items()),
+    *_GMSH,
 ]

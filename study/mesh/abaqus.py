@@ -12,7 +12,7 @@ from study.mesh.abaqus_words import REFUSED, cell_type, is_harmless
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
 from study.mesh.listing import some
 from study.mesh.placement import Placement, placement
-from study.mesh.raw import ROW, Block, RawMesh, is_solid, raw_mesh
+from study.mesh.raw import Block, RawMesh, is_solid, nodes_of, raw_mesh
 from study.mesh.text import NumberedLine, floats
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
@@ -246,7 +246,7 @@ def _cells(keyword: _Keyword) -> list[_Cells]:
     if name == "line" or not keyword.rows:
         return []
     lines, rows = _whole_rows(keyword.rows, 1 + nodes)
-    if name not in ROW:  # refused later, with the count
+    if not nodes_of(name):  # refused later, with the count
         empty = np.empty((len(rows), 0), dtype=np.int64)
         return [_Cells(name, lines, np.empty(0, dtype=np.int64), empty)]
     found = _integers(lines, rows, element_type, nodes)

@@ -11,8 +11,7 @@ import numpy as np
 from study.mesh.abaqus import read_abaqus
 from study.mesh.check import repair_tetrahedra
 from study.mesh.draft import Draft, element_map, start_draft
-from study.mesh.gmsh import is_gmsh_text, read_gmsh
-from study.mesh.gmsh4 import is_gmsh_4, read_gmsh_4
+from study.mesh.gmsh import read_gmsh
 from study.mesh.kinds import (
     MeshError,
     MeshReport,
@@ -36,11 +35,10 @@ MAX_BYTES = 2**30
 MAX_ELEMENTS = 5_000_000
 
 _MAX_COORDINATE = 1e6  # metres; anything beyond is a misread number
-_OWN = {".inp": read_abaqus, ".obj": read_obj, ".stl": read_stl}
+_OWN = {".inp": read_abaqus, ".msh": read_gmsh, ".obj": read_obj, ".stl": read_stl}
 _MESHIO = {
     ".vtu": "vtu",
     ".vtk": "vtk",
-    ".msh": "gmsh",
     ".mesh": "medit",
     ".meshb": "medit",
     ".ply": "ply",
@@ -92,10 +90,6 @@ def _read(source: Path, data: bytes) -> RawMesh:
     suffix = source.suffix.lower()
     if suffix in _OWN:
         return _OWN[suffix](data)
-    if suffix == ".msh" and is_gmsh_text(data):
-        return read_gmsh(data)
-    if suffix == ".msh" and is_gmsh_4(data):
-        return read_gmsh_4(data)
     if suffix == ".vtk" and re.search(rb"(?im)^DATASET\s+POLYDATA\b", data[:4096]):
         return read_polydata(data)
     if suffix in _MESHIO:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,11 +16,9 @@ from study.mesh.listing import listing
 Block = tuple[str, NDArray[Any]]
 """A cell type by its usual name (tetra, tetra10, triangle, quad, hexahedron, ...) and its cells."""
 
-# Type -> corner nodes, which come first in every row; the rest of the row is mid-side nodes.
-_TETRAHEDRA = {"tetra": 4, "tetra10": 4}
-_FACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-ROW = {"tetra": 4, "tetra10": 10, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
-"""Nodes of a cell, for every type that can be used."""
+# Shape and, unless the cell is linear, the number of its nodes, of which the corners come first.
+_USABLE = re.compile(r"(tetra|triangle|quad)(\d*)")
+_CORNERS = {"tetra": 4, "triangle": 3, "quad": 4}
 _SOLID = ("hexahedron", "wedge", "pyramid", "polyhedron", "tetra", "VTK_LAGRANGE")
 
 
@@ -50,13 +49,13 @@ def raw_mesh(points: NDArray[Any], blocks: Iterable[Block], notes: Sequence[str]
     for name, cells in blocks:
         if len(cells) == 0:
             continue
-        if name in _TETRAHEDRA:
-            tetrahedra.append(_corners(name, cells, _TETRAHEDRA[name]))
-            curved.add(name, len(cells), name != "tetra")
-        elif name in _FACES or (name == "polygon" and np.ndim(cells) == 2):
-            corners = _corners(name, cells, _FACES[name]) if name in _FACES else np.asarray(cells)
-            triangles.append(fan(corners))
-            curved.add(name, len(cells), ROW.get(name, 0) > _FACES.get(name, 0))
+        shape = _USABLE.fullmatch(name)
+        if shape and shape[1] == "tetra":
+            tetrahedra.append(_corners(name, cells))
+            curved.add(name, len(cells), bool(shape[2]))
+        elif shape or (name == "polygon" and np.ndim(cells) == 2):
+            triangles.append(fan(_corners(name, cells) if shape else np.asarray(cells)))
+            curved.add(name, len(cells), bool(shape and shape[2]))
             cut.add(name, len(cells), not name.startswith("triangle"))
         elif is_solid(name):
             solids[name] = solids.get(name, 0) + len(cells)
@@ -128,13 +127,20 @@ def by_corner_count(polygons: Sequence[Sequence[int]]) -> list[Block]:
     ]
 
 
-def _corners(name: str, cells: NDArray[Any], corners: int) -> NDArray[Any]:
-    if np.ndim(cells) != 2 or cells.shape[1] != ROW[name]:
+def nodes_of(name: str) -> int:
+    """Number of nodes of a tetrahedron, triangle or quad of any order, zero for other cells."""
+    shape = _USABLE.fullmatch(name)
+    return int(shape[2] or _CORNERS[shape[1]]) if shape else 0
+
+
+def _corners(name: str, cells: NDArray[Any]) -> NDArray[Any]:
+    expected = nodes_of(name)
+    if np.ndim(cells) != 2 or cells.shape[1] != expected:
         raise MeshError(
-            f"cells of type {name} have shape {np.shape(cells)} instead of (n, {ROW[name]}): "
+            f"cells of type {name} have shape {np.shape(cells)} instead of (n, {expected}): "
             "damaged or truncated file; export it again"
         )
-    return cells[:, :corners]
+    return cells[:, : _CORNERS[name.rstrip("0123456789")]]
 
 
 def _stack(rows: list[NDArray[Any]], width: int) -> IndexArray:

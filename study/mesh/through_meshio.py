@@ -78,16 +78,6 @@ def _compare_counts(data: bytes, cells: int, entries: int) -> None:
         )
 
 
-def _check_gmsh(data: bytes) -> None:
-    """Only the binary form of format 2 comes here; the others have readers of their own."""
-    if not re.search(rb"^\$MeshFormat\s+2(?:\.\d+)?\s+1\s", data[:4096], re.MULTILINE):
-        raise MeshError("not a Gmsh file of format 1, 2 or 4.1; save it as one of these")
-    for section in (b"Nodes", b"Elements"):
-        if b"$End" + section not in data:
-            raise MeshError(f"no $End{section.decode()}: truncated, export it again")
-    _check_announced(data, rb"^\$(?:Nodes|Elements)\s+(\d+)")
-
-
 def _check_medit(data: bytes) -> None:
     if data[:4] in {b"\1\0\0\0", b"\0\0\0\1"}:
         return  # the binary form ends with a code that only its reader can find
@@ -119,7 +109,6 @@ def _check_announced(data: bytes, pattern: bytes) -> None:
 _PRECHECKS = {
     "vtu": _check_vtu,
     "vtk": _check_vtk,
-    "gmsh": _check_gmsh,
     "medit": _check_medit,
     "ply": _check_ply,
     "off": _check_off,
