@@ -16,6 +16,7 @@ from tests.mesh_samples import SIDE, Ints, cube, cube_surface, gmsh_1, gmsh_2
 
 ABAQUS = "Abaqus and CalculiX (.inp)"
 GMSH = "Gmsh (.msh)"
+MEDIT = "MEDIT (.mesh, .meshb)"
 
 Edit = Callable[[str], str]
 
@@ -445,10 +446,146 @@ _GMSH = [
     ),
 ]  # fmt: skip
 
+# ---- MEDIT -------------------------------------------------------------------------------------
+
+
+def medit_text() -> str:
+    points, tetrahedra = cube(2)
+    rows = ["MeshVersionFormatted 2", "Dimension 3", "Vertices", str(len(points))]
+    rows += [" ".join(map(repr, place)) + " 0" for place in points.tolist()]
+    rows += ["Tetrahedra", str(len(tetrahedra))]
+    rows += [" ".join(map(str, t + 1)) + " 5" for t in tetrahedra]
+    return "\n".join([*rows, "End", ""])
+
+
+def medit_binary(version: int, order: str = "<", more: dict[int, bytes] | None = None) -> bytes:
+    """The cube with sections of the given codes between vertices and tetrahedra."""
+    points, tetrahedra = cube(2)
+    integer, real = ("i8" if version > 3 else "i4"), ("f4" if version == 1 else "f8")
+    vertices = np.zeros(27, [("place", order + real, 3), ("reference", order + integer)])
+    vertices["place"] = points
+    cells = np.hstack([tetrahedra + 1, np.full((48, 1), 5)]).astype(order + integer)
+
+    def counted(rows: np.ndarray) -> bytes:
+        return np.array([len(rows)], order + integer).tobytes() + rows.tobytes()
+
+    data = np.array([1, version], order + "i4").tobytes()
+    content = {3: np.array([3], order + "i4").tobytes(), 4: counted(vertices)}
+    for code, section in [*content.items(), *(more or {}).items(), (8, counted(cells))]:
+        position = np.dtype(order + ("i4" if version < 3 else "i8"))
+        following = len(data) + 4 + position.itemsize + len(section)
+        data += np.array([code], order + "i4").tobytes()
+        data += np.array([following], position).tobytes() + section
+    return data + np.array([54, 0], order + "i4").tobytes()
+
+
+def before_end(*lines: str) -> Edit:
+    return swap("\nEnd\n", "\n".join(["", *lines, "End", ""]))
+
+
+def _medit(name: str, treatment: Treatment, edit: Edit = str, words: str = "") -> Feature:
+    def write(folder: Path) -> Path:
+        path = folder / "cube.mesh"
+        path.write_text(edit(medit_text()))
+        return path
+
+    return Feature(MEDIT, name, treatment, write, words)
+
+
+def _meditb(name: str, treatment: Treatment, data: bytes, words: str = "") -> Feature:
+    def write(folder: Path) -> Path:
+        path = folder / "cube.meshb"
+        path.write_bytes(data)
+        return path
+
+    return Feature(MEDIT, name, treatment, write, words)
+
+
+def medit_p2(text: str) -> str:
+    """Ten nodes for every tetrahedron."""
+    points, tetrahedra = cube(2)
+    edges = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]
+    middles = points[tetrahedra[:, edges]].mean(axis=2).reshape(-1, 3)
+    more = "\n".join(" ".join(map(repr, place)) + " 0" for place in middles.tolist())
+    head, _, body = text.partition("Tetrahedra\n48\n")
+    rows = [
+        " ".join([*row.split()[:4], *(str(28 + 6 * e + i) for i in range(6)), "0"])
+        for e, row in enumerate(body.split("\n")[:48])
+    ]
+    head = head.replace("Vertices\n27", f"Vertices\n{27 + len(middles)}")
+    return "\n".join([head + more, "TetrahedraP2", "48", *rows, "End", ""])
+
+
+MEDIT_IGNORED = {
+    "`Corners`, `Ridges`, `RequiredVertices`, ...": before_end(
+        "Corners", "2", "1", "2", "Ridges 1", "1", "RequiredVertices", "1", "1",
+        "RequiredTriangles 1 1",
+    ),
+    "`Edges`": before_end("Edges", "1", "1 2 0", "EdgesP2 1", "1 2 3 0"),
+    "`Normals`, `NormalAtVertices`, `Tangents`, `TangentAtVertices`": before_end(
+        "Normals", "1", "0 0 1", "NormalAtVertices", "1", "1 1", "Tangents", "1", "1 0 0",
+        "TangentAtVertices", "1", "1 1", "NormalAtTriangleVertices", "1", "1 1 1",
+    ),
+    "solutions (`SolAtVertices`, ...)": before_end("SolAtVertices", "1", "1 1", "0.5"),
+    "`AngleOfCornerBound`, `BoundingBox`, `Periodic...`, `SubDomain...`": before_end(
+        "AngleOfCornerBound", "45.", "BoundingBox", "0 1 0 1 0 1", "PeriodicVertices", "1", "1 2",
+        "SubDomainFromMesh", "1", "3 1 1 0",
+    ),
+    "`Comments`, `Identifier`, `Geometry`": before_end(
+        "Comments", "1", '"Organ"', "a liver", "Identifier", '"x"', "Geometry", '"y"'
+    ),
+}  # fmt: skip
+
+_MEDIT = [
+    _medit("text: vertices, tetrahedra, references", "read"),
+    *(
+        _meditb(f"binary, version {version}{', big-endian' * (order == '>')}", "read",
+                medit_binary(version, order))
+        for version in (1, 2, 3, 4)
+        for order in "<>"
+    ),
+    _medit("keywords in any case", "read", lambda text: text.upper()),
+    _medit("counts behind their keyword, blank lines", "read",
+           every(r"^(Vertices|Tetrahedra|Dimension)\s+(\d+)$", r"\n\n \1 \2\n")),
+    _medit("the dimension in a line of its own", "read", swap("Dimension 3", "Dimension\n3")),
+    _medit("comments (`#`)", "read",
+           both(swap("Vertices\n", "# Tetrahedra 9\nVertices # v\n#\n"), every("5$", "5 # 5"))),
+    _medit("Fortran's exponents (`6.D-2`)", "read", every(r"0\.06\b", "6.D-2")),
+    _medit("lines ended by CR LF", "read", swap("\n", "\r\n", -1)),
+    *(_medit(name, "ignored", edit) for name, edit in MEDIT_IGNORED.items()),
+    _meditb("binary: every section that holds no cells", "ignored",
+            medit_binary(2, more={13: b"\1\0\0\0\1\0\0\0", 62: b"abc", 60: b"", 81: b"text"})),
+    _medit("`Triangles`, `Quadrilaterals` beside tetrahedra", "ignored with a note",
+           before_end("Triangles", "1", "1 2 5 0", "Quadrilaterals", "1", "1 2 5 4 0"),
+           "3 triangles beside the tetrahedra not used"),
+    _medit("`TetrahedraP2`, ...: their corners", "ignored with a note", medit_p2,
+           "48 cells of type tetra10: mid-side nodes not used"),
+    _medit("`Hexahedra`, `Prisms`, `Pyramids`, of any order", "refused",
+           before_end("Hexahedra", "1", "1 2 5 4 10 11 14 13 0"), "1 hexahedron cells beside 48"),
+    _meditb("binary: `Hexahedra`, ...", "refused",
+            medit_binary(2, more={10: b"\1\0\0\0" + bytes(36)}), "1 hexahedron cells beside 48"),
+    _medit("an unknown keyword", "refused", before_end("Heptahedra", "1", "1"),
+           "line 82: Heptahedra is not known"),
+    _meditb("binary: an unknown keyword", "refused", medit_binary(2, more={500: b""}),
+            "keyword 500 at byte 796 is not known"),
+    _medit("another order of nodes (`TetrahedraP2Ordering`)", "refused",
+           before_end("TetrahedraP1Ordering", "4", "1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"),
+           "line 82: TETRAHEDRAP1ORDERING"),
+    _medit("other numbers than announced", "refused", swap("Tetrahedra\n48", "Tetrahedra\n49"),
+           "line 32: TETRAHEDRA announces 49"),
+    _medit("a node that is missing", "refused", before_end("Tetrahedra 1", "1 2 5 99 0"),
+           "use node numbers outside 0 to 26"),
+    _medit("`Vertices` twice", "refused", before_end("Vertices", "1", "0 0 0 0"),
+           "line 82: Vertices a second time"),
+    _medit("no `End`", "refused", swap("\nEnd\n", "\n"), "no `End`"),
+    _medit("two dimensions", "refused", swap("Dimension 3", "Dimension 2"), "Dimension 2"),
+]  # fmt: skip
+
 FEATURES: list[Feature] = [
     *(_abaqus(name, "read", edit) for name, edit in _READ.items()),
     *(_abaqus(name, "ignored", edit) for name, edit in _IGNORED.items()),
     *(_abaqus(name, "ignored with a note", edit, words) for name, (edit, words) in _NOTED.items()),
     *(_abaqus(name, "refused", edit, words) for name, (edit, words) in _REFUSED.items()),
     *_GMSH,
+    *_MEDIT,
 ]

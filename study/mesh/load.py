@@ -21,6 +21,7 @@ from study.mesh.kinds import (
     TetrahedronQuality,
 )
 from study.mesh.listing import one_per_kind
+from study.mesh.medit import read_medit
 from study.mesh.obj import read_obj
 from study.mesh.polydata import read_polydata
 from study.mesh.quality import sliver_notes, surface_quality, tetrahedron_quality
@@ -35,12 +36,17 @@ MAX_BYTES = 2**30
 MAX_ELEMENTS = 5_000_000
 
 _MAX_COORDINATE = 1e6  # metres; anything beyond is a misread number
-_OWN = {".inp": read_abaqus, ".msh": read_gmsh, ".obj": read_obj, ".stl": read_stl}
+_OWN = {
+    ".inp": read_abaqus,
+    ".mesh": read_medit,
+    ".meshb": read_medit,
+    ".msh": read_gmsh,
+    ".obj": read_obj,
+    ".stl": read_stl,
+}
 _MESHIO = {
     ".vtu": "vtu",
     ".vtk": "vtk",
-    ".mesh": "medit",
-    ".meshb": "medit",
     ".ply": "ply",
     ".off": "off",
 }

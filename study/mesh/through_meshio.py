@@ -78,14 +78,6 @@ def _compare_counts(data: bytes, cells: int, entries: int) -> None:
         )
 
 
-def _check_medit(data: bytes) -> None:
-    if data[:4] in {b"\1\0\0\0", b"\0\0\0\1"}:
-        return  # the binary form ends with a code that only its reader can find
-    if not re.search(rb"^\s*End\s*\Z", data, re.MULTILINE):
-        raise MeshError("no `End` in the last line: truncated? If it is complete, add it")
-    _check_announced(data, rb"^\s*[A-Z]\w+\s+(\d+)\s*$")
-
-
 def _check_ply(data: bytes) -> None:
     header, end, _ = data[:65536].partition(b"end_header")
     if not end or not re.search(rb"\n\s*\Z", header):
@@ -109,7 +101,6 @@ def _check_announced(data: bytes, pattern: bytes) -> None:
 _PRECHECKS = {
     "vtu": _check_vtu,
     "vtk": _check_vtk,
-    "medit": _check_medit,
     "ply": _check_ply,
     "off": _check_off,
 }
