@@ -11,12 +11,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from study.mesh.elsewhere import named
 from tests.mesh_features import Feature, Treatment
 from tests.mesh_samples import SIDE, Ints, cube, cube_surface, gmsh_1, gmsh_2
 
 ABAQUS = "Abaqus and CalculiX (.inp)"
 GMSH = "Gmsh (.msh)"
 MEDIT = "MEDIT (.mesh, .meshb)"
+ELSEWHERE = "Formats that are not read"
 
 Edit = Callable[[str], str]
 
@@ -433,6 +435,11 @@ _GMSH = [
         lambda: numbered_4(True) + b"$NodeData\n1\n", "section $NodeData ... $EndNodeData",
     ),
     _gmsh(
+        "format 2: `$ParametricNodes`", "refused",
+        lambda: gmsh_bytes("2").replace(b"Nodes", b"ParametricNodes"),
+        "$ParametricNodes is not read",
+    ),
+    _gmsh(
         "a node that is missing", "refused",
         lambda: gmsh_bytes("2").replace(b" 4 2 7 1 1 ", b" 4 2 7 1 99 "), "node number 99",
     ),
@@ -581,6 +588,20 @@ _MEDIT = [
     _medit("two dimensions", "refused", swap("Dimension 3", "Dimension 2"), "Dimension 2"),
 ]  # fmt: skip
 
+# ---- What is not read --------------------------------------------------------------------------
+
+
+def _elsewhere(name: str, ending: str) -> Feature:
+    def write(folder: Path) -> Path:
+        path = folder / f"organ{ending}"
+        path.write_text("anything")
+        return path
+
+    return Feature(
+        ELSEWHERE, f"{name} (`{ending}`, ...)", "refused", write, f"({ending} is for: {name} "
+    )
+
+
 FEATURES: list[Feature] = [
     *(_abaqus(name, "read", edit) for name, edit in _READ.items()),
     *(_abaqus(name, "ignored", edit) for name, edit in _IGNORED.items()),
@@ -588,4 +609,5 @@ FEATURES: list[Feature] = [
     *(_abaqus(name, "refused", edit, words) for name, (edit, words) in _REFUSED.items()),
     *_GMSH,
     *_MEDIT,
+    *(_elsewhere(name, ending) for name, ending in named().items()),
 ]

@@ -209,7 +209,7 @@ def _check_options(keyword: _Keyword, known: set[str]) -> None:
         if option not in known:
             raise MeshError(f"{where}, {option[:40]} is not known and might change the mesh")
     system = keyword.options.get("SYSTEM", "R").upper()
-    if system != "R":
+    if not system.startswith("R"):
         raise MeshError(f"{where}, SYSTEM={system[:40]}: only rectangular coordinates are read")
 
 

@@ -67,6 +67,8 @@ def sections(data: bytes) -> dict[str, Section]:
 
 def section(found: dict[str, Section], name: str) -> Section:
     """The section of that name, which has to be there."""
+    if name == "Nodes" and "ParametricNodes" in found:
+        raise MeshError("$ParametricNodes is not read; save without parametric coordinates")
     if name not in found:
         raise MeshError(f"section ${name} ... $End{name} missing or cut off; export it again")
     return found[name]

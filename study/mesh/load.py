@@ -11,6 +11,7 @@ import numpy as np
 from study.mesh.abaqus import read_abaqus
 from study.mesh.check import repair_tetrahedra
 from study.mesh.draft import Draft, element_map, start_draft
+from study.mesh.elsewhere import refusal
 from study.mesh.gmsh import read_gmsh
 from study.mesh.kinds import (
     MeshError,
@@ -50,7 +51,9 @@ _MESHIO = {
     ".ply": "ply",
     ".off": "off",
 }
-FORMATS = ".vtu, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh (MEDIT), .stl, .obj, .ply, .off"
+FORMATS = (
+    ".vtu, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh, .meshb (MEDIT), .stl, .obj, .ply, .off"
+)
 
 
 def load_mesh(
@@ -100,7 +103,7 @@ def _read(source: Path, data: bytes) -> RawMesh:
         return read_polydata(data)
     if suffix in _MESHIO:
         return read_with_meshio(source, data, _MESHIO[suffix])
-    raise MeshError(f"unknown file name ending `{suffix}`; can be read: {FORMATS}")
+    raise MeshError(refusal(suffix, FORMATS))
 
 
 def _checked(
