@@ -448,6 +448,11 @@ _GMSH = [
         lambda: numbered_4(True).replace(b"\n3 1 4 48\n", b"\n3 1 4 47\n"), "expected $EndElements",
     ),
     _gmsh(
+        "other totals than announced", "refused",
+        lambda: numbered_4(True).replace(b"$Nodes\n2 27 ", b"$Nodes\n2 28 "),
+        "section $Nodes announces 28 rows but has 27",
+    ),
+    _gmsh(
         "formats 3 and others", "refused",
         lambda: gmsh_bytes("2").replace(b"2.2 0 8", b"3 0 8"), "Gmsh format 3",
     ),
@@ -578,6 +583,8 @@ _MEDIT = [
     _medit("another order of nodes (`TetrahedraP2Ordering`)", "refused",
            before_end("TetrahedraP1Ordering", "4", "1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"),
            "line 82: TETRAHEDRAP1ORDERING"),
+    _meditb("binary: another order of nodes", "refused", medit_binary(2, more={133: b""}),
+            "keyword 133 at byte 796"),
     _medit("other numbers than announced", "refused", swap("Tetrahedra\n48", "Tetrahedra\n49"),
            "line 32: TETRAHEDRA announces 49"),
     _medit("a node that is missing", "refused", before_end("Tetrahedra 1", "1 2 5 99 0"),

@@ -53,6 +53,16 @@ def test_a_cut_off_file_is_refused(name):
             read_gmsh(data[:length])
 
 
+def test_element_types_are_those_of_meshio():
+    from meshio._common import num_nodes_per_cell
+    from meshio.gmsh import common
+
+    theirs = {k: num_nodes_per_cell[name] for k, name in common._gmsh_to_meshio_type.items()}
+    both = CELLS.keys() & theirs.keys()
+    assert len(both) > 30
+    assert {kind: CELLS[kind][1] for kind in both} == {kind: theirs[kind] for kind in both}
+
+
 @pytest.mark.parametrize("kind", CELLS)
 def test_elements_of_any_type_are_counted_or_used(kind):
     """Nothing is left out in silence: volume cells and faces turn up in what is read."""

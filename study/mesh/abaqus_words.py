@@ -108,5 +108,5 @@ REFUSED = {
 
 
 def is_harmless(keyword: str) -> bool:
-    """Whether the keyword, in capitals without blanks, leaves nodes and elements as they are."""
-    return keyword not in REFUSED and bool(_HARMLESS.match(keyword))
+    """Whether a keyword that is not in REFUSED leaves nodes and elements as they are."""
+    return bool(_HARMLESS.match(keyword))
