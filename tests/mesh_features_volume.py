@@ -143,7 +143,7 @@ _REFUSED = {
     "`*ELGEN`, `*ELCOPY`": (at_end("*ELGEN", "1, 2, 1, 1"), "line 80: *ELGEN"),
     "`*MODEL CHANGE` of elements": (
         at_end("*STEP", "*MODEL CHANGE, REMOVE", "SET", "*END STEP"),
-        "line 81: *MODELCHANGE",
+        "line 81: *MODEL CHANGE",
     ),
     "`*IMPERFECTION`, `*ADJUST`": (at_end("*IMPERFECTION, FILE=a, STEP=1"), "*IMPERFECTION"),
     "`*IMPORT`, `*RESTART, READ`": (at_end("*RESTART, READ"), "line 80: *RESTART, READ"),
@@ -178,7 +178,7 @@ _REFUSED = {
         part("*Instance, name=B, part=Bone", *_END),
         "line 82: there is no part BONE",
     ),
-    "a part without an instance": (part(), "line 2: part ORGAN has no *INSTANCE"),
+    "parts without any instance": (part(), "line 2: part ORGAN has no *INSTANCE"),
     "a part that is not ended": (swap("*NODE", "*PART, NAME=P\n*NODE"), "no *END PART"),
 }
 
@@ -263,6 +263,13 @@ _NOTED = {
     "nodes of the assembly, which no element uses": (
         part(*_INSTANCE, *_END, "*NODE, NSET=REFERENCE", f"1, {SIDE}, 0., 0."),
         "1 nodes that no element uses dropped",
+    ),
+    "a part without an instance, beside one that has one": (
+        part(
+            *_INSTANCE, *_END,
+            beside="*PART, NAME=B\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n*END PART",
+        ),
+        "part B (line 81) has no instance and is left out",
     ),
     "an instance of faces beside that of the body": (
         part(

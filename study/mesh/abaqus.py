@@ -29,6 +29,8 @@ class _Keyword(NamedTuple):
     """In capitals, without blanks."""
     options: dict[str, str]
     rows: list[tuple[int, str]]
+    written: str
+    """The name as errors show it."""
 
 
 class _Cells(NamedTuple):
@@ -116,7 +118,7 @@ def _keyword(number: int, text: str) -> _Keyword:
     name, *options = _OPTION.findall(text.lstrip("* "))[:50] or [""]
     pairs = (option.partition("=") for option in options)
     named = {_squeezed(key): value.strip().strip('"') for key, _, value in pairs if key.strip()}
-    return _Keyword(number, _squeezed(name), named, [])
+    return _Keyword(number, _squeezed(name), named, [], " ".join(name.upper().split())[:40])
 
 
 def _squeezed(text: str) -> str:
@@ -144,7 +146,7 @@ def _model(keywords: Sequence[_Keyword]) -> _Model:
             scope = _open(keyword, model)
         elif keyword.name in {"ENDPART", "ENDINSTANCE", "ENDASSEMBLY"}:
             if opened[0] != keyword.name[3:]:
-                raise MeshError(f"line {keyword.line}: *{keyword.name} ends nothing")
+                raise MeshError(f"line {keyword.line}: *{keyword.written} ends nothing")
             opened, scope = opened[1:], model.free
         else:
             _take(keyword, scope)
@@ -189,7 +191,7 @@ def _refuse_unknown(keyword: _Keyword) -> None:
     reset = keyword.name == "SYSTEM" and not keyword.rows
     if reset or (keyword.name == "MODELCHANGE" and contact):
         return
-    where = f"line {keyword.line}: *{keyword.name[:40]}"
+    where = f"line {keyword.line}: *{keyword.written}"
     if keyword.name == "RESTART" and "READ" in keyword.options:
         raise MeshError(f"{where}, READ takes the mesh from another analysis; write it out")
     if keyword.name in REFUSED:
@@ -202,7 +204,7 @@ def _refuse_unknown(keyword: _Keyword) -> None:
 
 
 def _check_options(keyword: _Keyword, known: set[str]) -> None:
-    where = f"line {keyword.line}: *{keyword.name}"
+    where = f"line {keyword.line}: *{keyword.written}"
     if "INPUT" in keyword.options:
         raise MeshError(f"{where}, INPUT= refers to another file; put the mesh into one file")
     for option in keyword.options:
@@ -241,8 +243,8 @@ def _cells(keyword: _Keyword) -> list[_Cells]:
     element_type = _squeezed(keyword.options.get("TYPE", ""))
     name, nodes = cell_type(element_type)
     if not name:
-        known = f"{element_type[:40]} is not known" if element_type else "is missing"
-        raise MeshError(f"line {keyword.line}: *ELEMENT, TYPE={known}; export tetrahedra (C3D4)")
+        known = f"TYPE={element_type[:40]} is not known" if element_type else "TYPE is missing"
+        raise MeshError(f"line {keyword.line}: *ELEMENT, {known}; export tetrahedra (C3D4)")
     if name == "line" or not keyword.rows:
         return []
     lines, rows = _whole_rows(keyword.rows, 1 + nodes)
@@ -299,31 +301,47 @@ def _integers(
 # ---- Putting together --------------------------------------------------------------------------
 
 
+class _Piece(NamedTuple):
+    """The mesh of an instance where it is put, or what stands outside of all parts."""
+
+    name: str
+    points: FloatArray
+    blocks: list[Block]
+    notes: list[str]
+
+
 def _joined(model: _Model) -> RawMesh:
     """The mesh of the whole model; several bodies would be welded where they touch."""
-    placed = [(_free_name(model), Placement(), [model.free])]
-    placed += [
-        (f"instance {one.name} (line {one.line})", one.place, [_part(one, model), one.own])
-        for one in model.instances
+    left_out = list(_left_out(model))
+    free = "the assembly" if model.instances else "the model"
+    pieces = [
+        _assembled(free, Placement(), [model.free]),
+        *(
+            _assembled(
+                f"instance {one.name} (line {one.line})", one.place, [_part(one, model), one.own]
+            )
+            for one in model.instances
+        ),
     ]
-    used = {one.part for one in model.instances}
-    for name, (line, _) in model.parts.items():
-        if name not in used:
-            raise MeshError(f"line {line}: part {name} has no *INSTANCE that puts it somewhere")
-    pieces = [(name, *_assembled(place, scopes)) for name, place, scopes in placed]
-    _refuse_several([(name, blocks) for name, _, blocks, _ in pieces])
-    starts = np.cumsum([0, *(len(points) for _, points, _, _ in pieces)])
+    _refuse_several(pieces)
+    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     blocks = [
         (cell, rows + start)
-        for start, (_, _, found, _) in zip(starts, pieces, strict=False)
-        for cell, rows in found
+        for start, piece in zip(starts, pieces, strict=False)
+        for cell, rows in piece.blocks
     ]
-    notes = [note for _, _, _, more in pieces for note in more]
-    return raw_mesh(np.concatenate([points for _, points, _, _ in pieces]), blocks, notes)
+    notes = [*left_out, *(note for piece in pieces for note in piece.notes)]
+    return raw_mesh(np.concatenate([piece.points for piece in pieces]), blocks, notes)
 
 
-def _free_name(model: _Model) -> str:
-    return "the assembly" if model.instances else "the model"
+def _left_out(model: _Model) -> Iterator[str]:
+    """Notes on parts that no instance puts somewhere, which are not in the model then."""
+    used = {one.part for one in model.instances}
+    for name, (line, scope) in model.parts.items():
+        if name not in used and not used:
+            raise MeshError(f"line {line}: part {name} has no *INSTANCE that puts it somewhere")
+        if name not in used and scope.cells:
+            yield f"part {name} (line {line}) has no instance and is left out"
 
 
 def _part(instance: _Instance, model: _Model) -> _Scope:
@@ -332,10 +350,12 @@ def _part(instance: _Instance, model: _Model) -> _Scope:
     return model.parts[instance.part][1]
 
 
-def _refuse_several(pieces: Sequence[tuple[str, list[Block]]]) -> None:
+def _refuse_several(pieces: Sequence[_Piece]) -> None:
     for wanted in (True, False):
         bodies = [
-            name for name, blocks in pieces if any(is_solid(cell) == wanted for cell, _ in blocks)
+            piece.name
+            for piece in pieces
+            if any(is_solid(cell) == wanted for cell, _ in piece.blocks)
         ]
         if len(bodies) > 1:
             raise MeshError(f"{len(bodies)} bodies: {some(bodies)}; export one of them")
@@ -343,9 +363,7 @@ def _refuse_several(pieces: Sequence[tuple[str, list[Block]]]) -> None:
             return
 
 
-def _assembled(
-    place: Placement, scopes: Sequence[_Scope]
-) -> tuple[FloatArray, list[Block], list[str]]:
+def _assembled(name: str, place: Placement, scopes: Sequence[_Scope]) -> _Piece:
     lines = [node for scope in scopes for node in scope.nodes]
     cells = [block for scope in scopes for block in scope.cells]
     nodes, notes = _coordinates(lines)
@@ -356,7 +374,7 @@ def _assembled(
         [line for block in cells if len(block.numbers) for line in block.lines],
     )
     blocks = [(block.name, _rows(block, nodes[:, 0], order)) for block in cells]
-    return place.moved(nodes[:, 1:]), blocks, notes
+    return _Piece(name, place.moved(nodes[:, 1:]), blocks, notes)
 
 
 def _unique(kind: str, numbers: FloatArray, lines: Sequence[int]) -> IndexArray:

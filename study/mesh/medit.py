@@ -85,9 +85,10 @@ def read_medit(data: bytes) -> RawMesh:
 
 
 def _read_text(text: str) -> RawMesh:
-    found = list(_sections(_COMMENT.sub("", re.sub(r"\r\n?", "\n", text))))
-    if not found or found[0].name != "MESHVERSIONFORMATTED":
+    text = _COMMENT.sub("", re.sub(r"\r\n?", "\n", text))
+    if not re.match(r"\s*MeshVersionFormatted\b", text, re.IGNORECASE):
         raise MeshError("does not begin with MeshVersionFormatted: not a MEDIT file")
+    found = list(_sections(text))
     if found[-1].name != "END":
         raise MeshError("no `End` in the last line: truncated? If it is complete, add it")
     points, blocks = np.empty((0, 3)), list[Block]()
