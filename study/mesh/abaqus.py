@@ -293,7 +293,7 @@ def _integers(
             (line, word)
             for line, row in zip(lines, rows, strict=True)
             for word in row
-            if not re.fullmatch(r"\s*[+-]?\d{1,18}\s*", word)
+            if not re.fullmatch(r"[ \t]*[+-]?[0-9]{1,18}[ \t]*", word)
         )
         raise MeshError(f"line {line}: `{bad.strip()[:40]}` is no node or element number") from None
 
