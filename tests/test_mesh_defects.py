@@ -391,8 +391,8 @@ def test_what_happens_to_many_blocks_of_cells_is_one_note():
     assert len(mesh.triangles) == 90 * 5
     assert mesh.notes == (
         "90 cells of type quad8: mid-side nodes not used, edges straight",
-        "180 faces of types quad, quad8 cut into triangles from their first corner; first "
-        "(0-based): 1, 2, 4, 5, 7, ...; triangles are numbered after that",
+        "180 faces of types quad, quad8 cut into triangles from their first corner (unless that "
+        "folds them); first (0-based): 1, 2, 4, 5, 7, ...; triangles are numbered after that",
     )
 
 

@@ -29,7 +29,8 @@ def treated(feature: Feature, folder) -> None:
     assert report.volume == pytest.approx(CUBE_VOLUME, rel=SINGLE)
     assert not isinstance(mesh, TetrahedralMesh) or len(mesh.tetrahedra) == 48
     if feature.treatment == "ignored":
-        assert report.notes == ()
+        # Every facet of an STL file has nodes of its own, which is nothing special.
+        assert [note for note in report.notes if " welded to " not in note] == []
     if feature.treatment == "ignored with a note":
         assert feature.words
         assert any(feature.words in note for note in report.notes)

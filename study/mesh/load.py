@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -24,35 +24,41 @@ from study.mesh.kinds import (
 from study.mesh.listing import one_per_kind
 from study.mesh.medit import read_medit
 from study.mesh.obj import read_obj
-from study.mesh.polydata import read_polydata
+from study.mesh.off import read_off
+from study.mesh.ply import read_ply
 from study.mesh.quality import sliver_notes, surface_quality, tetrahedron_quality
 from study.mesh.raw import RawMesh
 from study.mesh.stl import read_stl
 from study.mesh.surface import enclosed_volume, repair_surface
 from study.mesh.tetrahedra import volumes
-from study.mesh.through_meshio import read_with_meshio
 from study.mesh.unit import METRES, check_extent, check_unit_name, choose_unit
+from study.mesh.vtk_legacy import read_vtk_legacy
+from study.mesh.vtk_xml import read_vtk_xml
 
 MAX_BYTES = 2**30
 MAX_ELEMENTS = 5_000_000
 
 _MAX_COORDINATE = 1e6  # metres; anything beyond is a misread number
-_OWN = {
+_READERS: dict[str, Callable[[bytes], RawMesh]] = {
     ".inp": read_abaqus,
     ".mesh": read_medit,
     ".meshb": read_medit,
     ".msh": read_gmsh,
     ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
     ".stl": read_stl,
+    ".vtk": read_vtk_legacy,
+    ".vtp": read_vtk_xml,
+    ".vtu": read_vtk_xml,
 }
-_MESHIO = {
-    ".vtu": "vtu",
-    ".vtk": "vtk",
-    ".ply": "ply",
-    ".off": "off",
-}
+# Files of VTK that say for themselves why they cannot be read: lattices, and lists of other files.
+_READERS |= dict.fromkeys(
+    [".vtm", ".pvtu", ".pvtp", ".pvd", ".vtmb", ".vti", ".vtr", ".vts"], read_vtk_xml
+)
 FORMATS = (
-    ".vtu, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh, .meshb (MEDIT), .stl, .obj, .ply, .off"
+    ".vtu, .vtp, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh, .meshb (MEDIT), .stl, .obj, "
+    ".ply, .off"
 )
 
 
@@ -97,12 +103,8 @@ def _content(source: Path) -> bytes:
 
 def _read(source: Path, data: bytes) -> RawMesh:
     suffix = source.suffix.lower()
-    if suffix in _OWN:
-        return _OWN[suffix](data)
-    if suffix == ".vtk" and re.search(rb"(?im)^DATASET\s+POLYDATA\b", data[:4096]):
-        return read_polydata(data)
-    if suffix in _MESHIO:
-        return read_with_meshio(source, data, _MESHIO[suffix])
+    if suffix in _READERS:
+        return _READERS[suffix](data)
     raise MeshError(refusal(suffix, FORMATS))
 
 

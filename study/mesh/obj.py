@@ -2,28 +2,87 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
+
 from study.mesh.kinds import MeshError
 from study.mesh.raw import RawMesh, by_corner_count, raw_mesh
-from study.mesh.text import NumberedLine, floats
+from study.mesh.text import NumberedLine, floats, text_lines, unit_note
+
+_FACES = {"f", "fo"}  # the second name is an old one
+# What would add to the surface and is not read: free forms, old patches, other files.
+_REFUSED = {
+    "surf": "a free-form surface",
+    "curv": "a free-form curve",
+    "curv2": "a free-form curve",
+    "bsp": "a patch",
+    "bzp": "a patch",
+    "cdp": "a patch",
+    "cdc": "a curve",
+    "call": "another file",
+    "csh": "a command",
+}
+_IGNORED = {
+    *("vt", "vn", "vp", "p", "l", "g", "o", "s", "mg"),
+    *("usemtl", "mtllib", "usemap", "maplib", "lod", "bevel", "c_interp", "d_interp"),
+    *("shadow_obj", "trace_obj", "ctech", "stech"),
+    # Settings and parts of free forms, which are refused where they begin.
+    *("cstype", "deg", "bmat", "step", "parm", "trim", "hole", "scrv", "sp", "end", "con", "res"),
+}
 
 
 def read_obj(data: bytes) -> RawMesh:
-    """Positions (`v`) and faces (`f`) of an OBJ file; textures, normals and groups are ignored.
+    """Positions (`v`) and faces (`f`) of an OBJ file, of all its groups and objects.
 
     A corner is v, v/vt, v//vn or v/vt/vn; a negative number counts back from the last position.
+    Textures, normals, colours, weights, points, lines, groups and materials are ignored.
+
+    Raises
+    ------
+    MeshError
+        Naming the line of a face or a number that cannot be read, or of a free-form surface.
     """
     positions: list[NumberedLine] = []
     faces: list[list[int]] = []
-    for number, line in enumerate(data.decode("latin-1").split("\n"), start=1):
-        words = line.partition("#")[0].split()
-        if not words:
-            continue
-        if words[0] == "v":
+    unknown: Counter[str] = Counter()
+    lines = text_lines(data)
+    for number, words in _statements(lines):
+        keyword = words[0].lower()
+        if keyword == "v":
             positions.append((number, words[1:]))
-        elif words[0] == "f":
+        elif keyword in _FACES:
             faces.append(_face(number, words[1:], len(positions)))
+        elif keyword in _REFUSED:
+            raise MeshError(
+                f"line {number}: `{keyword}` stands for {_REFUSED[keyword]}, which cannot be "
+                "read; export polygons"
+            )
+        elif keyword not in _IGNORED:
+            unknown[keyword] += 1
     _refuse_forward_references(faces, len(positions))
-    return raw_mesh(floats(positions, 3), by_corner_count(faces))
+    notes = [
+        *unit_note("\n".join(line for line in lines if line.startswith("#"))),
+        *(
+            f"{count} lines `{word[:40]}`, unknown in OBJ, ignored"
+            for word, count in unknown.items()
+        ),
+    ]
+    return raw_mesh(floats(positions, 3), by_corner_count(faces), notes)
+
+
+def _statements(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """Number of the first line and words of every statement; a backslash joins lines."""
+    words: list[str] = []
+    first = 1
+    for number, line in enumerate(lines, start=1):
+        text = line.partition("#")[0].rstrip()
+        first = first if words else number
+        words += text.removesuffix("\\").split()
+        if words and not text.endswith("\\"):
+            yield first, words
+            words = []
+    if words:
+        raise MeshError(f"line {first}: continued by a backslash, but nothing follows: truncated")
 
 
 def _face(number: int, corners: list[str], position_count: int) -> list[int]:

@@ -19,7 +19,7 @@ Block = tuple[str, NDArray[Any]]
 # Shape and, unless the cell is linear, the number of its nodes, of which the corners come first.
 _USABLE = re.compile(r"(tetra|triangle|quad)(\d*)")
 _CORNERS = {"tetra": 4, "triangle": 3, "quad": 4}
-_SOLID = ("hexahedron", "wedge", "pyramid", "polyhedron", "tetra", "VTK_LAGRANGE")
+_SOLID = ("hexahedron", "wedge", "pyramid", "polyhedron", "tetra", "voxel", "VTK")
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ def raw_mesh(points: NDArray[Any], blocks: Iterable[Block], notes: Sequence[str]
     MeshError
         If a block has rows of a length that does not fit its type.
     """
+    places = np.asarray(points, dtype=float)
     tetrahedra: list[NDArray[Any]] = []
     triangles: list[NDArray[Any]] = []
     solids: dict[str, int] = {}
@@ -54,13 +55,14 @@ def raw_mesh(points: NDArray[Any], blocks: Iterable[Block], notes: Sequence[str]
             tetrahedra.append(_corners(name, cells))
             curved.add(name, len(cells), bool(shape[2]))
         elif shape or (name == "polygon" and np.ndim(cells) == 2):
-            triangles.append(fan(_corners(name, cells) if shape else np.asarray(cells)))
+            corners = _corners(name, cells) if shape else np.asarray(cells)
+            triangles.append(fan(places, corners))
             curved.add(name, len(cells), bool(shape and shape[2]))
             cut.add(name, len(cells), not name.startswith("triangle"))
         elif is_solid(name):
             solids[name] = solids.get(name, 0) + len(cells)
     return RawMesh(
-        np.asarray(points, dtype=float),
+        places,
         _stack(tetrahedra, 4),
         _stack(triangles, 3),
         solids,
@@ -69,7 +71,7 @@ def raw_mesh(points: NDArray[Any], blocks: Iterable[Block], notes: Sequence[str]
 
 
 def is_solid(name: str) -> bool:
-    """Whether cells of this type have a volume."""
+    """Whether cells of this type have a volume, or are of one of VTK's types without a name."""
     return name.startswith(_SOLID)
 
 
@@ -100,17 +102,62 @@ def _notes(curved: _Tally, cut: _Tally) -> Iterator[str]:
         yield f"{curved.text('cells')}: mid-side nodes not used, edges straight"
     if cut.types:
         yield (
-            f"{cut.text('faces')} cut into triangles from their first corner; first (0-based): "
-            f"{listing(np.array(cut.first))}; triangles are numbered after that"
+            f"{cut.text('faces')} cut into triangles from their first corner (unless that folds "
+            f"them); first (0-based): {listing(np.array(cut.first))}; triangles are numbered after "
+            "that"
         )
 
 
-def fan(polygons: NDArray[Any]) -> NDArray[Any]:
-    """Triangles around the first corner of each polygon, shape (k (m - 2), 3) from (k, m)."""
+def fan(points: FloatArray, polygons: NDArray[Any]) -> NDArray[Any]:
+    """Triangles around one corner of each polygon, shape (k (m - 2), 3) from (k, m).
+
+    It is the first corner unless the polygon has a re-entrant one, where triangles round the first
+    might fold over each other; then the corner from which they fold least.
+    """
     if polygons.shape[1] < 3:
         raise MeshError(f"{len(polygons)} polygons have fewer than three corners: damaged file")
+    if polygons.shape[1] > 3 and _within(polygons, len(points)):
+        polygons = _turned(points, polygons)
     later = [polygons[:, [0, i, i + 1]] for i in range(1, polygons.shape[1] - 1)]
     return np.stack(later, axis=1).reshape(-1, 3)
+
+
+def strip_triangles(strips: NDArray[Any]) -> NDArray[Any]:
+    """Triangles of strips of equal length, shape (k (m - 2), 3) from (k, m), wound alike."""
+    start = np.arange(strips.shape[1] - 2)
+    odd = start % 2  # every other triangle would be wound the other way
+    return np.asarray(strips[:, np.stack([start + odd, start + 1 - odd, start + 2], 1)]).reshape(
+        -1, 3
+    )
+
+
+def _within(polygons: NDArray[Any], count: int) -> bool:
+    """Whether the nodes exist, which is refused elsewhere if they do not."""
+    return bool(polygons.min() >= 0 and polygons.max() < count)
+
+
+def _turned(points: FloatArray, polygons: NDArray[Any]) -> NDArray[Any]:
+    """Polygons begun at the corner whose fan is best, the first if it does not fold at all."""
+    with np.errstate(all="ignore"):  # places that are no numbers are refused elsewhere
+        corner = points[polygons]
+        corner = corner - corner.mean(axis=1, keepdims=True)
+        area = np.cross(corner, np.roll(corner, -1, axis=1)).sum(axis=1)
+        start = np.zeros(len(polygons), dtype=np.int64)
+        folded = np.flatnonzero(_fan_margin(corner, area, 0) < 0)
+        margins = [_fan_margin(corner[folded], area[folded], k) for k in range(polygons.shape[1])]
+    start[folded] = np.argmax(margins, axis=0)
+    columns = (start[:, None] + np.arange(polygons.shape[1])) % polygons.shape[1]
+    return np.take_along_axis(polygons, columns, axis=1)
+
+
+def _fan_margin(corner: FloatArray, area: FloatArray, first: int) -> FloatArray:
+    """Smallest component along the area vector of the triangles round one corner.
+
+    It is negative if a triangle of the fan is turned against the polygon as a whole.
+    """
+    spokes = np.roll(corner, -first, axis=1)[:, 1:] - corner[:, first : first + 1]
+    triangles = np.cross(spokes[:, :-1], spokes[:, 1:])
+    return np.asarray(np.einsum("kid,kd->ki", triangles, area).min(axis=1))
 
 
 def by_corner_count(polygons: Sequence[Sequence[int]]) -> list[Block]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,10 +13,16 @@ NumberedLine = tuple[int, list[str]]
 """1-based line number, and the words of the line after its keyword."""
 
 
-def lines_starting(text: str, keyword: str) -> list[NumberedLine]:
-    """Every line whose first word is the keyword."""
-    split = ((number, line.split()) for number, line in enumerate(text.split("\n"), start=1))
-    return [(number, words[1:]) for number, words in split if words and words[0] == keyword]
+def text_lines(data: bytes) -> list[str]:
+    """Lines of a text file, ended in any of the three ways, without a byte order mark."""
+    text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def unit_note(text: str) -> list[str]:
+    """A note if a header or a comment names a unit, since only the declared one counts."""
+    found = re.search(r"\bunits?\s*[:= ]\s*([a-z]{1,12})\b", text, re.IGNORECASE)
+    return [f"`{found[0]}` in the file is not used: `organ.unit` says the unit"] if found else []
 
 
 def floats(lines: Sequence[NumberedLine], count: int) -> FloatArray:
