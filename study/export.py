@@ -21,6 +21,7 @@ from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.solvers import solve_static
 from study.folders import replacing
+from study.mesh.kinds import TetrahedralMesh
 from study.models.finite_elements import FINER, reference_of
 from study.organ.geometry import Level
 from study.problem.problem import Problem
@@ -32,7 +33,13 @@ from study.scene.problem import problem_of
 
 Floats = NDArray[np.float64]
 
-FORMATS = ("calculix", "vtu")
+MESHES = {
+    "gmsh": ("mesh.msh", "gmsh"),
+    "medit": ("mesh.mesh", "medit"),
+    "nastran": ("mesh.bdf", "nastran"),
+}
+"""File of the mesh alone by the program that reads it, and meshio's name of its format."""
+FORMATS = ("calculix", "vtu", *MESHES)
 MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
@@ -43,6 +50,7 @@ FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     for deck in ("static", "dynamic")
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
+FILES |= {file for file, _ in MESHES.values()}
 FRAMES = 4
 """Times, equally spaced, at which the motion of all nodes is compared."""
 
@@ -75,8 +83,11 @@ def export(request: ExportRequest, progress: Progress) -> Path:
         raise ValueError("organ.shape: a point has no finite elements; use liver, block or a mesh")
     folder = (request.out or target.folder).resolve()
     with replacing(folder, _foreign, "export") as partial:
-        write = _write_vtu if request.to == "vtu" else _write_calculix
-        write(target, partial, progress)
+        if request.to in MESHES:
+            _write_mesh(request.to, target, partial, progress)
+        else:
+            write = _write_vtu if request.to == "vtu" else _write_calculix
+            write(target, partial, progress)
     return folder
 
 
@@ -95,6 +106,17 @@ def _target(request: ExportRequest) -> _Target:
 
 
 # --- what is written ---------------------------------------------------------------------------
+
+
+def _write_mesh(to: str, target: _Target, folder: Path, progress: Progress) -> None:
+    """The tetrahedra of the reference as a mesh file, corners only, in metres."""
+    import meshio
+
+    with progress.stage("organ"):
+        mesh = _level(problem_of(target.scene), target.elements).mesh
+    file, format_ = MESHES[to]
+    meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)]).write(folder / file, format_)
+    _write(folder, {MARK: _about_mesh(target.scene, file, mesh)})
 
 
 def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
@@ -269,6 +291,16 @@ Its finite-element problem, SI units throughout.
 
 Material: Young's modulus {tissue.youngs_modulus:g} Pa, Poisson ratio {tissue.poisson_ratio:g},
 density {tissue.density:g} kg/m^3.
+"""
+
+
+def _about_mesh(scene: Scene, file: str, mesh: TetrahedralMesh) -> str:
+    return f"""\
+{scene.title or "A scene"}
+The mesh of its finite elements, in metres. A scene takes it as organ.mesh with organ.unit = "m",
+and then has the same tetrahedra again, also where a mesher that is not reproducible made them.
+
+{file}  {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra
 """
 
 

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -14,10 +15,12 @@ from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from study import export as exporting
 from study.commands import app
-from study.export import ExportRequest, export
+from study.export import MESHES, ExportRequest, export
 from study.progress import Silent
 from study.results.folder import write
 from study.results.records import ElementsRecord
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 from tests.oracles.cases import build, ramp
 from tests.report_samples import with_model
 
@@ -254,7 +257,7 @@ def test_results_on_a_mesh_that_is_no_more_are_refused(tmp_path, small_results):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("block", "--to", "nastran"), "--to nastran: use one of calculix, vtu"),
+        (("block", "--to", "abaqus"), "--to abaqus: use one of calculix, vtu, gmsh"),
         (("paper", "--to", "vtu"), "organ.shape: a point has no finite elements"),
         (("no-such", "--to", "vtu"), "neither a file nor a built-in scene"),
         ((".", "--to", "vtu"), "no results here"),
@@ -265,3 +268,18 @@ def test_what_cannot_be_exported_is_refused(arguments, message, tmp_path, monkey
     with pytest.raises(ValueError, match=re.escape(message)):
         app(["export", *arguments], exit_on_error=False, result_action="return_value")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("to", MESHES)
+def test_an_exported_mesh_holds_the_tetrahedra_of_the_reference(to, tmp_path):
+    folder = export(ExportRequest(target="block", to=to, out=tmp_path / "out"), Silent())
+    mesh = problem_of(read_scene("block")).geometry.mesh
+    found = meshio.read(folder / MESHES[to][0], MESHES[to][1])
+    (cells,) = (block.data for block in found.cells if block.type == "tetra")
+    assert (cells == mesh.tetrahedra).all()
+    assert found.points == pytest.approx(mesh.points, abs=1e-9)
+    if to != "nastran":  # which the study writes and does not read
+        scene = read_scene("block", (f"organ.mesh={folder / MESHES[to][0]}", "organ.unit=m"))
+        again = problem_of(scene).geometry.mesh
+        assert len(again.tetrahedra) == len(mesh.tetrahedra)
+        assert (folder / "README.txt").read_text().count(f"{len(cells)} tetrahedra") == 1

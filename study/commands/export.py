@@ -21,7 +21,8 @@ def export(
     target
         A built-in scene, a TOML file, or a results folder.
     to
-        calculix (input decks, and our displacement to compare with) or vtu (for ParaView).
+        calculix (input decks, and our displacement to compare with), vtu (for ParaView), or for
+        the mesh alone gmsh, medit or nastran.
     out
         Folder to write; export in the results folder, or NAME-export here, by default.
     set_
