@@ -15,6 +15,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,11 +141,16 @@ def write(path: Path, found: str, arrays: Arrays) -> None:
     """Write a state aside and move it into place, so that a crash leaves the one before."""
     aside = path.with_name(f".{path.name}")
     marks = {IDENTITY: np.array(found), DIGEST: np.array(digest(arrays))}
-    with aside.open("wb") as file:
-        np.savez(file, allow_pickle=False, **marks, **arrays)
-        file.flush()
-        os.fsync(file.fileno())
-    aside.replace(path)
+    try:
+        with aside.open("wb") as file:
+            np.savez(file, allow_pickle=False, **marks, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+        aside.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            aside.unlink(missing_ok=True)
+        raise
 
 
 def digest(arrays: Arrays) -> str:

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.folders import write_bytes
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -97,7 +99,7 @@ def write(drawings: Mapping[Path, Callable[[], Figure | None]]) -> list[Path]:
                 files |= {stem.with_suffix(".svg"): svg(figure)}
                 files |= {stem.with_suffix(".pdf"): pdf(figure)}
     for path, content in files.items():
-        path.write_bytes(content)
+        write_bytes(path, content)
     return list(files)
 
 

@@ -10,8 +10,10 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,8 @@ WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
 WINDOWS = (None, "vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 TIMEOUT = 60.0
 """Longest time [s] of one attempt."""
+LOOK = 0.05
+"""Seconds between two looks at whether a child has ended."""
 WIDTH = 640
 """Width of a picture [pixel]."""
 
@@ -51,13 +55,17 @@ class Pictures:
 FLAT = Pictures("matplotlib (flat triangles; VTK could not render here)", None)
 
 
-def render(job: Job) -> Pictures:
-    """Render a job in a child process, or say that it has to be drawn flat."""
+def render(job: Job, unwanted: Event | None = None) -> Pictures:
+    """Render a job in a child process, or say that it has to be drawn flat.
+
+    Once the pictures are `unwanted` the child is killed, for nobody waits for it any more.
+    """
+    unwanted = unwanted or Event()
     with tempfile.TemporaryDirectory(prefix="liver-study-") as folder:
         source, target = Path(folder) / "job.npz", Path(folder) / "pictures.npz"
         _write(job, source)
         for window in WINDOWS:
-            if _attempt(source, target, window):
+            if not unwanted.is_set() and _attempt(source, target, window, unwanted):
                 with np.load(target, allow_pickle=False) as found:
                     return Pictures(f"VTK, {found['renderer']}", found["pixels"])
     return FLAT
@@ -77,16 +85,21 @@ def _write(job: Job, path: Path) -> None:
     )
 
 
-def _attempt(source: Path, target: Path, window: str | None) -> bool:
+def _attempt(source: Path, target: Path, window: str | None, unwanted: Event) -> bool:
     """Whether a child drew the pictures; one that crashes or hangs did not."""
     environment = dict(os.environ)
     if window is not None:
         environment[WINDOW_VARIABLE] = window
     command = [sys.executable, "-P", str(CHILD), str(source), str(target)]
     try:
-        done = subprocess.run(  # noqa: S603 - our own program and files
-            command, env=environment, capture_output=True, timeout=TIMEOUT, check=False
+        child = subprocess.Popen(  # noqa: S603 - our own program and files
+            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-    except (OSError, subprocess.TimeoutExpired):
+    except OSError:
         return False
-    return done.returncode == 0 and target.is_file()
+    end = time.monotonic() + TIMEOUT
+    while child.poll() is None:
+        if unwanted.wait(LOOK) or time.monotonic() > end:
+            child.kill()
+            child.wait()
+    return child.returncode == 0 and target.is_file()

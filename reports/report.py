@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
+from threading import Event
 
 from reports.content import document
 from reports.difference_figure import difference_figure
@@ -18,6 +20,7 @@ from reports.renders import Pictures, render
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
+from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
 
 NAME = "report.pdf"
@@ -30,9 +33,11 @@ def make_report(folder: Path) -> None:
     """Write report.pdf into a results folder.
 
     Raises ResultsError for a folder without results or with some that are not whole, see
-    `study.results.folder.read`, or one that cannot be written.
+    `study.results.folder.read`, or one that cannot be written, before anything is drawn.
     """
-    _replace(folder / NAME, pdf(read(folder)))
+    results = read(folder)
+    _check(folder / NAME)
+    write_bytes(folder / NAME, pdf(results))
 
 
 def pdf(results: Results) -> bytes:
@@ -47,12 +52,25 @@ def draw(results: Results) -> tuple[Figures, Drawing]:
     VTK renders in its own process while matplotlib draws the rest.
     """
     seen = views(results)
-    with ThreadPoolExecutor(1) as pool:
-        pictures = None if seen is None else pool.submit(render, job(seen))
+    with ThreadPoolExecutor(1) as pool, _set_after_a_failure() as unwanted:
+        pictures = None if seen is None else pool.submit(render, job(seen), unwanted)
         figures = _plots(results)
+        if pictures is not None:
+            pictures.result()  # here, where a signal makes them unwanted
     if seen is None or pictures is None:
         return figures, None
     return _with_pictures(figures, seen, pictures)
+
+
+@contextmanager
+def _set_after_a_failure() -> Iterator[Event]:
+    """An event that is set when the block ends by an exception, so that none waits for a thread."""
+    event = Event()
+    try:
+        yield event
+    except BaseException:
+        event.set()
+        raise
 
 
 def _plots(results: Results) -> Figures:
@@ -102,16 +120,11 @@ def template() -> bytes:
     return resources.files("reports").joinpath(TEMPLATE).read_bytes()
 
 
-def _replace(path: Path, content: bytes) -> None:
-    """Put a file in its place at once, so that an interrupted run leaves the earlier one."""
+def _check(path: Path) -> None:
+    """Refuse a report that could not be written, and remove what a killed program left of one."""
     try:
-        handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            Path(aside).chmod(0o644)
-            Path(aside).replace(path)
-        finally:
-            Path(aside).unlink(missing_ok=True)
-    except OSError as error:
-        raise ResultsError(f"{path}: cannot be written ({error.strerror})") from None
+        check_file(path)
+        for left in path.parent.glob(f".{path.name}.*"):
+            left.unlink(missing_ok=True)
+    except (FolderError, OSError) as error:
+        raise ResultsError(str(error).replace("--out ", "")) from None

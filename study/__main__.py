@@ -1,12 +1,23 @@
 """Entry of `liver-study` and `python -m study`."""
 
 import os
+import sys
+
+from study import signals, streams
 
 # Linear algebra here is sparse or small. OpenBLAS would start threads that mostly wait, at a cost
 # of a fifth of the processor time of a quick command. It reads this when numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from study.commands import main
+
+def main() -> None:
+    """Run the command line. From its first instant, a signal ends it by a message."""
+    signals.listen(signals.leave_at_once)
+    streams.prepare()
+    from study.commands.application import main as commands
+
+    sys.exit(commands())
+
 
 if __name__ == "__main__":
     main()

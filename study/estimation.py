@@ -27,6 +27,7 @@ from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
+from study.folders import check_file, check_folder, making, write_bytes
 
 if TYPE_CHECKING:
     from fuzzy.systems.table import Blanks
@@ -82,6 +83,8 @@ def answer(request: EstimationRequest) -> Answer:
         if name not in SYSTEMS:
             raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
     _refuse_idle(request)
+    if request.figures is not None:
+        check_folder(request.figures, "--figures")
     if request.inputs is not None:
         return _table(request, request.inputs)
     if request.rule_base is not None:
@@ -185,6 +188,7 @@ def _table(request: EstimationRequest, inputs: Path) -> Answer:
     notes: tuple[str, ...] = ()
     if request.out is not None:
         (kind,) = request.systems
+        check_file(request.out)
         range_ = PLAUSIBLE if request.rule_base is None else (-np.inf, np.inf)
         blanks = _blanks(request)
         notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_, blanks)
@@ -271,11 +275,11 @@ def _draw(
     found = {name: estimate(readings, name, settings).estimate for name in systems}
     pictures = {"sets": draw_sets(arrays, found), "surfaces": draw_surfaces(arrays, over)}
     pictures |= {f"rules-{name}": draw_rules(arrays, name) for name in systems}
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, picture in pictures.items():
-        path = folder / f"{name}.svg"
-        path.write_bytes(picture)
-        yield str(path)
+    paths = {folder / f"{name}.svg": picture for name, picture in pictures.items()}
+    with making(folder):
+        for path, picture in paths.items():
+            write_bytes(path, picture)
+    yield from map(str, paths)
 
 
 def _refuse_idle_rules(given: Mapping[str, Any], out: Path | None) -> None:
@@ -301,6 +305,7 @@ def rule_base_lines(
         if sugeno:
             raise ValueError("--sugeno: only with --out; constants are no part of the audit")
         return audit_lines(audit(system), system)
+    check_file(out)
     lines = [str(out)]
     if out.suffix.lower() == ".fis" and system != type_1_of(system):
         system = type_1_of(system)

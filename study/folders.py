@@ -1,73 +1,180 @@
-"""Folders that are written aside and moved into place at once."""
+"""Folders and files that are written aside and moved into place at once.
+
+A folder is claimed by a lock for as long as it is being written. What a killed program left beside
+it is told and removed by the next one that claims it.
+"""
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+
+from study import lock
 
 Foreign = Callable[[set[str]], str | None]
 """Of the names in a folder, one that it must not lose, if there is any."""
 
+OLD, NEW = "old", "new"
+"""In the folder aside: what is replaced, and what replaces it."""
+OF_THE_MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+"""Errors for which another place or name is no remedy."""
+
+NO_PLACE = (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError)
+"""Errors of writing a file for which another place is the remedy."""
+
 
 class FolderError(ValueError):
-    """A folder that cannot be written or must not be replaced; the message says what to do."""
+    """A place that cannot be written or must not be replaced; the message says what to do."""
 
 
 @contextmanager
 def replacing(folder: Path, foreign: Foreign, writer: str) -> Iterator[Path]:
     """A folder beside `folder` that takes its place when the block ends without an exception.
 
-    FolderError before the block if `folder` holds what no `writer` wrote, or cannot be written.
+    FolderError before the block if `folder` holds what no `writer` wrote, cannot be written, or is
+    being written by another. After a failure nothing new is left. An OSError of the block names
+    `folder`.
     """
-    folder = folder.resolve()
+    _check_name(folder, "--out")
+    shown, folder = folder, folder.resolve()
     _check(folder, foreign, writer)
+    with claimed(shown):
+        aside = _aside(folder)
+        try:
+            partial = aside / NEW
+            partial.mkdir()
+            with naming(shown, aside):
+                yield partial
+                if folder.exists():
+                    folder.replace(aside / OLD)
+                partial.replace(folder)
+        finally:
+            _settle(aside, folder)
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Keep others from writing a folder, which need not be there, while the block runs.
+
+    FolderError if another does, or if there cannot be such a folder. Folders above it are made, and
+    removed if they are empty in the end.
+    """
+    _check_name(folder, "--out")
+    shown, folder = folder, folder.resolve()
+    with _parents(folder), ExitStack() as stack:
+        try:
+            stack.enter_context(lock.held(folder.with_name(f".{folder.name}.lock")))
+        except lock.HeldError as held:
+            number = f" (process {held})" if str(held) else ""
+            raise FolderError(
+                f"{shown}: is being written by another run{number}; wait for it to end, or give "
+                "--out another folder"
+            ) from None
+        except OSError as error:
+            raise refusal(shown, error) from None
+        _clear(folder)
+        yield
+
+
+@contextmanager
+def naming(shown: Path, aside: Path | None = None) -> Iterator[None]:
+    """Let an OSError of the block that names no file, or one in the folder aside, name `shown`."""
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        yield
     except OSError as error:
-        raise FolderError(f"{folder}: cannot be written ({error.strerror})") from None
+        if error.filename is None or (aside and str(error.filename).startswith(str(aside))):
+            error.filename, error.filename2 = str(shown), None
+        raise
+
+
+@contextmanager
+def making(folder: Path) -> Iterator[None]:
+    """A folder to write files into in the block; a failure removes it, unless it was there."""
+    found = folder.exists()
     try:
-        partial = aside / "new"
-        partial.mkdir()
-        yield partial
-        if folder.exists():
-            folder.replace(aside / "old")
-        partial.replace(folder)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        with naming(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            yield
+    except BaseException:
+        if not found:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def check_file(path: Path, flag: str = "--out") -> None:
+    """Refuse a file that could not be written. FolderError names the flag and the remedy."""
+    _check_name(path, flag)
+    if path.is_dir():
+        raise FolderError(f"{flag} {path}: is a folder; give a file")
+    if path.exists():
+        _check_access(path, os.W_OK, flag)
+    elif not path.parent.is_dir():
+        raise FolderError(f"{flag} {path}: there is no folder {path.parent}; make it first")
+    else:
+        _check_access(path.parent, os.W_OK | os.X_OK, flag)
+
+
+def check_folder(folder: Path, flag: str = "--out") -> None:
+    """Refuse a folder that could not be made or written. FolderError names the flag."""
+    _check_name(folder, flag)
+    above = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
+    if not above.is_dir():
+        raise FolderError(f"{flag} {folder}: {above} is a file; give a folder")
+    _check_access(above, os.W_OK | os.X_OK, flag)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file aside and move it into place. OSError that names it, and no half a file.
+
+    What is no file, such as /dev/stdout, is written as it is.
+    """
+    path = path.resolve()
+    with naming(path):
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)
+            return
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        aside = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            aside.chmod(_mode(path))
+            aside.replace(path)
+        finally:
+            aside.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8 as `write_bytes` does; lines end in a line feed."""
+    write_bytes(path, text.encode())
+
+
+def tell(text: str) -> None:
+    """Tell a person what was done to a folder."""
+    print(f"liver-study: {text}", file=sys.stderr, flush=True)  # noqa: T201 - its job
+
+
+def refusal(path: Path, error: OSError) -> Exception:
+    """What to raise where a place cannot be written before anything is computed."""
+    if error.errno in OF_THE_MACHINE:
+        return error
+    return FolderError(f"{path}: cannot be written ({error.strerror}); choose another folder")
+
+
+# --- steps -------------------------------------------------------------------------------------
 
 
 def refuse_unwritable(folder: Path, foreign: Foreign, writer: str) -> None:
     """FolderError if `replacing` would refuse the folder; nothing is left behind."""
-    folder = folder.resolve()
-    _check(folder, foreign, writer)
-    parent = folder.parent
-    while not parent.exists():
-        parent = parent.parent
-    try:
-        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=parent):
-            pass
-    except OSError as error:
-        raise FolderError(f"{folder}: cannot be written ({error.strerror})") from None
-
-
-def refuse_unwritable_file(path: Path, flag: str) -> None:
-    """FolderError if a file cannot be made or replaced, which is tried and left as it was."""
-    try:
-        if path.is_dir():
-            raise FolderError(f"{flag} {path}: is a folder; name a file in it")
-        if not path.parent.is_dir():
-            raise FolderError(f"{flag} {path}: there is no folder {path.parent}; make it first")
-        is_new = not path.exists()
-        with path.open("ab"):
-            pass
-        if is_new:
-            path.unlink()
-    except OSError as error:
-        raise FolderError(f"{flag} {path}: cannot be written ({error.strerror})") from None
+    check_folder(folder)
+    _check(folder.resolve(), foreign, writer)
 
 
 def _check(folder: Path, foreign: Foreign, writer: str) -> None:
@@ -76,10 +183,85 @@ def _check(folder: Path, foreign: Foreign, writer: str) -> None:
     try:
         if folder.exists() and not folder.is_dir():
             raise FolderError(f"{folder}: is a file; give --out a folder")
-        found = foreign({path.name for path in folder.iterdir()}) if folder.is_dir() else None
+        if not folder.is_dir():
+            return
+        if folder.is_mount() or not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+            what = "is where a disk is mounted" if folder.is_mount() else "may not be written"
+            raise FolderError(f"{folder}: {what}; give --out another folder")
+        found = foreign({path.name for path in folder.iterdir()})
     except OSError as error:  # a name too long, a folder that may not be looked into
         raise FolderError(f"{folder}: cannot be written ({error.strerror})") from None
     if found is not None:
         raise FolderError(
             f"{folder}: holds {found}, which no {writer} wrote; give --out another folder"
         )
+
+
+def _check_access(place: Path, wanted: int, flag: str) -> None:
+    if not os.access(place, wanted):
+        raise FolderError(f"{flag}: {place} may not be written; give another place")
+
+
+def _check_name(path: Path, flag: str) -> None:
+    """A name may be too long, or none at all."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise FolderError(f"{flag} {path}: {reason}; give another name") from None
+
+
+@contextmanager
+def _parents(folder: Path) -> Iterator[None]:
+    """The folders above one; those that had to be made are removed unless something is in them."""
+    missing = [path for path in folder.parents if not path.exists()]
+    try:
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            if not os.access(folder.parent, os.W_OK | os.X_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        except OSError as error:
+            raise refusal(folder, error) from None
+        yield
+    finally:
+        for path in missing:
+            with suppress(OSError):
+                path.rmdir()
+
+
+def _aside(folder: Path) -> Path:
+    try:
+        return Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise refusal(folder, error) from None
+
+
+def _clear(folder: Path) -> None:
+    """Remove the folders aside of programs that were killed: who holds the lock has none yet."""
+    pattern = re.compile(rf"\.{re.escape(folder.name)}\.[a-z0-9_]{{8}}")
+    for path in sorted(folder.parent.iterdir()):
+        if pattern.fullmatch(path.name) and path.is_dir() and _is_aside(path):
+            _settle(path, folder)
+            tell(f"{path}: left by a run that was killed; removed")
+
+
+def _is_aside(path: Path) -> bool:
+    return {inner.name for inner in path.iterdir()} <= {OLD, NEW}
+
+
+def _settle(aside: Path, folder: Path) -> None:
+    """Remove a folder aside; if it was left amid the move into place, end that first."""
+    if (aside / OLD).exists() and (aside / NEW).exists() and not folder.exists():
+        (aside / NEW).replace(folder)
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _mode(path: Path) -> int:
+    """Permissions that a file written in place would have."""
+    if path.exists():
+        return path.stat().st_mode & 0o777
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return 0o666 & ~mask

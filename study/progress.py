@@ -8,26 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
+from study.signals import stop_if_asked
+
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
 Advance = Callable[[float], None]
-
-_asked: list[int] = []
-
-
-def ask_to_stop(number: int) -> None:
-    """Let the program end at the next stage, as by a signal of that number.
-
-    For an exit that the signal's handler raised where Python swallows exceptions.
-    """
-    _asked.append(number)
-
-
-def stop_if_asked() -> None:
-    """End the program if that was asked for."""
-    if _asked:
-        sys.exit(128 + _asked[0])
 
 
 class Progress(Protocol):

@@ -325,7 +325,7 @@ VARIED = {
 
 def varied(seed):
     """A scene by name, and overrides of a few of its keys."""
-    chance = random.Random(seed)  # noqa: S311 - it chooses what to try
+    chance = random.Random(seed)
     scene = chance.choice(["block", "block", "block", "paper"])
     base = TINY if scene == "block" else ("fuzzy.sensitivity_readings=0", "time.samples=16")
     kind = chance.choice(["tissue", "basafa"]) if scene == "block" else "basafa"

@@ -20,6 +20,7 @@ from reports.difference_figure import bars
 from reports.field_figures import views
 from reports.ranking import leads
 from reports.tables import lead_rows
+from study import folders
 from study.commands.report import report as report_command
 from study.results.folder import Results, ResultsError, write
 from study.results.records import SCHEMA_VERSION
@@ -115,13 +116,11 @@ def test_a_report_that_fails_leaves_the_earlier_one(tmp_path, monkeypatch):
 
 
 def test_a_folder_that_cannot_be_written_is_said_so(tmp_path, monkeypatch):
-    def refuse(*_args, **_kwargs):
-        raise PermissionError(13, "Permission denied")
-
     (tmp_path / "a").mkdir()
     write(whole(), tmp_path / "a")
-    monkeypatch.setattr(report.tempfile, "mkstemp", refuse)
-    with pytest.raises(ResultsError, match=r"report.pdf: cannot be written \(Permission denied\)"):
+    monkeypatch.setattr(folders.os, "access", lambda *_: False)
+    monkeypatch.setattr(report, "draw", lambda _: pytest.fail("drawn though it cannot be written"))
+    with pytest.raises(ResultsError, match="a may not be written"):
         report.make_report(tmp_path / "a")
 
 

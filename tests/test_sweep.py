@@ -179,9 +179,11 @@ def test_a_result_that_cannot_be_written_ends_the_sweep_and_leaves_no_part(store
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(ValueError, match="No space left on device"):
+    with pytest.raises(OSError, match="No space left on device") as ended:
         run(squares(3), store)
-    assert not list(store.folder.iterdir())
+    assert ended.value.filename == str(store.folder)
+    assert "start again" in ended.value.__notes__[0]
+    assert not store.folder.exists()
 
 
 # Identity

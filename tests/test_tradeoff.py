@@ -128,7 +128,8 @@ def test_a_superposition_follows_one_load_and_stays_off_the_front_of_those_that_
 
 def test_the_table_is_read_back_with_all_columns(found, tmp_path):
     scene = sampled(read_scene("block", SMALL))
-    study_module.write(found, scene, 2, tmp_path / "out")
+    with study_module.place(tmp_path / "out") as folder:
+        study_module.write(found, scene, 2, folder)
     with (tmp_path / "out" / study_module.TABLE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == table.COLUMNS

@@ -26,6 +26,7 @@ from fuzzy.systems.fis_sections import (
 )
 from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
 from fuzzy.systems.system import OPERATORS, Connective, FuzzySystem, Operators, Rule, Term, Variable
+from study.folders import NO_PLACE, write_text
 
 SYSTEM_KEYS = (
     "Name",
@@ -242,8 +243,8 @@ def write_fis(system: FuzzySystem, path: Path) -> None:
     """Write a type-1 system; ValueError, and no file, if a `.fis` file cannot hold it."""
     text = fis_text(system)
     try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
+        write_text(path, text)
+    except NO_PLACE as error:
         raise FisError(f"{path}: cannot be written ({error.strerror})") from None
 
 

@@ -40,6 +40,7 @@ from typing import Any, NoReturn, cast
 
 from fuzzy.systems.sets import Footprint, FuzzySet, Kind
 from fuzzy.systems.system import Connective, FuzzySystem, Operators, Rule, Term, Variable
+from study.folders import NO_PLACE, write_text
 
 FORMAT = "fuzzy-system"
 VERSION = 1
@@ -244,8 +245,8 @@ def _closest(name: str, known: Collection[str]) -> str:
 def write_json(system: FuzzySystem, path: Path) -> None:
     """Write any system, of type 1 or 2, as JSON; JsonError if the file cannot be written."""
     try:
-        path.write_text(json_text(system), encoding="utf-8", newline="\n")
-    except OSError as error:
+        write_text(path, json_text(system))
+    except NO_PLACE as error:
         raise JsonError(f"{path}: cannot be written ({error.strerror})") from None
 
 

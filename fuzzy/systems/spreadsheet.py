@@ -8,10 +8,11 @@ what is left of a larger sheet, and dropped.
 import csv
 import io
 import re
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+from study.folders import NO_PLACE, write_text
 
 DELIMITERS = ",;\t"
 _ANNOUNCED = re.compile(r"sep=([,;\t])\r?\n")
@@ -103,14 +104,12 @@ def _check_widths(table: Table) -> None:
 def write_table(
     path: Path, header: Sequence[str], rows: Iterable[Sequence[str]], delimiter: str
 ) -> None:
-    """Write the file aside and move it into place. TableError if it cannot be written."""
+    """Write the file aside and move it into place. TableError if there is no place for it."""
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as aside:
-            partial = Path(aside) / path.name
-            with partial.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
-                writer.writerow(header)
-                writer.writerows(rows)
-            partial.replace(path)
-    except OSError as error:
+        write_text(path, text.getvalue())
+    except NO_PLACE as error:
         raise TableError(f"{path}: cannot be written ({error.strerror})") from None

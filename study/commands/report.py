@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import nullcontext
 from pathlib import Path
 
 
@@ -14,6 +16,10 @@ def report(folder: Path) -> None:
         Results folder of an earlier run.
     """
     from reports.report import make_report
+    from study.folders import claimed
 
-    make_report(folder)
+    # Where its parent may not be written the folder cannot be replaced meanwhile, nor locked.
+    free = os.access(folder.absolute().parent, os.W_OK)
+    with claimed(folder) if free else nullcontext():
+        make_report(folder)
     print(folder / "report.pdf")

@@ -6,9 +6,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.flags import EXIT_FAILED_CHECK, Overrides, Switch
+from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
 
 if TYPE_CHECKING:
+    from study.progress import Progress
     from study.results import Results
 
 
@@ -49,33 +50,36 @@ def run(
     if fields and chosen.is_point:
         raise ValueError("--fields: a single point has none; leave it out")
     folder = out or default_folder(scene)
-    with (
-        replacing(folder) as partial,
-        continuing(folder, resume=resume) as state,
-        on_stderr() as progress,
-    ):
-        keeping = Keeping(state, resume, partial if fields else None)
-        results = run_study(chosen, Watch(progress, keeping))
-        with progress.stage("results"):
-            write(results, partial)
-        failure = None
-        if report:
-            with progress.stage("report"):
-                failure = _report_failure(partial)
+    with on_stderr() as progress:
+        with replacing(folder) as partial, continuing(folder, resume=resume) as state:
+            keeping = Keeping(state, resume, partial if fields else None)
+            results = run_study(chosen, Watch(progress, keeping))
+            with progress.stage("results"):
+                write(results, partial)
+        failure = _report_failure(folder, progress) if report else None  # the results are safe
     _print_summary(results, folder)
-    if failure:
-        print(f"liver-study: results kept, but no report: {failure}", file=sys.stderr)
-    if failure or any(not check.passed for check in results.record.checks):
+    if failure is not None:
+        reason = str(failure) or type(failure).__name__
+        print(
+            f"liver-study: results kept, but no report: {reason}; liver-study report {folder} "
+            "makes it",
+            file=sys.stderr,
+        )
+        sys.exit(EXIT_MACHINE)
+    if any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
 
 
-def _report_failure(folder: Path) -> Exception | None:
-    """Make the report; a fault in it must not cost a finished run."""
-    try:
-        from reports.report import make_report
+def _report_failure(folder: Path, progress: Progress) -> Exception | KeyboardInterrupt | None:
+    """Make the report; neither a fault in it nor a signal must cost a finished run."""
+    from study.folders import claimed
 
-        make_report(folder)
-    except Exception as error:  # whatever it is, the results stay
+    try:
+        with progress.stage("report"), claimed(folder):
+            from reports.report import make_report
+
+            make_report(folder)
+    except (Exception, KeyboardInterrupt) as error:  # whatever it is, the results stay
         return error
     return None
 

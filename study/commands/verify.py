@@ -25,11 +25,12 @@ def verify(
     as_json
         Print JSON instead of a table.
     """
+    from study.folders import check_file
     from study.known import request, table
     from study.progress import on_stderr
 
-    if out is not None and not out.parent.is_dir():
-        raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")
+    if out is not None:
+        check_file(out)
     with on_stderr() as progress:
         verdicts = request.verify(progress, quick=quick)
     if out is not None:

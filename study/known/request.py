@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.folders import refuse_unwritable
+from study.folders import claimed, naming, refuse_unwritable
 from study.known import table
 from study.known.case import Case, CaseVerdict
 from study.known.finding import Finding
@@ -82,10 +82,12 @@ def study(request: StabilityRequest, progress: Tell = silent) -> list[CaseVerdic
     request.refuse()
     chosen = request.cases()
     how = How(request.workers, request.scheduler)
-    outcomes = run([case.task for case in chosen], request.store, how, progress)
-    verdicts = judged(chosen, outcomes)
-    request.folder.mkdir(parents=True, exist_ok=True)
-    table.write_stability(verdicts, request.folder / table.NAME)
+    with claimed(request.folder):
+        outcomes = run([case.task for case in chosen], request.store, how, progress)
+        verdicts = judged(chosen, outcomes)
+        with naming(request.folder):
+            request.folder.mkdir(parents=True, exist_ok=True)
+        table.write_stability(verdicts, request.folder / table.NAME)
     return verdicts
 
 

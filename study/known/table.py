@@ -13,12 +13,14 @@ relative unless the case says otherwise; passed; message.
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from study.folders import write_text
 from study.known.case import CaseVerdict
 from study.known.finding import Finding
 
@@ -60,8 +62,9 @@ def write_verification(verdicts: Iterable[CaseVerdict], path: Path) -> None:
 
 
 def _write(path: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([columns, *rows])
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    write_text(path, text.getvalue())
 
 
 def _case_row(verdict: CaseVerdict) -> list[str]:

@@ -6,6 +6,9 @@ motion of a run that was interrupted, too, which goes on in it.
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -103,9 +106,14 @@ def recording(
 
 
 def _give_out(path: Path, mesh: Mesh, times: Floats, frames: Frames) -> None:
-    """Write aside, and move into place what is complete."""
+    """Write aside, and move into place what is complete.
+
+    OSError first where there may be no space: on a full disk HDF5 prints pages, and may crash.
+    """
     from study.results.vtkhdf import write
 
+    if shutil.disk_usage(path.parent).free < frames.count * frames.size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     aside = path.with_name(f".{path.name}")
     try:
         write(aside, mesh.points, mesh.cells, times, frames.read)

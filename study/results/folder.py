@@ -18,7 +18,7 @@ import math
 import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -52,7 +52,7 @@ __all__ = ["Arrays", "Results", "ResultsError", "read", "replacing", "write"]
 
 MARK, SCENE = "results.json", "scene.toml"
 FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, "export"}
-OURS, FIELDS = ".report.pdf", manifest.FIELDS
+OURS, FIELDS = (".report.pdf", ".export."), manifest.FIELDS  # the first, of killed programs
 CHECKSUMS = "sha256"
 """Where results.json has the checksums of the other files, so that two runs are not mixed."""
 
@@ -278,15 +278,33 @@ def _foreign(present: set[str]) -> str | None:
 
 @contextmanager
 def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
-    """A folder beside `folder` for what an interrupted run goes on from; success removes it."""
+    """A folder beside `folder` for what an interrupted run goes on from; success removes it.
+
+    What the machine or a signal ends in the block has a note of how to go on.
+    """
     folder = folder.resolve()
     state = folder.with_name(f".{folder.name}.state")
-    if not resume:
+    if state.is_dir() and not resume:
         shutil.rmtree(state, ignore_errors=True)
+        folders.tell(f"{state}: left by an interrupted run; removed, for this one has no --resume")
     state.mkdir(parents=True, exist_ok=True)
     try:
         yield state
-        shutil.rmtree(state)
+        shutil.rmtree(state, ignore_errors=True)
+    except (KeyboardInterrupt, MemoryError, OSError) as error:
+        error.add_note(_how_to_go_on(state, _kept(state)))
+        raise
     finally:
-        with suppress(OSError):
-            state.rmdir()  # where nothing was kept
+        if not _kept(state):
+            shutil.rmtree(state, ignore_errors=True)
+
+
+def _kept(state: Path) -> list[str]:
+    """Names of the models that have a state; fields without one are of no use."""
+    return sorted(path.stem for path in state.glob("[!.]*.npz")) if state.is_dir() else []
+
+
+def _how_to_go_on(state: Path, kept: list[str]) -> str:
+    if not kept:
+        return "no model had run far enough to be kept for --resume: start again"
+    return f"kept {', '.join(kept)} in {state}: the same command with --resume goes on from there"

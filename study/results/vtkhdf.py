@@ -6,6 +6,7 @@ the times in single precision. Format: https://docs.vtk.org/en/latest/vtk_file_f
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,7 @@ def write(path: Path, points: Floats, cells: Ints, times: Floats, fields: Fields
     if source.error is not None:
         raise source.error
     if not done or writer.GetErrorCode():
-        raise OSError(f"{path}: VTK could not write the fields")
+        raise OSError(errno.EIO, "VTK could not write the fields", str(path))
 
 
 def _grid(points: Floats, cells: Ints) -> vtkUnstructuredGrid:

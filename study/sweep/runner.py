@@ -56,15 +56,26 @@ def run(
     crashes are not stored: their cause may lie outside the task (memory, a signal, a full disk), so
     starting the sweep again tries each once more. Within a sweep every task has one attempt. In
     this process a task that crashes takes the sweep with it; what was stored stays.
-    ValueError if the store cannot be written or workers cannot be had.
+    ValueError if the store cannot be made or workers cannot be had; what the machine or a signal
+    ends has a note of how to go on.
     """
     store.prepare()
+    try:
+        return _run(tasks, store, how or How(), progress)
+    except (KeyboardInterrupt, MemoryError, OSError) as error:
+        error.add_note(store.advice())
+        raise
+    finally:
+        store.tidy()
+
+
+def _run(tasks: Sequence[Task], store: Store, how: How, progress: Tell) -> list[Outcome]:
     by_key = {task.key: task for task in tasks}
     ended = {name: kept for name, task in by_key.items() if (kept := _kept(task, store))}
     left = {name: task for name, task in by_key.items() if name not in ended}
     tally, start = Tally(len(by_key), stored=len(ended)), time.perf_counter()
     progress(tally)
-    with _attempts(tuple(left.values()), how or How()) as attempts:
+    with _attempts(tuple(left.values()), how) as attempts:
         for task, found in attempts:
             if found.value is not None:
                 store.put(task, found.value, found.wall)

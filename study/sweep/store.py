@@ -11,9 +11,11 @@ import json
 import os
 import uuid
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from study.folders import FolderError, naming, refusal
 from study.sweep.canonical import Plain, canonical, digest
 from study.sweep.program import program
 from study.sweep.task import Task, key
@@ -37,31 +39,42 @@ class Store:
     folder: Path
 
     def prepare(self) -> None:
-        """Make the folder. ValueError if it cannot be written, before anything is computed."""
+        """Make the folder. FolderError if it cannot be written, before anything is computed."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise self._unwritable(error) from None
+            raise refusal(self.folder, error) from None
         if not os.access(self.folder, os.W_OK | os.X_OK):
-            raise ValueError(f"{self.folder}: may not be written; choose another folder")
+            raise FolderError(f"{self.folder}: may not be written; choose another folder")
+
+    def tidy(self) -> None:
+        """Remove the folder if there is nothing in it."""
+        with suppress(OSError):
+            self.folder.rmdir()
+
+    def advice(self) -> str:
+        """How to go on after an interruption."""
+        if not any(self.folder.glob("[!.]*.json")):
+            return "nothing was kept yet: start again"
+        return f"start again: what is kept in {self.folder} is not computed twice"
 
     def get(self, task: Task) -> Stored | None:
         """The result of a task, or None if there is none that can be believed."""
         return _read(self._path(task.key))
 
     def put(self, task: Task, value: Plain, wall: float) -> None:
-        """Keep the result of a task. ValueError if it cannot be written."""
+        """Keep the result of a task. OSError that says how to go on if it cannot be written."""
         stored = Stored(task.function, task.arguments, program(task.module), value, wall)
         path = self._path(task.key)
         aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
         record = vars(stored)
         try:
-            _write(aside, canonical(record | {"sha256": digest(record)}))
-            aside.replace(path)
-        except OSError as error:
-            raise self._unwritable(error) from None
+            with naming(self.folder, aside):
+                _write(aside, canonical(record | {"sha256": digest(record)}))
+                aside.replace(path)
         finally:
-            aside.unlink(missing_ok=True)
+            with suppress(OSError):  # with its folder
+                aside.unlink(missing_ok=True)
 
     def __iter__(self) -> Iterator[Stored]:
         """All results that can be believed, of any program."""
@@ -70,12 +83,6 @@ class Store:
 
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}.json"
-
-    def _unwritable(self, error: OSError) -> ValueError:
-        return ValueError(
-            f"{self.folder}: cannot be written ({error.strerror}); free space or choose another "
-            "folder, and start again: what is kept is not computed twice"
-        )
 
 
 def _write(path: Path, text: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.folders import refuse_unwritable_file
+from study.folders import check_file, write_text
 from study.models.table import model
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -87,8 +87,10 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     scene, folder = _ready(request), request.folder
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
-    found = study.study(scene, chosen, _store(folder), request.how, repeats, progress)
-    study.write(found, scene, repeats, folder)
+    how = request.how
+    with study.place(folder) as partial:  # refused now, not after the work
+        found = study.study(scene, chosen, _store(folder), how, repeats, progress)
+        study.write(found, scene, repeats, partial)
     own = 100 * (found.reference.field_error or 0.0)
     return [
         *table.lines(found.entries),
@@ -103,7 +105,7 @@ def advise(
     """Whether the demand can be met, and lines; writes the scene if it can."""
     wanted, given = demand(rate, error), request.read()
     path = request.out or Path(f"{request.name}-{_suffix(wanted)}.toml")
-    refuse_unwritable_file(path, "--out")
+    check_file(path)
     problem = _set_up(recommend.judged_by(sampled(given)))
     model(given, "tissue").varied().prepare(problem)  # a lattice of its spacing
     store = _store(Path("results") / f"{request.name}-tradeoff")
@@ -111,7 +113,7 @@ def advise(
     lines = [*recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
-    path.write_text(recommend.recommended_scene(given, found), encoding="utf-8")
+    write_text(path, recommend.recommended_scene(given, found))
     return True, [*lines, f"scene in {path}"]
 
 

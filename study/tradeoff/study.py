@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -140,7 +141,7 @@ def step_of(outcome: Outcome) -> float:
 
 
 def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
-    """Write table, record and scene; the folder appears, or is replaced, at once."""
+    """Write table, record and scene into an empty folder; see `place`."""
     text, solved = write_scene(scene), found.reference
     record = {
         "reference": {
@@ -155,11 +156,18 @@ def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
         "load_average": os.getloadavg(),
         "machine": asdict(provenance(text, scene.organ.mesh)),
     }
-    with replacing(folder, _foreign, "trade-off study") as partial:
-        table.write(found.entries, partial / TABLE)
-        content = json.dumps(record, indent=1, allow_nan=False)
-        (partial / RECORD).write_text(content + "\n", encoding="utf-8")
-        (partial / "scene.toml").write_text(text, encoding="utf-8")
+    table.write(found.entries, folder / TABLE)
+    content = json.dumps(record, indent=1, allow_nan=False)
+    (folder / RECORD).write_text(content + "\n", encoding="utf-8")
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+
+
+def place(folder: Path) -> AbstractContextManager[Path]:
+    """A folder beside `folder` that takes its place when the block ends without an exception.
+
+    FolderError before the block if `folder` holds anything but a study, or cannot be written.
+    """
+    return replacing(folder, _foreign, "trade-off study")
 
 
 def refuse_unwritable(folder: Path) -> None:

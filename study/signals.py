@@ -1,0 +1,95 @@
+"""Signals that ask the program to stop, and how it answers: it unwinds, and says so once."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+from typing import NoReturn
+
+Handler = Callable[[int, FrameType | None], object]
+
+EXIT_MACHINE = 3
+"""Exit code of what the machine or a person ended: no disk, no memory, a signal."""
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # not every system has them all
+
+_asked: list[int] = []
+
+
+class Stopped(KeyboardInterrupt):
+    """The program was asked to stop; the text names the signal."""
+
+
+def listen(handler: Handler) -> None:
+    """Let a handler answer the signals that ask to stop, but for those that are ignored.
+
+    A shell lets its background jobs ignore SIGINT, and nohup SIGHUP: so does the program.
+    """
+    for number in numbers():
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def numbers() -> list[int]:
+    """Numbers of the signals that ask to stop on this system."""
+    return [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+
+
+def leave_at_once(number: int, _: FrameType | None) -> NoReturn:
+    """Answer before anything was done, where an exception would end amid the imports."""
+    _say(f"liver-study: {told(number)} before it began; there is nothing to --resume, start again")
+    os._exit(EXIT_MACHINE)
+
+
+def stop(number: int, _: FrameType | None) -> NoReturn:
+    """Answer by Stopped, so that half-written folders are removed; to a second signal, at once."""
+    if _asked:
+        _say("liver-study: stopped at once; the next run removes what is half-written")
+        os._exit(EXIT_MACHINE)
+    ask_to_stop(number)
+    raise Stopped(told(number))
+
+
+def ask_to_stop(number: int) -> None:
+    """Let the program end at the next stage, as by a signal of that number.
+
+    For a Stopped that was raised where Python swallows exceptions.
+    """
+    _asked.append(number)
+
+
+def asked() -> bool:
+    """Whether the program was asked to stop."""
+    return bool(_asked)
+
+
+def stop_if_asked() -> None:
+    """Raise Stopped if the program was asked to stop."""
+    if _asked:
+        raise Stopped(told(_asked[0]))
+
+
+def told(number: int) -> str:
+    """How a person is told of a signal."""
+    return "interrupted" if number == signal.SIGINT else f"stopped by {signal.Signals(number).name}"
+
+
+def keep_quiet() -> None:
+    """Let Python not print a Stopped that it swallows: the next stage makes up for it."""
+    shown = sys.unraisablehook
+
+    def hook(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, Stopped):
+            shown(unraisable)
+
+    sys.unraisablehook = hook
+
+
+def _say(text: str) -> None:
+    """Past Python's own streams, which may be amid a line."""
+    try:
+        os.write(2, f"{text}\n".encode())
+    except OSError:  # nobody listens
+        return
