@@ -7,7 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from study.results.folder import default_folder, refuse_unwritable
-from study.scene.file import BUILT_IN, read_scene
+from study.run.suiting import read_suited
+from study.scene.file import BUILT_IN
 
 
 def is_scene(target: str) -> bool:
@@ -25,7 +26,7 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
 
     ValueError for whatever a run of it into the folder `out` would refuse, by the same code.
     """
-    scene = read_scene(name, overrides)
+    scene = read_suited(name, overrides)
     refuse_unwritable(out or default_folder(name))
     lines = [scene.title or name, f"models: {', '.join(scene.models)}"]
     from study.run.ready import ReadyPoint, ready
@@ -35,20 +36,23 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
         return [*lines, f"one control mass point of {given.problem.mass:.4g} kg"]
     from study.run.dimensionless import dimensionless
 
-    lines += [f"note: {note}" for note in given.problem.geometry.notes]
+    lines += [f"note: {note}" for note in (*scene.remarks, *given.problem.geometry.notes)]
     numbers = asdict(dimensionless(scene, given.problem))
     lines += [f"{key} = {value:.4g}" for key, value in numbers.items()]
     described = (line for model in given.models.values() for line in model.describe())
     return [*lines, *dict.fromkeys(described)]
 
 
-def describe_mesh(path: Path, unit: str | None) -> list[str]:
+def describe_mesh(
+    path: Path, unit: str | None, axes: str | None = None, pieces: str = "one"
+) -> list[str]:
     """Lines on a mesh file: what it holds, what was repaired, its quality."""
+    from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
 
-    _, report = load_mesh(path, unit)
+    _, report = load_mesh(path, unit, axes, pieces)
     extent = " x ".join(f"{1e3 * length:.1f}" for length in report.extent)
     return [
         f"{path.name}: {report.kind}, unit {report.unit}, {1e3 * report.volume:.3f} L, {extent} mm",
-        *(f"note: {note}" for note in report.notes),
+        *(f"note: {note}" for note in (*report.notes, axes_note(axes))),
     ]

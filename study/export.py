@@ -19,6 +19,7 @@ from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed, unknowns
+from fem_reference.model import Method
 from fem_reference.solvers import solve_static
 from study.folders import replacing
 from study.mesh.kinds import TetrahedralMesh
@@ -27,8 +28,8 @@ from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.results import folder as results
+from study.run.suiting import read_suited
 from study.scene import Scene
-from study.scene.file import read_scene
 from study.scene.problem import problem_of
 
 Floats = NDArray[np.float64]
@@ -94,7 +95,7 @@ def export(request: ExportRequest, progress: Progress) -> Path:
 def _target(request: ExportRequest) -> _Target:
     path = Path(request.target)
     if not path.is_dir():
-        return _Target(read_scene(request.target, request.overrides), Path(f"{path.stem}-export"))
+        return _Target(read_suited(request.target, request.overrides), Path(f"{path.stem}-export"))
     if request.overrides:
         raise ValueError(
             f"--set: {path} is exported as it was run; leave it out, or name {path}/scene.toml"
@@ -126,7 +127,13 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
     given = nodal_problem(body, scene.tissue, problem.foundation)
     with progress.stage("at rest under full load"):
         displacement = solve_static(body).reshape(-1, 3)
-    _write(folder, {VTU: vtu.text(given, displacement), MARK: _about_vtu(scene, given)})
+    _write(
+        folder,
+        {
+            VTU: vtu.text(given, displacement),
+            MARK: _about_vtu(scene, given) + _noted(scene, problem),
+        },
+    )
 
 
 def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
@@ -146,7 +153,10 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
         _difference(rest, own_rest),
         max(_difference(u, v) for (_, u), (_, v) in zip(moved, own_moved, strict=True)),
     )
-    _write(folder, files | {MARK: _about_calculix(scene, given, motion, differences)})
+    _write(
+        folder,
+        files | {MARK: _about_calculix(scene, given, motion, differences) + _noted(scene, problem)},
+    )
 
 
 def _check_memory(level: Level, scene: Scene) -> None:
@@ -191,7 +201,8 @@ def _level(problem: Problem, elements: int | None) -> Level:
 def motion_of(scene: Scene, problem: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     times = problem.observation.times
-    count = (len(times) - 1) * scene.reference.steps_per_sample
+    stepping = Method("hht-alpha", scene.reference.steps_per_sample)
+    count = stepping.pace(problem.factor, times).steps(len(times) - 1)
     factors = problem.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping
@@ -302,6 +313,12 @@ and then has the same tetrahedra again, also where a mesher that is not reproduc
 
 {file}  {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra
 """
+
+
+def _noted(scene: Scene, problem: Problem) -> str:
+    """What was found, repaired or chosen of the organ, each once."""
+    notes = dict.fromkeys((*scene.remarks, *problem.geometry.notes))
+    return "".join(["\nNotes on the organ:\n", *(f"- {note}\n" for note in notes)]) if notes else ""
 
 
 # --- the folder --------------------------------------------------------------------------------

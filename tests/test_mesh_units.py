@@ -69,7 +69,7 @@ def test_a_declared_unit_wins_over_the_band_with_a_warning(load_cube):
     assert report.unit == "mm"
     assert report.extent == pytest.approx([SIDE / 10] * 3)
     assert report.notes[0].startswith("WARNING: 0.001728 L with the declared unit mm")
-    assert report.notes[0].endswith("in cm it would be one")
+    assert report.notes[0].endswith("; as cm it would be 1.73 L, a liver's")
 
 
 @pytest.mark.parametrize(("stored", "declared"), [("mm", "m"), ("m", "mm"), ("mm", "um")])
@@ -86,5 +86,23 @@ def test_the_box_is_limited(load_cube, side, message):
 
 @pytest.mark.parametrize("unit", ["metre", "km", "MM", ""])
 def test_unknown_names_are_refused(load_cube, unit):
-    with pytest.raises(MeshError, match=r"`organ.unit` = .* is not one of m, dm, cm, mm, um, in"):
+    names = "m, dm, cm, mm, um, in"
+    with pytest.raises(MeshError, match=rf"`organ.unit` = .* is not one of {names}; as m it would"):
         load_cube("m", unit)
+
+
+@pytest.mark.parametrize(
+    ("stored", "declared"),
+    [("mm", "cm"), ("mm", "MM"), ("cm", "m"), ("in", "inch"), ("mm", "in"), ("cm", "Cm")],
+)
+def test_a_mistaken_unit_is_answered_with_the_one_that_makes_a_liver(load_cube, stored, declared):
+    hint = f"as {stored} it would be 1.73 L, a liver's"
+    with pytest.raises(MeshError) as caught:
+        load_cube(stored, declared)
+    assert str(caught.value).endswith(hint)
+
+
+def test_no_unit_is_proposed_for_what_is_no_liver_in_any(load_cube):
+    with pytest.raises(MeshError) as caught:
+        load_cube("m", "MM", side=0.3)
+    assert "it would be" not in str(caught.value)

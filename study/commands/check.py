@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from study.commands.flags import Overrides
 
@@ -13,6 +14,8 @@ def check(
     set_: Overrides = None,
     out: Path | None = None,
     unit: str | None = None,
+    axes: str | None = None,
+    pieces: Literal["one", "largest"] = "one",
 ) -> None:
     """Check a scene or a mesh file and say what would be run, without running it.
 
@@ -28,16 +31,24 @@ def check(
         Results folder that `run` is to write a scene to; results/NAME by default.
     unit
         Unit of a mesh file, for example mm; guessed from the volume if it is not given.
+    axes
+        Sides of the patient to which x, y and z of a mesh file point, for example RAS; LPS if they
+        are not given.
+    pieces
+        Of a mesh file in several pieces: largest keeps that one, one (the default) refuses them.
     """
     from study.check import describe_mesh, describe_scene, is_scene
 
     if is_scene(target):
-        if unit is not None:
-            raise ValueError(f"--unit: {target} is a scene; give --set organ.unit={unit}")
+        for name, value in (("unit", unit), ("axes", axes)):
+            if value is not None:
+                raise ValueError(f"--{name}: {target} is a scene; give --set organ.{name}={value}")
+        if pieces != "one":
+            raise ValueError(f"--pieces: {target} is a scene; give --set organ.pieces={pieces}")
         lines = describe_scene(target, set_ or (), out)
     else:
         for flag, given in (("--set", set_), ("--out", out)):
             if given:
                 raise ValueError(f"{flag}: {target} is a mesh, not a scene; leave it out")
-        lines = describe_mesh(Path(target), unit)
+        lines = describe_mesh(Path(target), unit, axes, pieces)
     print("\n".join(lines))

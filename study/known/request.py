@@ -14,7 +14,7 @@ from study.known.finding import Finding
 from study.known.suite import PROBLEMS, stability_cases
 from study.known.trial import attempted
 from study.progress import Progress
-from study.scene.file import read_scene
+from study.run.suiting import read_suited
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
 from study.sweep.store import Store
@@ -59,7 +59,7 @@ class StabilityRequest:
 
     def cases(self) -> list[Case]:
         """The cases that are asked for."""
-        return stability_cases(read_scene(self.scene), quick=self.quick)
+        return stability_cases(read_suited(self.scene, ()), quick=self.quick)
 
     def refuse(self) -> None:
         """ValueError, before anything is run, for a scene, folder or workers that will not do."""
@@ -68,7 +68,7 @@ class StabilityRequest:
             refuse_unwritable(folder, lambda _: None, "stability study")
         from study.known.stability.cases import own_scene  # compiled, as suite's
 
-        own_scene.refuse(read_scene(self.scene))
+        own_scene.refuse(read_suited(self.scene, ()))
 
 
 def planned(request: StabilityRequest) -> str:

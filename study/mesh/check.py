@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.mesh.draft import Draft, drop_duplicates, weld
+from study.mesh.draft import Draft, drop_duplicates, keep_largest, weld
 from study.mesh.kinds import FloatArray, IndexArray, MeshError, TetrahedralMesh
 from study.mesh.listing import listing
 from study.mesh.tetrahedra import EDGES, volumes
@@ -16,6 +16,7 @@ from study.mesh.topology import (
     edges_of,
     faces_of,
     group_rows,
+    linked_rows,
     same_turn,
     shared_pairs,
 )
@@ -35,8 +36,10 @@ _SAMPLES = np.vstack(
 _MIXED = (0.3, 0.7)  # share of inverted elements that points to broken numbering
 
 
-def repair_tetrahedra(draft: Draft) -> Draft:
+def repair_tetrahedra(draft: Draft, *, largest: bool = False) -> Draft:
     """Weld nodes, drop repeated elements and turn all volumes positive; refuse what is left.
+
+    With `largest`, the piece of the largest volume is kept of several.
 
     Raises
     ------
@@ -47,6 +50,10 @@ def repair_tetrahedra(draft: Draft) -> Draft:
     draft = drop_duplicates(weld(draft))
     _refuse_flat(draft)
     draft = _oriented(draft)
+    if largest:
+        neighbours = linked_rows(group_rows(faces_of(draft.elements))) // 4
+        size = volumes(TetrahedralMesh(draft.points, draft.elements))
+        draft = keep_largest(draft, neighbours, size, "volume")
     faces = faces_of(draft.elements)
     groups = group_rows(faces)
     pairs = shared_pairs(groups)
@@ -128,7 +135,7 @@ def _pieces(draft: Draft, neighbours: IndexArray) -> list[str]:
     sizes = np.sort(np.bincount(piece))[::-1]
     return [
         f"{count} pieces without a common face, of {listing(sizes)} tetrahedra; they would float: "
-        "keep one piece, or join them in the mesher"
+        'keep one piece (`organ.pieces` = "largest" does), or join them in the mesher'
     ]
 
 

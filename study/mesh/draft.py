@@ -60,7 +60,7 @@ def start_draft(points: FloatArray, elements: IndexArray, limit: float) -> Draft
     return _recentred(replace(draft, tolerance=_tolerance(draft.points)))
 
 
-def drop_unused_nodes(draft: Draft) -> Draft:
+def drop_unused_nodes(draft: Draft, *, noted: bool = True) -> Draft:
     """Drop the nodes no element uses: they would have neither mass nor stiffness."""
     used = np.zeros(len(draft.points), dtype=bool)
     used[draft.elements] = True
@@ -69,7 +69,8 @@ def drop_unused_nodes(draft: Draft) -> Draft:
     dropped = np.flatnonzero(~used)
     number = np.where(used, np.cumsum(used) - 1, -1)
     note = f"{len(dropped)} nodes that no element uses dropped; first: {_files(draft, dropped)}"
-    return _renumbered(draft, number, np.flatnonzero(used)).noting(note)
+    left = _renumbered(draft, number, np.flatnonzero(used))
+    return left.noting(note) if noted else left
 
 
 def weld(draft: Draft) -> Draft:
@@ -97,6 +98,21 @@ def drop_duplicates(draft: Draft) -> Draft:
     return draft.keeping(np.sort(groups.first)).noting(
         f"{len(extra)} elements with the same nodes as an earlier one dropped; "
         f"first (0-based): {listing(draft.element_ids[extra])}"
+    )
+
+
+def keep_largest(draft: Draft, neighbours: IndexArray, size: FloatArray, what: str) -> Draft:
+    """Drop all pieces but the largest by the summed `size` (elements,) of a `what`, with a note."""
+    count, piece = components(neighbours, len(draft.elements))
+    if count == 1:
+        return draft
+    sizes = np.bincount(piece, weights=size)
+    kept = piece == sizes.argmax()
+    dropped = np.flatnonzero(~kept)
+    share = 100 * (1.0 - sizes.max() / sizes.sum())
+    return drop_unused_nodes(draft.keeping(np.flatnonzero(kept)), noted=False).noting(
+        f"{count - 1} of {count} pieces dropped for the largest, {len(dropped)} elements with "
+        f"{share:.3g} % of the {what}; first (0-based): {listing(draft.element_ids[dropped])}"
     )
 
 

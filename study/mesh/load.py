@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from study.mesh.abaqus import read_abaqus
+from study.mesh.axes import SCENE, along_scene, letters_of, to_scene
 from study.mesh.check import repair_tetrahedra
 from study.mesh.draft import Draft, element_map, start_draft
 from study.mesh.elsewhere import refusal
@@ -31,7 +33,7 @@ from study.mesh.raw import RawMesh
 from study.mesh.stl import read_stl
 from study.mesh.surface import enclosed_volume, repair_surface
 from study.mesh.tetrahedra import volumes
-from study.mesh.unit import METRES, check_extent, check_unit_name, choose_unit
+from study.mesh.unit import METRES, check_extent, choose_unit
 from study.mesh.vtk_legacy import read_vtk_legacy
 from study.mesh.vtk_xml import read_vtk_xml
 
@@ -62,13 +64,23 @@ FORMATS = (
 )
 
 
+class Reading(NamedTuple):
+    """How a file is to be read: its unit, its axes, and whether other pieces are dropped."""
+
+    unit: str | None
+    axes: str
+    largest: bool
+
+
 def load_mesh(
-    path: str | Path, unit: str | None
+    path: str | Path, unit: str | None, axes: str | None = None, pieces: str = "one"
 ) -> tuple[TetrahedralMesh | SurfaceMesh, MeshReport]:
     """Tetrahedra, or else the closed surface, in a mesh file.
 
     `unit` names the file's length unit: m, dm, cm, mm, um or in; None guesses millimetres or
-    metres from the volume, which then has to be a liver's.
+    metres from the volume, which then has to be a liver's. `axes` names the sides to which the
+    file's axes point, those of a scene by default (`study.mesh.axes`). `pieces` "largest" keeps the
+    largest of several, which are refused by default.
 
     Raises
     ------
@@ -78,9 +90,10 @@ def load_mesh(
     """
     source = Path(path)
     try:
-        check_unit_name(unit)
+        letters = SCENE if axes is None else letters_of(axes)
+        how = Reading(unit, letters, pieces == "largest")
         data = _content(source)
-        return _checked(_read(source, data), unit, source, hashlib.sha256(data).hexdigest())
+        return _checked(_read(source, data), how, source, hashlib.sha256(data).hexdigest())
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from error
 
@@ -109,17 +122,17 @@ def _read(source: Path, data: bytes) -> RawMesh:
 
 
 def _checked(
-    raw: RawMesh, unit: str | None, source: Path, sha256: str
+    raw: RawMesh, how: Reading, source: Path, sha256: str
 ) -> tuple[TetrahedralMesh | SurfaceMesh, MeshReport]:
     solid = _is_solid(raw)
-    draft = _repaired(raw, solid, unit)
+    draft = _repaired(raw, solid, how)
     volume = _volume(draft)
-    name, unit_notes = choose_unit(unit, volume)
+    name, unit_notes = choose_unit(how.unit, volume)
     scale = METRES[name]
-    points = draft.points * scale
+    points, elements = along_scene(draft.points * scale, draft.elements, how.axes)
     extent = np.ptp(points, axis=0)
-    check_extent(extent, name)
-    mesh = (TetrahedralMesh if solid else SurfaceMesh)(points, draft.elements)
+    check_extent(extent, name, volume)
+    mesh = (TetrahedralMesh if solid else SurfaceMesh)(points, elements)
     quality, shape_notes = _quality(mesh, draft)
     report = MeshReport(
         file=str(source),
@@ -129,7 +142,7 @@ def _checked(
         kind="tetrahedra" if solid else "surface",
         volume=volume * scale**3,
         extent=extent,
-        offset=draft.offset * scale,
+        offset=to_scene(how.axes) @ draft.offset * scale,
         node_map=draft.node_map,
         element_map=element_map(draft, len(raw.tetrahedra if solid else raw.triangles)),
         quality=quality,
@@ -163,12 +176,12 @@ def _unused(raw: RawMesh, solid: bool) -> list[str]:
     ]
 
 
-def _repaired(raw: RawMesh, solid: bool, unit: str | None) -> Draft:
+def _repaired(raw: RawMesh, solid: bool, how: Reading) -> Draft:
     # Without a declared unit, the finest one that can be guessed sets the limit.
-    limit = _MAX_COORDINATE / METRES[unit or "mm"]
-    if solid:
-        return repair_tetrahedra(start_draft(raw.points, raw.tetrahedra, limit))
-    return repair_surface(start_draft(raw.points, raw.triangles, limit))
+    limit = _MAX_COORDINATE / METRES.get(how.unit or "mm", METRES["mm"])
+    elements = raw.tetrahedra if solid else raw.triangles
+    repair = repair_tetrahedra if solid else repair_surface
+    return repair(start_draft(raw.points, elements, limit), largest=how.largest)
 
 
 def _volume(draft: Draft) -> float:

@@ -6,22 +6,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.mesh.draft import Draft, drop_duplicates, drop_unused_nodes, weld
+from study.mesh.draft import (
+    Draft,
+    drop_duplicates,
+    drop_unused_nodes,
+    keep_largest,
+    weld,
+)
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
 from study.mesh.listing import listing
 from study.mesh.topology import (
     components,
     edges_of,
     group_rows,
+    linked_rows,
     same_turn,
     shared_pairs,
 )
 
+_INSIDE = 0.5
+"""Turns round a point that lies inside: 1, but for rounding and for what is open."""
 
-def repair_surface(draft: Draft) -> Draft:
+
+def repair_surface(draft: Draft, *, largest: bool = False) -> Draft:
     """Weld nodes, drop useless triangles and turn the rest outwards; refuse what is not closed.
 
-    Crossings of the surface with itself are not looked for.
+    With `largest`, the piece of the largest area is kept of several. Crossings of the surface with
+    itself are not looked for.
 
     Raises
     ------
@@ -31,9 +42,11 @@ def repair_surface(draft: Draft) -> Draft:
     draft = drop_unused_nodes(drop_duplicates(_without_degenerate(weld(draft))))
     if not len(draft.elements):
         raise MeshError("no triangle with three distinct corners is left; export the mesh again")
+    if largest:
+        neighbours = linked_rows(group_rows(edges_of(draft.elements))) // 3
+        draft = keep_largest(draft, neighbours, _areas(draft), "area")
     edges = edges_of(draft.elements)
     pairs = _edge_pairs(draft, edges)
-    _refuse_pieces(draft, pairs // 3)
     draft = _outward(_consistent(draft, edges, pairs))
     return _noting_flat(_noting_shape(draft))
 
@@ -63,42 +76,79 @@ def _without_degenerate(draft: Draft) -> Draft:
     )
 
 
+def _areas(draft: Draft) -> FloatArray:
+    corner = draft.points[draft.elements]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.asarray(0.5 * np.linalg.norm(normal, axis=1))
+
+
 def _edge_pairs(draft: Draft, edges: IndexArray) -> IndexArray:
-    """The two directed edges along every edge of a closed surface, shape (e, 2)."""
+    """The two directed edges along every edge of a closed surface in one piece, shape (e, 2)."""
     groups = group_rows(edges)
-    problems = []
-    open_edges = edges[groups.first[groups.count == 1]]
-    if len(open_edges):
-        loops = _loop_count(open_edges)
-        where = draft.element_ids[groups.first[groups.count == 1] // 3]
-        problems.append(
-            f"{len(open_edges)} open edges in {loops} holes, the first at triangles (0-based) "
-            f"{listing(where)}; close the surface"
-        )
-    crowded = groups.first[groups.count > 2]
-    if len(crowded):
-        problems.append(
-            f"{len(crowded)} non-manifold edges with more than two triangles, the first at "
-            f"triangles (0-based) {listing(draft.element_ids[crowded // 3])}; remove inner walls"
-        )
+    problems = [
+        *_holes(draft, edges, groups.first[groups.count == 1]),
+        *_walls(draft, groups.first[groups.count > 2]),
+        *_pieces(draft, linked_rows(groups) // 3),
+    ]
     if problems:
         raise MeshError("not the surface of a body: " + "; ".join(problems))
     return shared_pairs(groups)
 
 
-def _loop_count(open_edges: IndexArray) -> int:
-    nodes, numbered = np.unique(open_edges, return_inverse=True)
-    return components(numbered.reshape(-1, 2), len(nodes))[0]
+def _holes(draft: Draft, edges: IndexArray, rows: IndexArray) -> list[str]:
+    """What is open: rows of edges that belong to one triangle only."""
+    if not len(rows):
+        return []
+    nodes, numbered = np.unique(edges[rows], return_inverse=True)
+    ends = numbered.reshape(-1, 2)
+    count, loop = components(ends, len(nodes))
+    sizes = np.sort(np.bincount(loop[ends[:, 0]]))[::-1]
+    widest = max(np.ptp(draft.points[nodes[loop == i]], axis=0).max() for i in range(count))
+    return [
+        f"{len(rows)} open edges in {count} holes, of {listing(sizes)} edges, the widest "
+        f"{widest:.3g} file units across, the first at triangles (0-based) "
+        f"{listing(draft.element_ids[rows // 3])}; close the surface (fill its holes in the tool "
+        "that made it)"
+    ]
 
 
-def _refuse_pieces(draft: Draft, neighbours: IndexArray) -> None:
+def _walls(draft: Draft, rows: IndexArray) -> list[str]:
+    if not len(rows):
+        return []
+    return [
+        f"{len(rows)} non-manifold edges with more than two triangles, the first at triangles "
+        f"(0-based) {listing(draft.element_ids[rows // 3])}; remove inner walls"
+    ]
+
+
+def _pieces(draft: Draft, neighbours: IndexArray) -> list[str]:
     count, piece = components(neighbours, len(draft.elements))
-    if count > 1:
-        sizes = np.sort(np.bincount(piece))[::-1]
-        raise MeshError(
-            f"{count} separate surfaces, of {listing(sizes)} triangles; keep one piece (an inner "
-            "one may be a cavity: fill it or mesh the body elsewhere)"
-        )
+    if count == 1:
+        return []
+    sizes = np.bincount(piece)
+    main = int(np.bincount(piece, weights=_areas(draft)).argmax())
+    body = draft.points[draft.elements[piece == main]]
+    first = np.unique(piece, return_index=True)[1]
+    inner = sum(
+        _winding(body, draft.points[draft.elements[first[i], 0]]) > _INSIDE
+        for i in range(count)
+        if i != main
+    )
+    within = f", {inner} of them inside the largest (cavities)" if inner else ""
+    return [
+        f"{count} separate surfaces, of {listing(np.sort(sizes)[::-1])} triangles{within}; keep "
+        'one piece (`organ.pieces` = "largest" does, and so fills cavities), or join them'
+    ]
+
+
+def _winding(triangles: FloatArray, point: FloatArray) -> float:
+    """How often triangles (k, 3, 3) wind round a point, in either sense: solid angles over 4 pi."""
+    a, b, c = np.moveaxis(triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    volume = np.einsum("kd,kd->k", a, np.cross(b, c))
+    ab, bc, ca = (np.einsum("kd,kd->k", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    angle = 2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
+    return float(abs(angle.sum()) / (4.0 * np.pi))
 
 
 def _consistent(draft: Draft, edges: IndexArray, pairs: IndexArray) -> Draft:

@@ -57,6 +57,11 @@ def shared_pairs(groups: RowGroups) -> IndexArray:
     return np.asarray(order[in_pair].reshape(-1, 2))
 
 
+def linked_rows(groups: RowGroups) -> IndexArray:
+    """Every row with the first one of its group, shape (rows, 2), however many a group has."""
+    return np.stack([groups.first[groups.group], np.arange(len(groups.group))], axis=1)
+
+
 def same_turn(first: IndexArray, second: IndexArray) -> NDArray[np.bool_]:
     """Whether rows with the same nodes (edges or triangles) run through them the same way."""
     return np.asarray(_even(first) == _even(second))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -123,22 +123,48 @@ def built_in_liver(volume: float, element_size: float) -> Geometry:
     return _geometry(level, body, (note,), partial(onto_surface, body.signed))
 
 
-def from_file(path: Path, unit: str | None, element_size: float) -> Geometry:
-    """The organ of a mesh file in its unit, in elements of about `element_size` [m].
+def from_file(
+    path: Path,
+    unit: str | None,
+    element_size: float,
+    axes: str | None = None,
+    pieces: str = "one",
+) -> Geometry:
+    """The organ of a mesh file in its unit and axes, in elements of about `element_size` [m].
 
+    `pieces` "largest" drops all others. The last organs are kept, as filling a surface takes long.
     Raises MeshError, a ValueError, for a file that cannot be used.
     """
+    try:
+        state = path.stat()
+    except OSError:
+        return _from_file(path, unit, element_size, axes, pieces, (0, 0))
+    return _from_file(path, unit, element_size, axes, pieces, (state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=2)
+def _from_file(
+    path: Path,
+    unit: str | None,
+    element_size: float,
+    axes: str | None,
+    pieces: str,
+    state: tuple[int, int],
+) -> Geometry:
+    from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
     from study.mesh.tetrahedralise import tetrahedralise
 
-    loaded, report = load_mesh(path, unit)
+    del state  # a file that was written anew is another key
+    loaded, report = load_mesh(path, unit, axes, pieces)
+    notes = (*report.notes, axes_note(axes))
     if isinstance(loaded, SurfaceMesh):
         filled, more = tetrahedralise(loaded, element_size)
         coarsely, _ = tetrahedralise(loaded, FINER * element_size)
         # Each filling takes half a minute, so there are no more levels.
         levels = {0: Level(filled, element_size), -1: Level(coarsely, FINER * element_size)}
-        return _geometry(levels.get, MeshBody(filled), (*report.notes, *more))
-    return _refined(loaded, element_size, report.notes)
+        return _geometry(levels.get, MeshBody(filled), (*notes, *more))
+    return _refined(loaded, element_size, notes)
 
 
 def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]) -> Geometry:

@@ -25,6 +25,7 @@ from study.results.records import (
 from study.run.assumptions import assumptions
 from study.run.dimensionless import dimensionless
 from study.run.ready import Ready, ReadyPoint, ready
+from study.run.suiting import suited
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
@@ -50,6 +51,7 @@ def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
     Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
     """
     started = time.perf_counter()
+    scene = suited(scene, watch.progress)
     given = ready(scene, watch.progress)
     made_by = provenance(write_scene(scene), scene.organ.mesh)  # as it is now, not after the run
     with watch.progress.stage("fuzzy systems"):
@@ -126,6 +128,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         warnings=warnings(scene, models, checks),
         assumptions=assumptions(scene, found.control_point),
         notes=(
+            *scene.remarks,
             *fuzzy.notes,
             *found.notes,
             *(note for run in runs.values() for note in run.notes),

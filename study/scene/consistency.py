@@ -55,8 +55,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield "reference.modes: only the method modal takes it; remove it"
     yield from _lattice_contradictions(scene, table)
     yield from _damping_contradictions(scene, table)
-    if scene.organ.mesh is None and scene.organ.unit is not None:
-        yield "organ.unit: has no effect without organ.mesh; remove it"
+    yield from _mesh_contradictions(scene, table)
     for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
@@ -76,6 +75,20 @@ def _unknown_reading(scene: Scene) -> Iterator[str]:
         LiverSettings(reading=scene.fuzzy.reading, placement=scene.fuzzy.placement)
     except ValueError as error:
         yield f"fuzzy.{error}"
+
+
+def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    organ = scene.organ
+    for key in ("unit", "axes", "pieces", "suit"):
+        if organ.mesh is None and _has(table, ("organ", key)):
+            yield f"organ.{key}: has no effect without organ.mesh; remove it"
+    if organ.axes is not None:
+        from study.mesh.axes import letters_of
+
+        try:
+            letters_of(organ.axes)
+        except ValueError as error:
+            yield str(error)
 
 
 def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:

@@ -11,15 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from study.annotation.quantity import Quantity
-from study.scene import Scene, SpringLaw
+from study.scene import Organ, Scene, SpringLaw
 from study.scene.consistency import MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
+from study.scene.schema import SuitedKey
 from study.scene.text import key_lines, parsed, read_text
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 BUILT_IN = ("liver", "block", "paper")
+SUITED: tuple[str, ...] = get_args(SuitedKey)
 
 
 def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
@@ -33,7 +35,20 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     for override in overrides:
         lines[_apply(table, override)] = 0  # on no line
     _resolve_mesh(table, Path.cwd())
+    if name in BUILT_IN:
+        _suit_the_rest(table, overrides)
     return validate(table, name, lines)
+
+
+def _suit_the_rest(table: Table, overrides: Sequence[str]) -> None:
+    """A built-in scene is made for its own organ: what is not overridden follows another one."""
+    organ = table.get("organ")
+    if isinstance(organ, dict) and "mesh" in organ and "suit" not in organ:
+        given = {override.partition("=")[0].strip() for override in overrides}
+        whole = {key.partition(".")[0] for key in given if "." not in key}
+        organ["suit"] = [
+            key for key in SUITED if key not in given and key.partition(".")[0] not in whole
+        ]
 
 
 def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) -> Scene:
@@ -88,12 +103,9 @@ def resolved(scene: Scene) -> Table:
 
 def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     """Keys that mean nothing for the shape, history, springs and damping in use."""
-    if scene.organ.mesh is not None:
-        yield "organ", "shape"
-    if scene.organ.mesh is not None or scene.organ.shape != "block":
-        yield "organ", "size"
-    if scene.organ.mesh is not None or scene.organ.shape != "liver":
-        yield "organ", "volume"
+    yield from _unused_of_organ(scene.organ)
+    if not scene.remarks:
+        yield ("remarks",)
     for key, kind in (
         ("ramp", "ramp-hold-release"),
         ("hold", "ramp-hold-release"),
@@ -111,6 +123,18 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield "reference", "modes"
     if "superposition" not in scene.models:
         yield ("superposition",)
+
+
+def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
+    if organ.mesh is not None:
+        yield "organ", "shape"
+    else:
+        yield "organ", "pieces"
+    if not organ.suit:
+        yield "organ", "suit"
+    for key, shape in (("size", "block"), ("volume", "liver")):
+        if organ.mesh is not None or organ.shape != shape:
+            yield "organ", key
 
 
 def _load(name: str) -> tuple[str, Path]:

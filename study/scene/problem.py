@@ -90,7 +90,8 @@ def point_problem_of(scene: Scene) -> PointProblem:
 def geometry_of(organ: Organ, element_size: float) -> Geometry:
     """Meshes of an organ, of elements of about `element_size` [m]. ValueError if it has none."""
     if organ.mesh is not None:
-        return shapes.from_file(Path(organ.mesh), organ.unit, element_size)
+        how = (organ.axes, organ.pieces)
+        return shapes.from_file(Path(organ.mesh), organ.unit, element_size, *how)
     if organ.shape == "block":
         return shapes.block(organ.size, element_size)
     return shapes.built_in_liver(organ.volume, element_size)

@@ -29,6 +29,14 @@ IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
 ElementName = Annotated[str, Choice("fem_reference.elements:CHOICES")]
 MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
 LargeStrain = Annotated[str, Choice("fem_reference.laws:LARGE_STRAIN")]
+SuitedKey = Literal[
+    "support.depth",
+    "support.stiffness",
+    "tool.radius",
+    "tool.force",
+    "lattice.spacing",
+    "reference.element_size",
+]
 Aetiology = Annotated[str, Choice("fuzzy.liver.table1:AETIOLOGIES")]
 
 
@@ -54,7 +62,10 @@ class Organ:
 
     `volume` scales the built-in liver, `size` is the block's. `point` is a single control mass
     point without a mesh; its mass is `mass`, or, without one, that for which eq. (2) at the scene's
-    damping ratio meets the benchmark's gamma_0.
+    damping ratio meets the benchmark's gamma_0. Of a mesh file: its length `unit`; its `axes`, the
+    sides of the patient to which x, y and z point, for example RAS, LPS where they are not stated;
+    whether the largest of several `pieces` is kept or they are refused; keys of the scene to
+    `suit` to it (`study.run.suiting`): in a built-in scene those that are not overridden.
     """
 
     shape: Literal["liver", "block", "point"] = "liver"
@@ -63,6 +74,9 @@ class Organ:
     mass: Annotated[float, Quantity("kg", 1e-6, 100.0)] | None = None
     mesh: str | None = None
     unit: str | None = None
+    axes: str | None = None
+    pieces: Literal["one", "largest"] = "one"
+    suit: tuple[SuitedKey, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,8 +197,10 @@ class Reference:
     With `accuracy`, a relative error, a finer mesh is taken until the displacement of each control
     point is estimated to be as accurate. `element`: auto is quadratic, with a pressure of its own
     above a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of
-    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `large_strain`: law of a static
-    solution beside it where strains exceed what linear elasticity is good for.
+    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `steps_per_sample`: of these, or
+    for the load of a superposition 16 times as many; by default as many steps as the motion needs,
+    however often it is sampled. `large_strain`: law of a static solution beside it where strains
+    exceed what linear elasticity is good for.
     """
 
     element: ElementName = "auto"
@@ -192,7 +208,7 @@ class Reference:
     accuracy: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
     method: MethodName = "ritz-vectors"
     modes: Annotated[int, Quantity("", 1, 1000)] = 100
-    steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
+    steps_per_sample: Annotated[int, Quantity("", 1, 100)] | None = None
     large_strain: LargeStrain = "neo-hookean"
 
 
@@ -214,7 +230,10 @@ class Time:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system."""
+    """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system.
+
+    `remarks`: sentences that stand among the notes of its results.
+    """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic's name; nested ones inherit
 
@@ -234,6 +253,7 @@ class Scene:
     time: Time = field(default_factory=Time)
     control_points: dict[str, Place] = field(default_factory=dict)
     renders: bool = True
+    remarks: tuple[str, ...] = ()
 
     @property
     def is_point(self) -> bool:

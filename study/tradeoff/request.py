@@ -12,8 +12,8 @@ from study.models.table import model
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.ready import set_up
+from study.run.suiting import read_suited
 from study.scene import Scene
-from study.scene.file import read_scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
 from study.sweep.store import Store
@@ -53,7 +53,7 @@ class TradeoffRequest:
 
     def read(self) -> Scene:
         """The scene."""
-        return read_scene(self.scene, self.overrides)
+        return read_suited(self.scene, self.overrides)
 
 
 def _ready(request: TradeoffRequest) -> Scene:
