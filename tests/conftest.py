@@ -36,12 +36,11 @@ def pytest_addoption(parser):
     )
 
 
-@pytest.fixture
-def heeding_interrupts():
-    """Children started meanwhile heed SIGINT, which a shell lets its background jobs ignore."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+@pytest.fixture(autouse=True, scope="session")
+def _heeding_signals():
+    """Tests and their children heed what a shell lets its background jobs ignore, and nohup."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session")

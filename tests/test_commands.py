@@ -202,7 +202,6 @@ def test_quick_commands_import_nothing_heavy(arguments, forbidden):
     assert not set(forbidden) & set(loaded)
 
 
-@pytest.mark.usefixtures("heeding_interrupts")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing_behind(number, tmp_path):
     process = subprocess.Popen(

@@ -100,7 +100,6 @@ def test_a_terminal_without_greek_letters_is_answered(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.usefixtures("heeding_interrupts")
 @pytest.mark.parametrize("word", ["cyclopts", "study.run.study"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_amid_the_imports_is_a_message(word, number, tmp_path):

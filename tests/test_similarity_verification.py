@@ -313,9 +313,9 @@ def test_the_area_between_tangled_curves_is_what_falls_into_it():
 
 
 def test_the_library_area_is_another_where_curves_cross():
-    """Why it is not used: 0.86 where the area is 0.80."""
+    """Why it is not used: 0.84 where the area is 0.80."""
     curves = phase_plane.comparable(graph(lambda t: np.sin(2.0 * t)), graph(np.sin))
-    assert similaritymeasures.area_between_two_curves(*curves) > 1.07 * 2.5 / np.pi
+    assert similaritymeasures.area_between_two_curves(*curves) > 1.05 * 2.5 / np.pi
 
 
 # --- the printed formulas, by other ways

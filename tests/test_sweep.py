@@ -473,7 +473,6 @@ def test_a_killed_worker_and_a_killed_driver_cost_the_runs_in_flight_and_no_more
 
 
 @needs_proc
-@pytest.mark.usefixtures("heeding_interrupts")
 @pytest.mark.parametrize(
     ("number", "workers"),
     [

@@ -14,11 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.observation import largest_rotation, largest_strain
-from fem_reference.solvers import solve_static
 from study.mesh.kinds import SurfaceMesh
 from study.mesh.load import load_mesh
-from study.models.finite_elements import reference_of
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.organ.geometry import Geometry
 from study.progress import Progress, Silent
@@ -107,6 +104,10 @@ def _depth(surface: SurfaceMesh, side: Side, share: float) -> float:
 
 def _bearable(scene: Scene) -> float:
     """The tool's force [N], less where strain or rotation at rest would leave the margin."""
+    from fem_reference.observation import largest_rotation, largest_strain
+    from fem_reference.solvers import solve_static
+    from study.models.finite_elements import reference_of
+
     prepared = reference_of(scene).prepare(problem_of(scene))
     body = prepared.body()
     u = solve_static(body)

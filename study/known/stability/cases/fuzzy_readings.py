@@ -23,7 +23,13 @@ from fuzzy.systems.interval_type2 import bounds_of_firing
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.quadrature import sampled
-from fuzzy.systems.sets import Footprint, FuzzySet, lower_membership, upper_membership
+from fuzzy.systems.sets import (
+    Footprint,
+    FuzzySet,
+    lower_membership,
+    membership,
+    upper_membership,
+)
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable, memberships, union
 from study.known.case import Case, Family
 from study.known.finding import Finding, beside, value
@@ -65,6 +71,7 @@ def cases() -> Iterator[Case]:
         ("a lag of almost 1", {"lag": 0.999}),
     ):
         yield FAMILY.case(f"footprint with {name}", "wide", {"footprint": parts}, ROUNDING)
+    yield from _odd_widths()
     yield from _refusals()
 
 
@@ -112,6 +119,16 @@ def _widths(kind: str) -> Iterator[Case]:
     yield FAMILY.case(title, "narrow_output", settings, "no mass on the 101 samples")
 
 
+def _odd_widths() -> Iterator[Case]:
+    """Sets without width are spikes, and the sign of a width does not count, as in Octave."""
+    for title, sd, off in (
+        ("at the centre of a set without width", 0.0, 0.0),
+        ("beside the centre of a set without width", 0.0, 1e-9),
+        ("beside the centre of a set of negative width", -1.0, 0.5),
+    ):
+        yield FAMILY.case(title, "member", {"sd": sd, "off": off}, ROUNDING)
+
+
 def _refusals() -> Iterator[Case]:
     for reading in (0.0, -1.0, 0.4, 151.0, 9500.0, None):
         told = "finite positive" if reading is None or reading <= 0 else "beyond any liver"
@@ -121,8 +138,6 @@ def _refusals() -> Iterator[Case]:
         "estimate from an unknown aetiology", "estimated", {"reading": 9.5, "name": "flu"}, "flu"
     )
     for title, function, settings, says in (
-        ("a set without width", "set_of", {"sd": 0.0}, "set 'a'"),
-        ("a set of negative width", "set_of", {"sd": -1.0}, "set 'a'"),
         ("a footprint of all its width", "wide", {"footprint": {"spread": 1.0}}, "spread"),
         ("a footprint below 0", "wide", {"footprint": {"mean": -1.0}}, "mean"),
         ("a footprint factor of 4", "factor", {"factor": 4.0}, "footprint_factor"),
@@ -236,9 +251,11 @@ def estimated(reading: float | None, name: str = "hcv") -> Finding:
     return value(0.0, estimate({name: given}, "mamdani").estimate)
 
 
-def set_of(sd: float) -> Finding:
-    """A Gaussian set of a width."""
-    return value(0.0, FuzzySet("a", "gaussmf", (sd, 0.0)).parameters[0])
+def member(sd: float, off: float) -> Finding:
+    """Membership so far off the centre of a Gaussian set of a width."""
+    found = membership(FuzzySet("a", "gaussmf", (sd, 0.0)), np.array([off]))
+    spike = float(off == 0.0)
+    return value(float(np.exp(-0.5 * (off / sd) ** 2)) if sd else spike, float(found[0]))
 
 
 def factor(factor: float) -> Finding:
