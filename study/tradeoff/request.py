@@ -110,7 +110,8 @@ def advise(
     model(given, "tissue").varied().prepare(problem)  # a lattice of its spacing
     store = _store(Path("results") / f"{request.name}-tradeoff")
     found = recommend.recommend(sampled(given), wanted, store, request.how, progress)
-    lines = [*recommend.lines(found), *_busy()]
+    noted = dict.fromkeys((*given.remarks, *problem.geometry.notes))
+    lines = [*(f"note: {note}" for note in noted), *recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
     write_text(path, recommend.recommended_scene(given, found))
