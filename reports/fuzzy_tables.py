@@ -16,6 +16,7 @@ SYSTEM = "system"
 SOURCED_MARKS = {"yes": "", "partly": " †", "weak": " ‡", "no": " §"}
 """After the name of a set; the template's caption says what each mark means."""
 CHOICE_NAMES = {
+    "knowledge": "knowledge base",
     "reading": "reading of Table I",
     "consequent": "consequent of mixed stages",
     "placement": "centres of the sets",

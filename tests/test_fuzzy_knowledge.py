@@ -206,7 +206,8 @@ def test_every_value_names_a_known_source_and_every_source_is_used():
     known = {row["id"] for row in rows("sources.csv")}
     table = rows("elastography.csv")
     named = {row[key] for row in table for key in row if key.endswith("_source")}
-    named |= {row["source"] for row in rows("parameters.csv")}
+    for file in ("parameters.csv", "stages.csv", "groups.csv", "exam_noise.csv"):
+        named |= {row["source"] for row in rows(file)}
     notes = " ".join(row["note"] for row in table)
     assert named <= known
     assert {source for source in known - named if source not in notes} == set()

@@ -206,7 +206,7 @@ def test_nothing_left_or_unknown_is_refused(reading, present, message):
         ("footprint", "none", "footprint = 'none': use one of uncertain-mean, "),
         ("footprint_factor", -0.1, "footprint_factor = -0.1: give a number from 0 to 3"),
         ("footprint_factor", float("nan"), "footprint_factor = nan"),
-        ("absent", "zero", "absent = 'zero': use one of normal, silent"),
+        ("absent", "zero", "absent = 'zero': use one of auto, normal, silent"),
     ],
 )
 def test_settings_name_key_value_and_remedy(key, value, message):
