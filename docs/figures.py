@@ -143,6 +143,38 @@ def _estimate(line: Line) -> list[str]:
     return [kilopascals(line["modulus_pa"]) + interval, *shares]
 
 
+def virtual_patients() -> Iterator[tuple[str, str]]:
+    """Knowledge bases and baselines on virtual patients."""
+    lines = [line for line in read("docs/data/cohort.csv") if line["aetiology"] == "all"]
+    by = {(line["contender"], line["readings"]): line for line in lines}
+    yield "cohort-patients", count(lines[0]["patients"])
+    for name, contender, readings in (
+        ("freed-one", "freed mamdani", "1"),
+        ("reading-one", "baseline: reading", "1"),
+        ("linear-one", "baseline: linear", "1"),
+        ("freed-several", "freed mamdani", "2 or more"),
+        ("mean-several", "baseline: mean of readings", "2 or more"),
+        ("linear-several", "baseline: linear", "2 or more"),
+    ):
+        yield f"cohort-{name}", tenths(by[contender, readings]["relative_rms"])
+    yield (
+        "cohort",
+        table(
+            ("contender", "bias [kPa]", "1 reading", "2 or more", "displacement", "in the band"),
+            [
+                [
+                    name,
+                    kilopascals(by[name, "all"]["bias"]),
+                    *(tenths(by[name, some]["relative_rms"]) for some in ("1", "2 or more")),
+                    tenths(by[name, "all"]["displacement_rms"]),
+                    tenths(by[name, "all"]["coverage"]) if by[name, "all"]["coverage"] else "",
+                ]
+                for name in dict.fromkeys(line["contender"] for line in lines)
+            ],
+        ),
+    )
+
+
 def field_error() -> Iterator[tuple[str, str]]:
     """The lattice at rest against converged finite elements."""
     lines = [line for line in measured("field_error") if line["body"] == "liver"]
@@ -353,8 +385,10 @@ def stability() -> Iterator[tuple[str, str]]:
 
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
-    groups = (liver_run, field_error, real_time, peers, error_bar, large_strain, tradeoff)
-    return {name: text for group in (*groups, verification, stability) for name, text in group()}
+    fuzzy = (liver_run, virtual_patients)
+    lattice = (field_error, real_time, peers, error_bar, large_strain, tradeoff)
+    groups = (*fuzzy, *lattice, verification, stability)
+    return {name: text for group in groups for name, text in group()}
 
 
 def pages() -> list[Path]:

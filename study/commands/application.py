@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 from cyclopts import App
 
 from study.commands.check import check
+from study.commands.cohort import cohort
 from study.commands.estimate import estimate
 from study.commands.export import export
 from study.commands.flags import EXIT_BAD_INPUT
@@ -57,6 +58,6 @@ def _leave(number: int, _: FrameType | None) -> NoReturn:
 
 for command in (
     *(run, scenes, check, report, export, verify),
-    *(tradeoff, recommend, stability, estimate, rules),
+    *(tradeoff, recommend, stability, estimate, rules, cohort),
 ):
     app.command(command)
