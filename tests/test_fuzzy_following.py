@@ -27,7 +27,7 @@ from fuzzy.systems.system import firing_strengths
 FOLLOWING = [name for name, base in KNOWLEDGE.items() if base.follows]
 SCALE = 1e3 * np.geomspace(4.0, 40.0, 150)
 FREED, PAPER_COUNT = (LiverSettings(knowledge=name) for name in ("freed", "paper-count"))
-SEVERITY = LiverSettings()
+SEVERITY = LiverSettings(knowledge="severity")
 CLOSEST = {"mamdani": 0.15, "sugeno": 0.10, "interval-type-2": 0.15}
 
 

@@ -91,7 +91,7 @@ class LiverSettings:
     rules that name it are left out; `auto` is as the knowledge base has it.
     """
 
-    knowledge: str = "severity"
+    knowledge: str = "freed"
     reading: str = "R1"
     consequent: str = "max"
     placement: str = "stage-mean"
@@ -107,10 +107,10 @@ class LiverSettings:
                 f"footprint_factor = {self.footprint_factor!r}: give a number from 0 to "
                 f"{LARGEST_FACTOR:g}; 1 is the published spread"
             )
+        counts = reading_named(self.reading).counts
         if self.base.follows:
             _require_untouched(self)
             return
-        counts = reading_named(self.reading).counts
         for aetiology, count in zip(AETIOLOGIES, counts, strict=True):
             try:
                 input_records(aetiology, count, self.placement)

@@ -111,7 +111,7 @@ class Fuzzy:
     """
 
     systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
-    knowledge: Annotated[str, Choice("fuzzy.liver.bases:KNOWLEDGE")] = "severity"
+    knowledge: Annotated[str, Choice("fuzzy.liver.bases:KNOWLEDGE")] = "freed"
     reading: str = "R1"
     consequent: Annotated[str, Choice("fuzzy.liver.rules:CONSEQUENTS")] = "max"
     placement: Annotated[str, Choice("fuzzy.liver.knowledge:PLACEMENTS")] = "stage-mean"
