@@ -164,7 +164,7 @@ from kernels.called import f
 def g(x):
     return f(x)
 """
-REMEDY = "from pathlib import Path\nfrom msm.compiled import drop_outdated\n{}\n"
+REMEDY = "from pathlib import Path\nfrom study.compiled import drop_outdated\n{}\n"
 ASK = "from kernels.calling import g; print(g(1))"
 
 

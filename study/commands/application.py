@@ -15,6 +15,7 @@ from study.commands.export import export
 from study.commands.flags import EXIT_BAD_INPUT
 from study.commands.recommend import recommend
 from study.commands.report import report
+from study.commands.robustness import robustness
 from study.commands.rules import rules
 from study.commands.run import run
 from study.commands.scenes import scenes
@@ -57,6 +58,6 @@ def _leave(number: int, _: FrameType | None) -> NoReturn:
 
 for command in (
     *(run, scenes, check, report, export, verify),
-    *(tradeoff, recommend, stability, estimate, rules),
+    *(tradeoff, recommend, stability, robustness, estimate, rules),
 ):
     app.command(command)

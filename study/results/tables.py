@@ -63,9 +63,7 @@ class SensitivityEntry(NamedTuple):
     readings: float
 
 
-Entry = TypeVar(
-    "Entry", CurveSample, BandSample, SimilarityScore, FieldDifference, SensitivityEntry
-)
+Entry = TypeVar("Entry", bound=NamedTuple)
 
 
 def write_table(path: Path, kind: type[Entry], rows: Iterable[Entry]) -> None:
