@@ -40,5 +40,9 @@ def robustness(
         return
     with on_stderr("robustness") as progress:
         found = asked.study(request, progress)
-    print("\n".join(asked.lines(found)))
-    print("\n".join(str(request.folder / name) for name in asked.FILES))
+    from reports.ranking_study import sentences
+    from reports.ranking_study_figure import write_figures
+
+    print("\n".join([*asked.lines(found), *sentences(request.folder)]))
+    tables = [request.folder / name for name in asked.FILES]
+    print("\n".join(map(str, [*tables, *write_figures(request.folder)])))

@@ -13,7 +13,9 @@ from study.results.tables import write_table
 from study.robustness import rows, summary
 from study.robustness.block import SYSTEMS
 from study.robustness.design import check_size, shares
+from study.robustness.spacing import over_spacing
 from study.robustness.unknowns import UNKNOWNS, Draw, draws
+from study.scene.file import read_scene
 from study.similarity.batch import COLUMNS
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
@@ -21,17 +23,20 @@ from study.sweep.store import Store
 from study.sweep.tally import Tell, silent
 from study.sweep.task import Task
 
+SCENE = "paper"
+"""Whose reference spacing is varied alone."""
 BLOCK = 32
 """Rows of the design in a block: some seconds."""
-NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES = (
-    "nearest.csv",
-    "differences.csv",
-    "table-iii.csv",
-    "indices.csv",
-    "nearest-to-table-iii.csv",
-    "unknowns.csv",
+NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES, SPACING = (
+    "ranking_nearest.csv",
+    "ranking_differences.csv",
+    "ranking_table_iii.csv",
+    "ranking_indices.csv",
+    "ranking_nearest_draws.csv",
+    "ranking_unknowns.csv",
+    "ranking_spacing.csv",
 )
-FILES = (NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES)
+FILES = (NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES, SPACING)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +97,7 @@ def study(request: RobustnessRequest, progress: Tell = silent) -> list[rows.Near
     write_table(request.folder / TABLE_III, rows.TableThree, table_iii)
     write_table(request.folder / INDICES, rows.Index, summary.indices(found))
     write_table(request.folder / DRAWN, rows.Drawn, _drawn(request, table_iii))
+    write_table(request.folder / SPACING, rows.AtSpacing, over_spacing(read_scene(SCENE)))
     _write_ranges(request.folder / RANGES)
     return nearest
 

@@ -85,3 +85,15 @@ class Drawn(NamedTuple):
     draw: int
     unknown: str
     value: str
+
+
+class AtSpacing(NamedTuple):
+    """Score of a system at a reference spacing [m], with both moduli [Pa] at small strain."""
+
+    spacing_m: float
+    benchmark_pa: float
+    system: str
+    estimate_pa: float
+    curve: str
+    measure: str
+    score: float
