@@ -11,6 +11,7 @@ from reports.benchmarks import Line, read
 from reports.digits import Table, count, fixed, percent, significant, words
 from reports.paper import TABLE_III
 from reports.tables import CURVE_NAMES, MEASURE_NAMES
+from study.results.folder import Results
 
 NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
     "ranking_nearest",
@@ -24,6 +25,12 @@ NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
 MOST_NAMED = 4
 CLAIM = "interval-type-2"
 """The system that the paper finds nearest to the benchmark."""
+
+
+def is_ranked(results: Results) -> bool:
+    """Whether a run ranks fuzzy systems by their likeness to the benchmark."""
+    names = [model.name for model in results.record.models]
+    return "basafa" in names and len(results.record.fuzzy.systems) > 1
 
 
 def ranking_study(folder: Traversable | None = None) -> dict[str, object] | None:

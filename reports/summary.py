@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from reports import budget
 from reports.appearance import labels, reference_name, system_name
 from reports.differences import field_errors, finite_elements, own_error, resolved
 from reports.digits import (
@@ -120,6 +121,7 @@ def sentences(results: Results) -> list[str]:
         *_estimates(results),
         *sensitivity_sentences(results),
         *_fields(results),
+        *budget.sentences(results),
         *_limits(results),
         *_rankings(results),
         *_reference(results),

@@ -46,7 +46,8 @@ class Simulation:
 class ModelRun:
     """The motion of a model with its record, in which its own numerical errors stand.
 
-    `bounds`: motion at both ends of an interval of stiffness, if the model has one.
+    `bounds`: motion at both ends of an interval of stiffness, if the model has one; `halved`: that
+    by half as long steps, if it finished.
     """
 
     trajectory: Trajectory
@@ -54,6 +55,7 @@ class ModelRun:
     checks: tuple[Check, ...] = ()
     notes: tuple[str, ...] = ()
     bounds: tuple[Trajectory, Trajectory] | None = None
+    halved: Trajectory | None = None
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,13 @@ from study.results.provenance import provenance
 from study.results.records import (
     ControlPoint,
     Dimensionless,
+    ErrorBudget,
     LatticeLimits,
     Provenance,
     StudyRecord,
 )
 from study.run.assumptions import assumptions
+from study.run.budget import error_budgets
 from study.run.dimensionless import dimensionless
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
@@ -42,6 +44,7 @@ class Compared:
     dimensionless: Dimensionless | None = None
     lattice_limits: LatticeLimits | None = None
     control_point: ControlPoint | None = None
+    budgets: tuple[ErrorBudget, ...] = ()
 
 
 def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
@@ -93,6 +96,7 @@ def _on_organ(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
         _fields(problem, runs),
         dimensionless(scene, problem),
         limits,
+        budgets=error_budgets(scene, problem, ready, runs, watch.progress),
     )
 
 
@@ -135,6 +139,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         dimensionless=found.dimensionless,
         lattice_limits=found.lattice_limits,
         control_point=found.control_point,
+        budgets=found.budgets,
     )
     has_field = response.volumes.size > 0
     return Results(
