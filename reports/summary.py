@@ -22,7 +22,7 @@ from reports.digits import (
 )
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
-from reports.ranking import Lead, leads, references, tool_probe
+from reports.ranking import Lead, leads, references, score_table, tool_probe
 from study.results.folder import Results
 from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
@@ -195,6 +195,24 @@ def _rankings(results: Results) -> Iterator[str]:
                 f"Similarity to {reference_name(results, reference)} at control point "
                 f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
             )
+            yield from _baseline(results, reference, probe)
+
+
+def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
+    """How often the reading without any fuzzy system is nearer than all of them."""
+    scores = score_table(results, reference, probe)
+    own = scores.get("reading")
+    tuned = [scores[m.name] for m in results.record.models if m.system and m.name in scores]
+    if own is None or not tuned:
+        return
+    shared = [column for column in own if all(column in row for row in tuned)]
+    ahead = sum(own[column] > max(row[column] for row in tuned) for column in shared)
+    verb = "scores" if ahead else "never scores"
+    of = f" by {ahead} of {len(shared)} measures" if ahead else ""
+    yield (
+        f"The reading as it is, without any fuzzy system, {verb} higher than every fuzzy system "
+        f"against {reference_name(results, reference)} at {words(probe)}{of}."
+    )
 
 
 def _winners(found: list[Lead], named: dict[str, str]) -> str:
