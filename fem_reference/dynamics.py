@@ -25,9 +25,9 @@ from fem_reference.stiffness import Stiffness
 from study.problem.damping import RayleighDamping
 
 Floats = NDArray[np.float64]
-March = Callable[
-    ["Oscillator", Callable[[Floats], Floats], float, int], Iterator[tuple[Floats, Floats]]
-]
+State = tuple[Floats, Floats]
+"""Displacement [m] and velocity [m/s], each of any shape."""
+March = Callable[["Oscillator", Callable[[Floats], Floats], float, int], Iterator[State]]
 
 GAMMA = 2.0 - np.sqrt(2.0)
 ORDER = 2
@@ -108,6 +108,22 @@ def hht(
         u, v = u_hat + step**2 * beta * a, v_hat + step * gamma * a
         before = after
         yield u, v
+
+
+def hermite(before: State, after: State, share: float, step: float) -> State:
+    """Displacement and velocity at a share of a step [s] by the cubic through both its ends.
+
+    Its error is of the fourth order in displacement and of the third in velocity, that of the steps
+    of the second.
+    """
+    (u, v), (u_end, v_end), s = before, after, share
+    if s == 1.0:
+        return after
+    gap = (u_end - u) / step
+    lead, lag = v - gap, v_end - gap
+    moved = u + step * s * (gap + (1.0 - s) * ((1.0 - s) * lead - s * lag))
+    speed = gap + (1.0 - s) * (1.0 - 3.0 * s) * lead + s * (3.0 * s - 2.0) * lag
+    return moved, speed
 
 
 class SteppedMotion:

@@ -10,12 +10,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.dynamics import March, Oscillator, hht, march
+from fem_reference.dynamics import March, Oscillator, State, hermite, hht, march
 from fem_reference.elasticity import Body, discretise
 from fem_reference.elements import AUTO
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
+from fem_reference.pace import Pace, own_pace
 from fem_reference.recording import Recorder
 from fem_reference.solvers import solve_static
 from fem_reference.superposition import (
@@ -42,11 +43,30 @@ DEFAULT = "ritz-vectors"
 
 @dataclass(frozen=True)
 class Method:
-    """How the motion is found: a name of `METHODS`, steps per sample, modes of `modal`."""
+    """How the motion is found: a name of `METHODS`, steps per sample, modes of `modal`.
+
+    Without `steps_per_sample` a motion has its own steps, however often it is sampled. Of either
+    `times` as many are taken, a power of two.
+    """
 
     name: str = DEFAULT
-    steps_per_sample: int = 1
+    steps_per_sample: int | None = None
     modes: int = 100
+    times: int = 1
+
+    def pace(self, factor: Factor, sampled: Floats) -> Pace:
+        """Steps of a motion under a load history that is sampled at these times [s]."""
+        if self.steps_per_sample is not None:
+            return Pace(self.steps_per_sample * self.times)
+        return own_pace(factor, sampled, self._parts).times(self.times)
+
+    def load_pace(self, factor: Factor, sampled: Floats) -> Pace:
+        """Steps over which the load of a superposition is linear."""
+        return self.pace(factor, sampled).times(LOAD_STEPS)
+
+    @property
+    def _parts(self) -> int:
+        return 1 if self.name in STEPPING else LOAD_STEPS
 
 
 @dataclass(frozen=True)
@@ -89,17 +109,38 @@ def _stepped(
     method: Method,
     advance: Advance,
 ) -> Solution:
-    """By equal steps in time, a whole number of them per sample."""
-    times, every = recorder.observation.times, method.steps_per_sample
-    step, count = float(times[1] - times[0]) / every, (len(times) - 1) * every
+    """By equal steps in time; samples within a step are those of its cubic."""
+    times = recorder.observation.times
+    pace = method.pace(factor, times)
+    step, count = pace.length(float(times[1] - times[0])), pace.steps(len(times) - 1)
     system = Oscillator(body.mass, body.stiffness, body.load, damping)
-    started, seen = time.perf_counter(), recorder.at_probes
-    for n, (u, v) in enumerate(scheme(system, factor, step, count)):
-        if n % every == 0:
-            recorder.motion(n // every, at_points(seen, u), at_points(seen, v))
-            recorder.field(n // every, u)
+    started = time.perf_counter()
+    before: State | None = None
+    for n, after in enumerate(scheme(system, factor, step, count)):
+        if n % pace.per_sample == 0:
+            _record(recorder, n // pace.per_sample * pace.samples, before, after, step, pace)
             advance(n / count)
+        before = after
     return _solution(body, recorder, step, count, time.perf_counter() - started)
+
+
+def _record(
+    recorder: Recorder, last: int, before: State | None, after: State, step: float, pace: Pace
+) -> None:
+    """Keep a sample at the end of a step, and those within the step."""
+    start = after if before is None else before
+    ends = [_at_probes(recorder, state) for state in (start, after)]
+    first = last if before is None else last - pace.samples + 1
+    for sample in range(first, min(last + 1, len(recorder.observation.times))):
+        share = 1.0 - (last - sample) / pace.samples
+        recorder.motion(sample, *hermite(ends[0], ends[1], share, step))
+        if sample in recorder.observation.frames:
+            recorder.field(sample, hermite(start, after, share, step)[0])
+
+
+def _at_probes(recorder: Recorder, state: State) -> State:
+    u, v = (at_points(recorder.at_probes, x) for x in state)
+    return u, v
 
 
 def _superposed(
@@ -113,7 +154,8 @@ def _superposed(
 ) -> Solution:
     """In a subspace; its strain also where a control point is farthest out."""
     started = time.perf_counter()
-    excitation = excitation_of(damping, factor, recorder, LOAD_STEPS * method.steps_per_sample)
+    pace = method.load_pace(factor, recorder.observation.times)
+    excitation = excitation_of(damping, factor, recorder, pace)
     found = superposed(excitation, choose(body, excitation, method.modes, advance))
     wall = time.perf_counter() - started
     for sample in range(len(recorder.observation.times)):

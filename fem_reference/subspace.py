@@ -109,7 +109,8 @@ class SubspaceMotion:
 
     `factor`: share of the body's load at times [s]. `displacement` [m] (n,) of all unknowns after
     the steps taken. `state` (m, 4): displacement, velocity, load and its slope of each mode of the
-    subspace, whose coordinates there are the columns of `modes` (m, m).
+    subspace, whose coordinates there are the columns of `modes` (m, m) and whose squared angular
+    frequencies [1/s^2] are `squares` (m,).
     """
 
     def __init__(
@@ -119,12 +120,12 @@ class SubspaceMotion:
         factor: Callable[[Floats], Floats],
         step: float,
     ) -> None:
-        squares, self.modes = eigh(subspace.stiffness)
+        self.squares, self.modes = eigh(subspace.stiffness)
         self.subspace, self.factor, self.step, self.time = subspace, factor, step, 0.0
-        self.state = np.zeros((len(squares), 4))
+        self.state = np.zeros((len(self.squares), 4))
         self.displacement = np.zeros(len(subspace.vectors))
         self._load = self.modes.T @ subspace.load
-        self._moved = transitions(squares, damping, step)
+        self._moved = transitions(self.squares, damping, step)
 
     @cached_property
     def _shapes(self) -> Floats:
@@ -148,16 +149,26 @@ def superposition(
     damping: RayleighDamping,
     factor: Callable[[Floats], Floats],
     times: Floats,
+    inside: int = 1,
 ) -> tuple[Floats, Floats]:
-    """Coordinates and their rates (times, m) in the subspace, from rest, at equally spaced times.
+    """Coordinates and their rates in the subspace, from rest, at equally spaced times.
 
-    Each mode is integrated exactly under a load that is linear between the times.
+    Each mode is integrated exactly under a load that is linear between the times. With `inside`,
+    each of these steps is also looked at so many times, equally spaced and its end the last of
+    them, as exactly; shape ((times - 1) * inside + 1, m).
     """
-    motion = SubspaceMotion(subspace, damping, factor, float(times[1] - times[0]))
-    y = np.zeros((len(times), len(motion.state), 2))
-    for n, (before, after) in enumerate(pairwise(factor(times)), start=1):
+    step = float(times[1] - times[0])
+    motion = SubspaceMotion(subspace, damping, factor, step)
+    count, modes = len(times) - 1, len(motion.state)
+    starts, y = np.zeros((count, modes, 4)), np.zeros((count, inside, modes, 2))
+    for n, (before, after) in enumerate(pairwise(factor(times))):
+        starts[n, :, :2] = motion.state[:, :2]
         motion.advance(before, after)
-        y[n] = motion.state[:, :2]
+        starts[n, :, 2:], y[n, -1] = motion.state[:, 2:], motion.state[:, :2]
+    for part in range(1, inside):
+        moved = transitions(motion.squares, damping, step * part / inside)
+        y[:, part - 1] = np.einsum("mij,nmj->nmi", moved[:, :2], starts)
+    y = np.concatenate([np.zeros((1, modes, 2)), y.reshape(-1, modes, 2)])
     return y[..., 0] @ motion.modes.T, y[..., 1] @ motion.modes.T
 
 

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points
+from fem_reference.pace import Pace
 from fem_reference.recording import Recorder
 from fem_reference.subspace import Subspace, modal_subspace, ritz_subspaces, superposition
 from study.problem.damping import RayleighDamping
@@ -23,7 +24,7 @@ Factor = Callable[[Floats], Floats]
 Advance = Callable[[float], None]
 
 LOAD_STEPS = 16
-"""Per sample: the load is linear between them."""
+"""Per step of a motion: the load is linear between them."""
 GROWTH = 4
 MAX_VECTORS = 80
 TINY = 1e-300
@@ -64,19 +65,23 @@ class Superposed:
 class Excitation:
     """What the motion follows from beside the body; the load is linear between `times` [s].
 
-    Every `every`-th of the times is a sample; `at_probes` takes nodal values to control points.
+    There are `samples` at the `pace` of these steps; `at_probes` takes nodal values to control
+    points.
     """
 
     damping: RayleighDamping
     factor: Factor
     times: Floats
-    every: int
+    pace: Pace
+    samples: int
     at_probes: csr_array
 
     def coordinates(self, subspace: Subspace) -> tuple[Floats, Floats]:
         """Coordinates and rates (samples, m)."""
-        y, rate = superposition(subspace, self.damping, self.factor, self.times)
-        return y[:: self.every], rate[:: self.every]
+        given = (self.damping, self.factor, self.times, self.pace.samples)
+        y, rate = superposition(subspace, *given)
+        every = self.pace.per_sample
+        return y[::every][: self.samples], rate[::every][: self.samples]
 
     def curves(self, subspace: Subspace) -> ProbeCurves:
         """The motion of the control points."""
@@ -98,12 +103,16 @@ class Excitation:
 
 
 def excitation_of(
-    damping: RayleighDamping, factor: Factor, recorder: Recorder, every: int
+    damping: RayleighDamping, factor: Factor, recorder: Recorder, pace: Pace
 ) -> Excitation:
-    """That of a recorder's samples, with so many steps of the load in each."""
+    """That of a recorder's samples, with steps of the load at a pace."""
     samples = recorder.observation.times
-    times = np.linspace(samples[0], samples[-1], (len(samples) - 1) * every + 1)
-    return Excitation(damping, factor, times, every, recorder.at_probes)
+    count = pace.steps(len(samples) - 1)
+    end = samples[0] + (samples[-1] - samples[0]) * (
+        count * pace.samples / (pace.per_sample * (len(samples) - 1))
+    )
+    times = np.linspace(samples[0], end, count + 1)
+    return Excitation(damping, factor, times, pace, len(samples), recorder.at_probes)
 
 
 def superposed(excitation: Excitation, subspace: Subspace) -> Superposed:
@@ -129,7 +138,8 @@ def subspace_trajectory(
     """What is observed of a body's motion in a given subspace, by so many steps of the load."""
     recorder = Recorder(body, observation)
     seen, V = recorder.at_probes, subspace.vectors
-    coordinates = excitation_of(damping, factor, recorder, steps_per_sample).coordinates(subspace)
+    pace = Pace(steps_per_sample)
+    coordinates = excitation_of(damping, factor, recorder, pace).coordinates(subspace)
     for sample, (y, rate) in enumerate(zip(*coordinates, strict=True)):
         u, v = V @ y, V @ rate
         recorder.motion(sample, at_points(seen, u), at_points(seen, v))

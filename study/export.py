@@ -18,6 +18,7 @@ from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.memory import SHARE, available, needed
+from fem_reference.model import Method
 from fem_reference.solvers import solve_static
 from study.folders import replacing
 from study.models.finite_elements import FINER, reference_of
@@ -160,7 +161,8 @@ def _level(problem: Problem, elements: int | None) -> Level:
 def motion_of(scene: Scene, problem: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     times = problem.observation.times
-    count = (len(times) - 1) * scene.reference.steps_per_sample
+    stepping = Method("hht-alpha", scene.reference.steps_per_sample)
+    count = stepping.pace(problem.factor, times).steps(len(times) - 1)
     factors = problem.factor(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping

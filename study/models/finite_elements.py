@@ -13,6 +13,7 @@ from fem_reference import model as fem
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points, evaluation
+from fem_reference.pace import Pace
 from fem_reference.solvers import solve_static
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
@@ -25,7 +26,6 @@ from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepp
 from study.organ.geometry import Level
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
-from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import (
@@ -75,9 +75,9 @@ class FiniteElements:
         return PreparedElements(self, problem)
 
     def method(self, times: int = 1) -> fem.Method:
-        """How the motion is found, with so many times the steps of the table."""
+        """How the motion is found, with so many times the steps of the table or its own."""
         chosen = self.reference
-        return fem.Method(chosen.method, times * chosen.steps_per_sample, chosen.modes)
+        return fem.Method(chosen.method, chosen.steps_per_sample, chosen.modes, times)
 
 
 @dataclass(eq=False)
@@ -87,6 +87,7 @@ class PreparedElements:
     model: FiniteElements
     problem: Problem
     best: MeshSolution | None = field(default=None, init=False)
+    _times: int = field(default=1, init=False)  # own steps, taken so many times as often
 
     @property
     def critical_time_step(self) -> float:
@@ -117,7 +118,7 @@ class PreparedElements:
         longest = 1.0 / rate if longest is None and rate is not None else longest
         if longest is not None:
             every = whole_steps(float(seen.times[1] - seen.times[0]), longest)
-            method = replace(method, steps_per_sample=every)
+            method = replace(method, steps_per_sample=every, times=1)
         found = fem.run(self.body(), self.model.damping, self.problem.factor, seen, method)
         return Simulation(found.trajectory, found.time_step)
 
@@ -149,11 +150,9 @@ class PreparedElements:
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion on the finest of the meshes that show its error."""
-        solved, error = self._solve(watch.progress)
+        coarsest, steps = self._paced(watch.progress)
+        solved, error = self._solve(coarsest, watch.progress)
         best = self.best = solved[-1]
-        coarsest = solved[0].found.trajectory  # where halving the steps is cheap
-        half = self._halved(solved[0], watch.progress)
-        steps = time_step_errors(ORDER, self.problem.probes, coarsest, half)
         strained, note = self._at_large_strain(solved, watch.progress)
         record = self._record(best, steps, self._elements(solved, error, strained))
         checks = (*step_checks(self.model.name, steps), *_subspace_checks(best))
@@ -163,11 +162,35 @@ class PreparedElements:
             notes.append(f"The reference's discretisation error is not estimated: {why}.")
         return ModelRun(best.found.trajectory, record, checks, tuple(filter(None, notes)))
 
-    def _solve(self, progress: Progress) -> tuple[list[MeshSolution], DiscretisationError | None]:
+    def _paced(self, progress: Progress) -> tuple[MeshSolution, dict[str, CurveErrors]]:
+        """On the coarsest mesh, where halving the steps is cheap, and the error of the steps.
+
+        Own steps that hold several samples are halved until it is small enough.
+        """
+        levels = map(self.problem.geometry.level, range(-COARSER, 1))
+        coarsest = self.solved_on(next(filter(None, levels)), progress)
+        while True:
+            half = self._halved(coarsest, progress)
+            whole = coarsest.found.trajectory
+            errors = time_step_errors(ORDER, self.problem.probes, whole, half.trajectory)
+            missed = not all(check.passed for check in step_checks(self.model.name, errors))
+            if not (missed and self._pace().samples > 1):
+                return coarsest, errors
+            self._times *= 2
+            coarsest = replace(coarsest, found=half)
+
+    def _pace(self) -> Pace:
+        problem = self.problem
+        return self.model.method(self._times).pace(problem.factor, problem.observation.times)
+
+    def _solve(
+        self, coarsest: MeshSolution, progress: Progress
+    ) -> tuple[list[MeshSolution], DiscretisationError | None]:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
-        levels = [geometry.level(k) for k in range(-COARSER, 1)]
-        solved = [self.solved_on(level, progress) for level in levels if level is not None]
+        levels = filter(None, (geometry.level(k) for k in range(-COARSER, 1)))
+        rest = [level for level in levels if level is not coarsest.level]
+        solved = [coarsest, *(self.solved_on(level, progress) for level in rest)]
         error = mesh_error(self.problem, solved)
         while is_too_coarse(accuracy, error):
             finer = self._finer(solved[-1].level, next_size(accuracy, error))
@@ -194,14 +217,14 @@ class PreparedElements:
             problem = self.problem
             arguments = (self.model.damping, problem.factor, problem.observation)
             return MeshSolution(
-                level, body, fem.run(body, *arguments, self.model.method(), advance)
+                level, body, fem.run(body, *arguments, self.model.method(self._times), advance)
             )
 
-    def _halved(self, solved: MeshSolution, progress: Progress) -> Trajectory:
+    def _halved(self, solved: MeshSolution, progress: Progress) -> fem.Solution:
         problem = self.problem
         with progress.stage(f"{self.model.name}: halved steps") as advance:
             arguments = (self.model.damping, problem.factor, problem.observation)
-            return fem.run(solved.body, *arguments, self.model.method(2), advance).trajectory
+            return fem.run(solved.body, *arguments, self.model.method(2 * self._times), advance)
 
     def _at_large_strain(
         self, solved: Sequence[MeshSolution], progress: Progress

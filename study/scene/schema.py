@@ -183,8 +183,10 @@ class Reference:
     With `accuracy`, a relative error, a finer mesh is taken until the displacement of each control
     point is estimated to be as accurate. `element`: auto is quadratic, with a pressure of its own
     above a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of
-    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `large_strain`: law of a static
-    solution beside it where strains exceed what linear elasticity is good for.
+    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `steps_per_sample`: of these, or
+    for the load of a superposition 16 times as many; by default as many steps as the motion needs,
+    however often it is sampled. `large_strain`: law of a static solution beside it where strains
+    exceed what linear elasticity is good for.
     """
 
     element: ElementName = "auto"
@@ -192,7 +194,7 @@ class Reference:
     accuracy: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
     method: MethodName = "ritz-vectors"
     modes: Annotated[int, Quantity("", 1, 1000)] = 100
-    steps_per_sample: Annotated[int, Quantity("", 1, 100)] = 1
+    steps_per_sample: Annotated[int, Quantity("", 1, 100)] | None = None
     large_strain: LargeStrain = "neo-hookean"
 
 

@@ -8,11 +8,13 @@ time would pile the points up where the organ rests and leave gaps where it move
 distances are then wrong; and timing is already scored by the time histories, whereas the phase
 plane is about shape. The price: noise adds length, so measured curves must be smoothed first.
 
-Frechet and area come from similaritymeasures 1.5, which scores NaN as a perfect match: its input
-must be finite (`study.similarity.motion.check_pair`). Its area joins points of equal rank by
-quadrilaterals and is blind to how far along a shared path two curves get. Its PCM is not used: it
-weights each gap by the arc length reached so far instead of the segment's own, so the result is
+Frechet comes from similaritymeasures 1.5, which scores NaN as a perfect match: its input must be
+finite (`study.similarity.motion.check_pair`). Its area is not used: it joins points of equal rank
+by quadrilaterals, which where the curves cross is not the area between them. Its PCM is not used:
+it weights each gap by the arc length reached so far instead of the segment's own, so the result is
 proportional to the number of points, and it divides by zero for a curve that does not move.
+
+The area is blind to how far along a shared path two curves get.
 
 The scores keep a floor: a candidate that never moves is about one reach away, hence near 1/2.
 """
@@ -21,6 +23,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study.similarity.enclosed_area import area_between
 
 Floats = NDArray[np.float64]
 
@@ -36,10 +40,8 @@ def frechet_distance(candidate: Floats, reference: Floats) -> float:
 
 
 def area_distance(candidate: Floats, reference: Floats) -> float:
-    """Area between the curves on normalised axes."""
-    import similaritymeasures
-
-    return float(similaritymeasures.area_between_two_curves(*comparable(candidate, reference)))
+    """Area between the curves on normalised axes, their starts and their ends joined."""
+    return area_between(*comparable(candidate, reference))
 
 
 def pcm_distance(candidate: Floats, reference: Floats) -> float:

@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Choices = NDArray[np.uint8]
+
+STEPS = ((1, 0), (0, 1), (1, 1))
+"""Of (i, j) along a path; of equally cheap ones the first is taken."""
 
 
 def warping_path(x: Floats, y: Floats, half_width: int) -> tuple[Indices, Indices]:
@@ -16,41 +20,41 @@ def warping_path(x: Floats, y: Floats, half_width: int) -> tuple[Indices, Indice
     (1, 1), all of weight one; of equally cheap steps the first named is taken, so the path is
     unique.
     """
-    return _trace_back(_accumulate(_banded_cost(x, y, half_width), half_width))
+    steps, first = _cheapest_steps(x, y, half_width)
+    return _trace_back(steps, first)
 
 
-def _banded_cost(x: Floats, y: Floats, half_width: int) -> Floats:
-    """Squared differences behind a border row and column; infinite outside the band."""
-    index = np.arange(len(x))
-    inside = np.abs(index[:, None] - index) <= half_width
-    cost = np.full((len(x) + 1, len(x) + 1), np.inf)
-    cost[1:, 1:][inside] = ((x[:, None] - y) ** 2)[inside]
-    cost[0, 0] = 0.0
-    return cost
+def _cheapest_steps(x: Floats, y: Floats, half_width: int) -> tuple[Choices, Indices]:
+    """Number in `STEPS` of the best step into each cell (i, j), of i + j = k in row k.
 
-
-def _accumulate(cost: Floats, half_width: int) -> Floats:
-    """Least summed cost of reaching each cell, overwriting `cost`.
-
-    Cells with the same i + j need only the two antidiagonals before them, and lie at a constant
-    stride in memory: each antidiagonal is one array operation.
+    Row k begins with the cell of i = first[k]. Its cells need the two rows before only, so the
+    costs are kept of three rows and memory grows with the band: a byte for each of its cells.
     """
-    n = len(cost) - 1
-    flat = cost.reshape(-1)
-    for k in range(2, 2 * n + 1):  # k = i + j, counted from the border
-        first = max(1, k - n, (k - half_width + 1) // 2)
-        last = min(n, k - 1, (k + half_width) // 2)
-        start, stop = first * n + k, last * n + k + 1
-        left, up, corner = (flat[start - s : stop - s : n] for s in (1, n + 1, n + 2))
-        flat[start:stop:n] += np.minimum(np.minimum(left, up), corner)
-    return cost
+    n = len(x)
+    rank = np.arange(2 * n - 1)
+    first = np.maximum(np.maximum(0, rank - n + 1), (rank - half_width + 1) // 2)
+    last = np.minimum(np.minimum(n - 1, rank), (rank + half_width) // 2)
+    steps = np.zeros((len(rank), int((last - first).max()) + 1), dtype=np.uint8)
+    # By i + 1, with a border that no path crosses.
+    before, last_but_one, row = (np.full(n + 2, np.inf) for _ in range(3))
+    before[1] = (x[0] - y[0]) ** 2
+    for k, a, b in zip(range(1, len(first)), first[1:], last[1:] + 1, strict=True):
+        totals = np.stack([before[a:b], before[a + 1 : b + 1], last_but_one[a:b]])
+        best = totals.argmin(axis=0)
+        steps[k, : b - a] = best
+        row[a + 1 : b + 1] = (x[a:b] - y[k - b + 1 : k - a + 1][::-1]) ** 2 + totals.min(axis=0)
+        row[a], row[b + 1] = np.inf, np.inf  # what an older row left beside the band
+        before, last_but_one, row = row, before, last_but_one
+    return steps, first
 
 
-def _trace_back(total: Floats) -> tuple[Indices, Indices]:
-    i = j = len(total) - 1
+def _trace_back(steps: Choices, first: Indices) -> tuple[Indices, Indices]:
+    i = j = len(steps) // 2
     path = [(i, j)]
-    while (i, j) != (1, 1):
-        i, j = min(((i - 1, j), (i, j - 1), (i - 1, j - 1)), key=lambda cell: total[cell])
+    while i or j:
+        k = i + j
+        down, along = STEPS[steps[k, i - first[k]]]
+        i, j = i - down, j - along
         path.append((i, j))
-    pairs = np.array(path[::-1]) - 1
+    pairs = np.array(path[::-1])
     return pairs[:, 0], pairs[:, 1]
