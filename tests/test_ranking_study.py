@@ -145,7 +145,7 @@ def test_a_draw_is_scored_as_a_scene_that_says_the_same():
     found = block.evaluated([as_in_the_paper_scene()])
     for s, system in enumerate(block.SYSTEMS):
         assert found.estimates[0, s] == results.record.fuzzy.systems[system].estimate_pa
-        known = [row.value for row in results.scores if row.model == f"msm-{system}"]
+        known = [row.score for row in results.scores if row.model == f"msm-{system}"]
         assert found.scores[0, s] == pytest.approx(known, abs=1e-6)
     # Negative control: a benchmark at another reference spacing is another one.
     other = block.evaluated([as_in_the_paper_scene()._replace(rest_length=5.0e-3)])

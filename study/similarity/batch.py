@@ -213,8 +213,97 @@ def frechet(a: Floats, b: Floats) -> float:
 
 @njit(cache=True)
 def area(a: Floats, b: Floats) -> float:
-    """Area between two curves (200, 2)."""
-    return 0.0 * a[0, 0] * b[0, 0]
+    """Area between two curves (200, 2), see `study.similarity.enclosed_area`."""
+    edges = _edges(np.concatenate((a, b[::-1])))
+    if len(edges) == 0:
+        return 0.0
+    ends = np.concatenate((edges[:, 1], edges[:, 3]))
+    return _between(edges, np.unique(np.concatenate((ends, _crossings(edges)))))
+
+
+@njit(cache=True)
+def _edges(polygon: Floats) -> Floats:
+    """Rows x, y of the lower and of the upper end and the sense, 1 up, of each edge not level.
+
+    By their lower ends, so that the edges at some height are found without looking at all.
+    """
+    n, count = len(polygon), 0
+    found = np.empty((n, 5))
+    for i in range(n):
+        p, q = polygon[i], polygon[(i + 1) % n]
+        if p[1] == q[1]:
+            continue
+        low, high = (p, q) if p[1] < q[1] else (q, p)
+        found[count, 0], found[count, 1] = low[0], low[1]
+        found[count, 2], found[count, 3] = high[0], high[1]
+        found[count, 4] = 1.0 if p[1] < q[1] else -1.0
+        count += 1
+    found = found[:count]
+    return found[np.argsort(found[:, 1])]
+
+
+@njit(cache=True)
+def _crossings(edges: Floats) -> Floats:
+    """Ordinates at which two of the edges cross."""
+    count, found = 0, np.empty(64)
+    for i in range(len(edges)):
+        x, y, high = edges[i, 0], edges[i, 1], edges[i, 3]
+        dx, dy = edges[i, 2] - x, high - y
+        for j in range(i + 1, len(edges)):
+            if edges[j, 1] >= high:
+                break
+            ex, ey = edges[j, 2] - edges[j, 0], edges[j, 3] - edges[j, 1]
+            turn = dx * ey - dy * ex
+            if turn == 0.0:
+                continue
+            ax, ay = edges[j, 0] - x, edges[j, 1] - y
+            share, other = (ax * ey - ay * ex) / turn, (ax * dy - ay * dx) / turn
+            if 0.0 < share < 1.0 and 0.0 < other < 1.0:
+                if count == len(found):
+                    found = np.concatenate((found, np.empty(count)))
+                found[count] = y + share * dy
+                count += 1
+    return found[:count]
+
+
+@njit(cache=True)
+def _between(edges: Floats, levels: Floats) -> float:
+    """Integral of the winding number's size over the slabs between levels."""
+    here, at = np.empty(len(edges), np.int64), np.empty(len(edges))
+    total, active, waiting = 0.0, 0, 0
+    for k in range(len(levels) - 1):
+        low, high = levels[k], levels[k + 1]
+        kept = 0
+        for i in range(active):
+            if edges[here[i], 3] >= high:
+                here[kept] = here[i]
+                kept += 1
+        while waiting < len(edges) and edges[waiting, 1] <= low:
+            here[kept] = waiting
+            kept, waiting = kept + 1, waiting + 1
+        active, middle = kept, 0.5 * (low + high)
+        for i in range(active):
+            x0, y0 = edges[here[i], 0], edges[here[i], 1]
+            x1, y1 = edges[here[i], 2], edges[here[i], 3]
+            at[i] = x0 + (middle - y0) / (y1 - y0) * (x1 - x0)
+        _sort(at, here, active)
+        winding, width = 0.0, 0.0
+        for m in range(active - 1):
+            winding += edges[here[m], 4]
+            width += abs(winding) * (at[m + 1] - at[m])
+        total += width * (high - low)
+    return total
+
+
+@njit(cache=True)
+def _sort(at: Floats, here: NDArray[np.int64], count: int) -> None:
+    """By insertion: few edges are at one height, and their order hardly changes between slabs."""
+    for i in range(1, count):
+        x, edge, j = at[i], here[i], i
+        while j and at[j - 1] > x:
+            at[j], here[j] = at[j - 1], here[j - 1]
+            j -= 1
+        at[j], here[j] = x, edge
 
 
 @njit(cache=True)
