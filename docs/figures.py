@@ -351,10 +351,18 @@ def stability() -> Iterator[tuple[str, str]]:
         yield f"collapse-{name}", f"{borne:.0f} and {first:.0f}"
 
 
+def ranking() -> Iterator[tuple[str, str]]:
+    """What the study of the paper's unknowns found, a line a finding, as the report says it."""
+    from reports.ranking_study import sentences
+
+    lines = "\n".join(f"- {text}" for text in sentences())
+    yield "ranking", f"\n\n{lines}\n\n"
+
+
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     groups = (liver_run, field_error, real_time, peers, error_bar, large_strain, tradeoff)
-    return {name: text for group in (*groups, verification, stability) for name, text in group()}
+    return {name: text for group in (*groups, verification, stability, ranking) for name, text in group()}
 
 
 def pages() -> list[Path]:
