@@ -362,7 +362,11 @@ def ranking() -> Iterator[tuple[str, str]]:
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     groups = (liver_run, field_error, real_time, peers, error_bar, large_strain, tradeoff)
-    return {name: text for group in (*groups, verification, stability, ranking) for name, text in group()}
+    return {
+        name: text
+        for group in (*groups, verification, stability, ranking)
+        for name, text in group()
+    }
 
 
 def pages() -> list[Path]:
