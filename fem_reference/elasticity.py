@@ -87,23 +87,54 @@ def discretise(
     curved along it. ValueError if the tool or the support touches no surface, for a Poisson ratio
     that no solid has, and for a tetrahedron without volume.
     """
-    name = chosen_element(element, tissue.poisson_ratio)
-    _check_poisson_ratio(tissue.poisson_ratio)
-    _refuse_flat(mesh)
-    kind = ELEMENTS[name]
-    bent = project if kind.quadratic else None
-    grid = straight(mesh) if bent is None else curved(mesh, bent)
-    one = kind.shapes()
-    surface = skfem.FacetBasis(grid, one, mapping(grid), intorder=FACET_ORDER)
+    name, surface = loaded_surface(mesh, tissue, foundation, tool, element, project)
+    grid, one = surface.mesh, surface.elem
     support = _by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
-    if support.nnz == 0 or not support.diagonal().any():
-        raise ValueError("the support holds no surface; enlarge support.depth")
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     mass = tissue.density * _finite(_product_form().assemble(nodes), "the mass")
     own = elastic(grid, name, tissue)
     stiffness = Stiffness(csc_array(own.matrix + support), own.pressure)
     load = _load(surface, tool)
     return Body(mesh, name, nodes, stiffness, _by_component(mass), support, load)
+
+
+def loaded_surface(
+    mesh: TetrahedralMesh,
+    tissue: Tissue,
+    foundation: Foundation,
+    tool: ToolPatch,
+    element: str = AUTO,
+    project: Projection | None = None,
+) -> tuple[ElementName, Any]:
+    """The element that is meant, and scikit-fem's basis of one component on the facets.
+
+    All that `discretise` refuses is refused here, where next to nothing is computed.
+    """
+    name = chosen_element(element, tissue.poisson_ratio)
+    _check_poisson_ratio(tissue.poisson_ratio)
+    _refuse_flat(mesh)
+    kind = ELEMENTS[name]
+    bent = project if kind.quadratic else None
+    grid = straight(mesh) if bent is None else curved(mesh, bent)
+    surface = skfem.FacetBasis(grid, kind.shapes(), mapping(grid), intorder=FACET_ORDER)
+    _refuse_untouched(surface, foundation, tool)
+    return name, surface
+
+
+def _refuse_untouched(surface: Any, foundation: Foundation, tool: ToolPatch) -> None:
+    """ValueError if no integration point of the facets is held, or pushed."""
+    points, normals = rows(surface.global_coordinates()), rows(surface.normals)
+    coarse = f"on a mesh of {surface.mesh.nelements} tetrahedra"
+    if not foundation.density(points, normals).any():
+        raise ValueError(
+            f"support: holds no surface {coarse}; enlarge support.depth, or reduce "
+            "reference.element_size"
+        )
+    if not tool.profile(points, normals).any():
+        raise ValueError(
+            f"tool: touches no surface {coarse}; enlarge tool.radius, move tool.place or reduce "
+            "reference.element_size"
+        )
 
 
 def _check_poisson_ratio(nu: float) -> None:
@@ -197,8 +228,6 @@ def _load(surface: Any, tool: ToolPatch) -> Floats:
     form = skfem.LinearForm(lambda v, w: tool.profile(rows(w.x), rows(w.n)) * v)
     nodal = np.asarray(form.assemble(surface))
     total = float(nodal.sum())
-    if total <= 0.0:
-        raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
     return np.outer(nodal * (tool.force / total), tool.direction).ravel()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.dynamics import March, Oscillator, State, hermite, hht, march
-from fem_reference.elasticity import Body, discretise
+from fem_reference.elasticity import Body, discretise, loaded_surface
 from fem_reference.elements import AUTO
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
@@ -188,6 +188,20 @@ def build(
     """Discretised body. ValueError, before anything is assembled, if memory does not hold it."""
     refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
     return discretise(mesh, tissue, foundation, tool, element, project)
+
+
+def refuse(
+    mesh: TetrahedralMesh,
+    tissue: Tissue,
+    foundation: Foundation,
+    tool: ToolPatch,
+    element: str = AUTO,
+    project: Projection | None = None,
+    method: str = DEFAULT,
+) -> None:
+    """ValueError for all that `build` refuses, without what takes time in it."""
+    refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
+    loaded_surface(mesh, tissue, foundation, tool, element, project)
 
 
 def run(

@@ -17,7 +17,7 @@ from fem_reference.pace import Pace
 from fem_reference.recording import Recorder
 from fem_reference.subspace import Subspace, modal_subspace, ritz_subspaces, superposition
 from study.problem.damping import RayleighDamping
-from study.problem.trajectory import Observation, Trajectory
+from study.problem.trajectory import Observation
 
 Floats = NDArray[np.float64]
 Factor = Callable[[Floats], Floats]
@@ -127,15 +127,15 @@ def superposed(excitation: Excitation, subspace: Subspace) -> Superposed:
     )
 
 
-def subspace_trajectory(
+def subspace_motion(
     body: Body,
     subspace: Subspace,
     damping: RayleighDamping,
     factor: Factor,
     observation: Observation,
     steps_per_sample: int,
-) -> Trajectory:
-    """What is observed of a body's motion in a given subspace, by so many steps of the load."""
+) -> Recorder:
+    """What is recorded of a body's motion in a given subspace, by so many steps of the load."""
     recorder = Recorder(body, observation)
     seen, V = recorder.at_probes, subspace.vectors
     pace = Pace(steps_per_sample)
@@ -144,7 +144,7 @@ def subspace_trajectory(
         u, v = V @ y, V @ rate
         recorder.motion(sample, at_points(seen, u), at_points(seen, v))
         recorder.field(sample, u)
-    return recorder.trajectory
+    return recorder
 
 
 Choose = Callable[[Body, Excitation, int, Advance], Subspace]

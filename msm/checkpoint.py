@@ -10,8 +10,10 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import struct
 import time
 import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +27,12 @@ Arrays = dict[str, NDArray[Any]]
 
 SECONDS = 60.0
 """Of wall time between two states."""
-IDENTITY = "identity"
+IDENTITY, DIGEST = "identity", "digest"
+DAMAGED = (
+    *(OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""What numpy and zipfile raise for a file that is cut or altered."""
 CHANGING = {
     "motion": ("sample", "repeated", "wall"),
     "stepper": ("u", "v", "t", "unseen"),
@@ -132,25 +139,44 @@ def _pieces(thing: object) -> Iterable[bytes]:
 def write(path: Path, found: str, arrays: Arrays) -> None:
     """Write a state aside and move it into place, so that a crash leaves the one before."""
     aside = path.with_name(f".{path.name}")
+    marks = {IDENTITY: np.array(found), DIGEST: np.array(digest(arrays))}
     with aside.open("wb") as file:
-        np.savez(file, allow_pickle=False, **{IDENTITY: np.array(found)}, **arrays)
+        np.savez(file, allow_pickle=False, **marks, **arrays)
         file.flush()
         os.fsync(file.fileno())
     aside.replace(path)
 
 
+def digest(arrays: Arrays) -> str:
+    """SHA-256 of the names and contents of arrays."""
+    return identity(tuple((name, arrays[name]) for name in sorted(arrays)))
+
+
 def read(path: Path, wanted: str) -> Arrays:
     """The state in a file. ValueError if it is damaged or of another run than `wanted`."""
     try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(
-            f"{path}: damaged state of a run ({error}); run without --resume"
-        ) from None
+        arrays = _load(path)
+        content = str(arrays.pop(DIGEST, ""))
+    except DAMAGED as error:
+        told = str(error) or type(error).__name__
+        raise ValueError(f"{path}: damaged state of a run ({told}); run without --resume") from None
     if str(arrays.pop(IDENTITY, "")) != wanted:
         raise ValueError(
             f"{path}: the state of another run: the organ, a material, the load, the step, what is "
             "recorded or the program has changed since; undo that, or run without --resume"
         )
+    if content != digest(arrays):
+        raise ValueError(
+            f"{path}: damaged state of a run (its arrays are not those that were written); run "
+            "without --resume"
+        )
     return arrays
+
+
+def _load(path: Path) -> Arrays:
+    with path.open("rb") as raw:
+        found = np.load(raw, allow_pickle=False)
+        if not isinstance(found, np.lib.npyio.NpzFile):
+            raise ValueError("it is no .npz file")  # noqa: TRY004 - the file is at fault
+        with found as file:
+            return {name: file[name] for name in file.files}

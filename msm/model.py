@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays, assemble
 from msm.checkpoint import Checkpoint, Keeper, identity, program
+from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
 from msm.linearised import largest_strain
 from msm.network import Network
-from msm.stability import DEFAULT, critical_time_step
+from msm.stability import DEFAULT, Follower, critical_time_step
 from msm.statics import static_displacement
-from msm.stepper import LatticeStepper
+from msm.stepper import LatticeStepper, refuse_unfit
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
@@ -37,6 +38,7 @@ __all__ = [
     "arrays",
     "assemble",
     "critical_time_step",
+    "refuse",
     "run",
     "static_displacement",
 ]
@@ -104,9 +106,7 @@ def run(
     checkpoint the run.
     """
     stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear)
-    interval = float(observation.times[1] - observation.times[0])
-    pace = Pace(step, interval, len(observation.times) - 1, stepper.limit_at_rest)
-    _refuse_too_many_steps(pace)
+    pace = _pace(step, observation, stepper.limit_at_rest)
     recorder, motion = _Recorder(assembly.lattice, stepper.net, observation), _Motion()
     recorder.record(0, stepper.u, stepper.v)
     keeper = None
@@ -148,15 +148,48 @@ def _parts(
     }
 
 
-def _refuse_too_many_steps(pace: Pace) -> None:
+def refuse(
+    assembly: Assembly,
+    material: Material,
+    observation: Observation,
+    step: Step = FOLLOWED,
+    *,
+    integrator: str = DEFAULT,
+    linear: bool = False,
+) -> None:
+    """ValueError for all that `run` refuses but checkpoints, without a step taken."""
+    refuse_unfit(integrator, material)
+    net = arrays(assembly, material, linear=linear)
+    follower = Follower(material.law, net, INTEGRATORS[integrator])
+    _pace(step, observation, follower.limit(np.zeros_like(net.load)))
+
+
+def _pace(step: Step, observation: Observation, at_rest: float) -> Pace:
+    """The steps of a run whose limit at rest [s] is known; ValueError if there are too many."""
+    interval = float(observation.times[1] - observation.times[0])
+    pace = Pace(step, interval, len(observation.times) - 1, at_rest)
+    if not isinstance(step, Counts):  # which follow from a run that was not refused
+        _refuse_too_many_steps(pace, step)
+    return pace
+
+
+def _refuse_too_many_steps(pace: Pace, step: Step) -> None:
     intervals = len(pace.substeps)
     steps = pace.choose(0) * intervals if pace.plan is None else int(pace.plan.sum())
     if steps > MAX_STEPS:
         raise ValueError(
             f"the lattice needs {steps:.2g} steps of about {pace.interval * intervals / steps:.2g} "
-            f"s, the limit is {MAX_STEPS:.0e}: reduce time.duration or support.stiffness, or "
-            "enlarge lattice.spacing"
+            f"s, the limit is {MAX_STEPS:.0e}: reduce time.duration, or {_shortens(step)}"
         )
+
+
+def _shortens(step: Step) -> str:
+    """What else leaves fewer steps to take."""
+    if isinstance(step, Fixed):
+        return "enlarge lattice.time_step"
+    if isinstance(step, Rate):
+        return "reduce lattice.step_rate"
+    return "support.stiffness, or enlarge lattice.spacing or lattice.step_fraction"
 
 
 class _Lost(NamedTuple):

@@ -26,7 +26,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import lame
 from msm.integrators import INTEGRATORS, Integrator
-from msm.laws import Law
+from msm.laws import Law, stiffness_at_rest
 from msm.linearised import largest_turn, nodal_bounds
 from msm.network import Network
 from msm.tangent import add_product, empty_tangent, linearise
@@ -65,7 +65,8 @@ def critical_time_step(assembly: Assembly, material: Material, integrator: str =
     net = arrays(assembly, material)
     method = INTEGRATORS[integrator]
     still = np.zeros_like(net.load)
-    omega, _ = largest_frequency(material.law, bounding(net, method), still)
+    steepest = at_rest(material.law, bounding(net, method))
+    omega, _ = largest_frequency(material.law, steepest, still)
     return longest_step(method, omega, damping_rate(net, still), net.beta)
 
 
@@ -106,6 +107,16 @@ def damping_rate(net: Network, u: Floats) -> float:
 def bounding(net: Network, method: Integrator) -> Network:
     """The network without what the method treats implicitly."""
     return net._replace(cells=net.cells[:0], bulk=net.bulk[:0]) if method.implicit_volume else net
+
+
+def at_rest(law: Law, net: Network) -> Network:
+    """The network with every spring as stiff as on the steeper side of rest.
+
+    A law with a corner there has one slope towards stretching, which counts at no strain, and one
+    towards compression; the least motion feels both. The same network without a corner.
+    """
+    below, above = stiffness_at_rest(law)
+    return net._replace(scale=net.scale * (below / above)) if below > above else net
 
 
 def largest_frequency(
@@ -167,23 +178,24 @@ class Follower:
         rate = damping_rate(self.net, u)
         if not self.bounded:
             return longest_step(self.method, 0.0, rate)
-        nodal_bounds(self.law, self.net, u, self.bound)
-        return longest_step(self.method, self._frequency(u), rate, self.net.beta)
+        net = self.net if u.any() else at_rest(self.law, self.net)
+        nodal_bounds(self.law, net, u, self.bound)
+        return longest_step(self.method, self._frequency(net, u), rate, self.net.beta)
 
     def stiffest(self) -> int:
         """The node about which the network was stiffest when last looked at."""
         return int(np.argmax(self.bound))  # NaN counts as largest
 
-    def _frequency(self, u: Floats) -> float:
+    def _frequency(self, net: Network, u: Floats) -> float:
         """Carried on from where it was found last, or found anew."""
         if self.found:
             growth = float((self.bound / self.bound_then).max())
             relief = float(self.bound.max() / self.bound_then.max())
-            turn = largest_turn(self.net, u, self.then)
+            turn = largest_turn(net, u, self.then)
             if growth < GROWTH and relief > RELIEF and turn < TURN:
                 return float(self.omega * (np.sqrt(max(growth, 1.0)) + 0.5 * turn))
         start = self.mode + self.noise
-        self.omega, self.mode = largest_frequency(self.law, self.net, u, start, RESOLVED)
+        self.omega, self.mode = largest_frequency(self.law, net, u, start, RESOLVED)
         self.bound_then, self.then = self.bound.copy(), u.copy()
         self.found += 1
         return self.omega

@@ -34,7 +34,7 @@ class LatticeStepper:
         *,
         linear: bool = False,
     ) -> None:
-        _refuse_unfit(integrator, material)
+        refuse_unfit(integrator, material)
         self.method = INTEGRATORS[integrator]
         self.law, self.factor = material.law, factor
         self.net = arrays(assembly, material, linear=linear)
@@ -74,7 +74,8 @@ class LatticeStepper:
         self.t, self.unseen = 0.0, 0
 
 
-def _refuse_unfit(integrator: str, material: Material) -> None:
+def refuse_unfit(integrator: str, material: Material) -> None:
+    """ValueError if an integrator does not suit the springs or their damping."""
     method = INTEGRATORS[integrator]
     if method.linear_only and not force_law_of(material.law).linear:
         raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.calibration import SPRING_POISSON_RATIO, lame
+from msm.calibration import LARGEST_POISSON_RATIO, SPRING_POISSON_RATIO, lame
 from msm.lattice import CORNERS, CellLattice, LatticeMesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-LARGEST_POISSON_RATIO = 0.4999
 
 
 @dataclass(frozen=True)
@@ -57,12 +55,18 @@ def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: floa
     if not SPRING_POISSON_RATIO <= poisson_ratio <= LARGEST_POISSON_RATIO:
         raise ValueError(
             f"a lattice with a volume term has Poisson ratios from {SPRING_POISSON_RATIO} to "
-            f"{LARGEST_POISSON_RATIO}, not {poisson_ratio:g}: below, the term would be negative "
-            "and a swollen body gain energy; change tissue.poisson_ratio or leave the term out"
+            f"{LARGEST_POISSON_RATIO}, not {poisson_ratio:g}: {_why(poisson_ratio)}; change "
+            "tissue.poisson_ratio or leave the term out"
         )
     first, mu = lame(youngs_modulus, poisson_ratio)
     bulk = (first - mu) * lattice.fill * lattice.spacing**3
     return VolumeTerm(lattice.cells, bulk, lattice.spacing, poisson_ratio)
+
+
+def _why(poisson_ratio: float) -> str:
+    if poisson_ratio < SPRING_POISSON_RATIO:
+        return "below, the term would be negative and a swollen body gain energy"
+    return "above, the term outweighs the springs more than 50 000 times and is not verified"
 
 
 def divergence(term: VolumeTerm, node_count: int) -> csr_array:

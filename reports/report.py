@@ -30,13 +30,18 @@ Drawing = dict[str, str] | None
 
 
 def make_report(folder: Path) -> None:
-    """Write report.pdf into a results folder; the same results give the same bytes.
+    """Write report.pdf into a results folder.
 
-    Raises ResultsError for a folder without results, or one that cannot be written.
+    Raises ResultsError for a folder without results or with some that are not whole, see
+    `study.results.folder.read`, or one that cannot be written.
     """
-    results = read(folder)
+    _replace(folder / NAME, pdf(read(folder)))
+
+
+def pdf(results: Results) -> bytes:
+    """The report of results in memory; the same results give the same bytes."""
     figures, drawing = draw(results)
-    _replace(folder / NAME, compile_pdf(document(results) | {"drawing": drawing}, figures))
+    return compile_pdf(document(results) | {"drawing": drawing}, figures)
 
 
 def draw(results: Results) -> tuple[Figures, Drawing]:

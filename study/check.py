@@ -6,28 +6,39 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from study.scene.file import read_scene
+from study.results.folder import default_folder, refuse_unwritable
+from study.scene.file import BUILT_IN, read_scene
 
 
-def describe_scene(name: str, overrides: Sequence[str]) -> list[str]:
-    """Lines on a scene: organ, loads, models and their steps. ValueError as of a run."""
+def is_scene(target: str) -> bool:
+    """Whether a name is that of a scene, and not of a mesh file."""
+    if target in BUILT_IN or target.lower().endswith(".toml"):
+        return True
+    try:
+        return not Path(target).exists()
+    except OSError:  # a name too long, which no file has
+        return True
+
+
+def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None) -> list[str]:
+    """Lines on a scene: organ, loads, models and their steps.
+
+    ValueError for whatever a run of it into the folder `out` would refuse, by the same code.
+    """
     scene = read_scene(name, overrides)
+    refuse_unwritable(out or default_folder(name))
     lines = [scene.title or name, f"models: {', '.join(scene.models)}"]
-    if scene.is_point:
-        from study.scene.problem import point_problem_of
+    from study.run.ready import ReadyPoint, ready
 
-        return [*lines, f"one control mass point of {point_problem_of(scene).mass:.4g} kg"]
-    from study.models.estimates import estimates
-    from study.models.table import is_tuned, models_of
+    given = ready(scene)
+    if isinstance(given, ReadyPoint):
+        return [*lines, f"one control mass point of {given.problem.mass:.4g} kg"]
     from study.run.dimensionless import dimensionless
-    from study.scene.problem import problem_of
 
-    problem = problem_of(scene)
-    lines += [f"note: {note}" for note in problem.geometry.notes]
-    numbers = asdict(dimensionless(scene, problem))
+    lines += [f"note: {note}" for note in given.problem.geometry.notes]
+    numbers = asdict(dimensionless(scene, given.problem))
     lines += [f"{key} = {value:.4g}" for key, value in numbers.items()]
-    models = models_of(scene, estimates(scene) if is_tuned(scene) else {})
-    described = (line for model in models for line in model.prepare(problem).describe())
+    described = (line for model in given.models.values() for line in model.describe())
     return [*lines, *dict.fromkeys(described)]
 
 

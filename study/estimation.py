@@ -6,14 +6,15 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.settings import ABSENT, LiverSettings
 from fuzzy.liver.stiffness import (
+    NORMAL_LIVER,
     PA_PER_KPA,
     UNIT,
     StiffnessEstimate,
@@ -22,12 +23,20 @@ from fuzzy.liver.stiffness import (
     patient_system,
 )
 from fuzzy.liver.system import liver_system
+from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
 
+if TYPE_CHECKING:
+    from fuzzy.systems.table import Blanks
+
 PLAUSIBLE = (parameters()["plausible_low"], parameters()["plausible_high"])
 """Readings [kPa] beyond which a unit must be wrong."""
+SHAPES = ("footprint", "footprint_factor")
+"""Settings of the type-2 sets, which are drawn and written, too."""
+ONLY_OF = dict.fromkeys((*SHAPES, "reducer"), "interval-type-2") | {"sugeno_aggregation": "sugeno"}
+"""Settings that only one of the systems has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +81,7 @@ def answer(request: EstimationRequest) -> Answer:
     for name in request.systems:
         if name not in SYSTEMS:
             raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
+    _refuse_idle(request)
     if request.inputs is not None:
         return _table(request, request.inputs)
     if request.rule_base is not None:
@@ -82,6 +92,23 @@ def answer(request: EstimationRequest) -> Answer:
                 f"{flag}: only with a table of readings; give --inputs or leave it out"
             )
     return _patient(request)
+
+
+def _refuse_idle(request: EstimationRequest) -> None:
+    """ValueError for a setting that cannot change the answer."""
+    given, systems = request.settings, request.systems or tuple(SYSTEMS)
+    drawn = SHAPES if request.figures is not None else ()
+    for key, system in ONLY_OF.items():
+        if key in given and system not in systems and key not in drawn:
+            raise ValueError(f"{_flag(key)}: only {system} has it; leave it out or add the system")
+    if given.get("sampling") == "exact" and "samples" in given:
+        raise ValueError("--samples: has no effect with exact sampling; leave it out")
+    if "absent" in given and request.inputs is None and len(request.readings) == len(AETIOLOGIES):
+        raise ValueError("--absent: no reading is absent; leave it out")
+
+
+def _flag(key: str) -> str:
+    return "--" + key.replace("_", "-")
 
 
 # --- one patient -------------------------------------------------------------------------------
@@ -159,10 +186,11 @@ def _table(request: EstimationRequest, inputs: Path) -> Answer:
     if request.out is not None:
         (kind,) = request.systems
         range_ = PLAUSIBLE if request.rule_base is None else (-np.inf, np.inf)
-        notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_)
+        blanks = _blanks(request)
+        notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_, blanks)
         lines.append(str(request.out))
     if request.explain:
-        lines += _explained(request, system, _table_row(inputs, request.row, system))
+        lines += _explained(request, *_table_row(request, inputs, system))
     return Answer(tuple(lines), notes)
 
 
@@ -189,21 +217,42 @@ def _rule_base(path: Path | None, given: Mapping[str, Any]) -> tuple[FuzzySystem
     options = {one.name for one in fields(InferenceOptions)}
     for key in given:
         if key not in options:
-            flag = "--" + key.replace("_", "-")
             raise ValueError(
-                f"{flag}: shapes the liver's rules only; leave it out with --rule-base"
+                f"{_flag(key)}: shapes the liver's rules only; leave it out with --rule-base"
             )
     return read_rule_base(path), ""
 
 
-def _table_row(inputs: Path, row: int | None, system: FuzzySystem) -> NDArray[np.float64]:
+def _blanks(request: EstimationRequest) -> Blanks | None:
+    """What a blank cell of the table means; None for a rule base that does not say."""
+    if request.rule_base is not None:
+        return None
+    from fuzzy.systems.table import Blanks
+
+    settings, normal = settings_of(request.settings), NORMAL_LIVER / PA_PER_KPA
+    return Blanks(
+        value=normal,
+        system=lambda names: patient_system(dict.fromkeys(names, normal), settings),
+        note=ABSENT[settings.absent].note.format(normal=normal),
+    )
+
+
+def _table_row(
+    request: EstimationRequest, inputs: Path, system: FuzzySystem
+) -> tuple[FuzzySystem, NDArray[np.float64]]:
+    """The system that answers for the row to explain, and its readings."""
     from fuzzy.systems.table import read_readings
 
-    X = read_readings(inputs, system)
-    number = 1 if row is None else row
+    blanks = _blanks(request)
+    X = read_readings(inputs, system, blanks=blanks is not None)
+    number = 1 if request.row is None else request.row
     if not 1 <= number <= len(X):
         raise ValueError(f"--row {number}: the table has rows 1 to {len(X)}")
-    return np.asarray(X[number - 1])
+    x = np.asarray(X[number - 1])
+    if blanks is None or not np.isnan(x).any():
+        return system, x
+    named = (one.name for one, value in zip(system.inputs, x, strict=True) if np.isfinite(value))
+    return blanks.system(tuple(named)), np.where(np.isnan(x), blanks.value, x)
 
 
 # --- figures and rule bases --------------------------------------------------------------------
@@ -229,6 +278,15 @@ def _draw(
         yield str(path)
 
 
+def _refuse_idle_rules(given: Mapping[str, Any], out: Path | None) -> None:
+    """ValueError for a setting that neither the audit nor the file depends on."""
+    if "absent" in given:
+        raise ValueError("--absent: is of a patient, not of the rules; leave it out")
+    for key in SHAPES:
+        if key in given and (out is None or out.suffix.lower() == ".fis"):
+            raise ValueError(f"{_flag(key)}: only a .json file holds it; leave it out or write one")
+
+
 def rule_base_lines(
     path: Path | None, given: Mapping[str, Any], out: Path | None, *, sugeno: bool
 ) -> Sequence[str]:
@@ -238,6 +296,7 @@ def rule_base_lines(
     from fuzzy.systems.files import write_rule_base
 
     system, _ = _rule_base(path, given)
+    _refuse_idle_rules(given, out)
     if out is None:
         if sugeno:
             raise ValueError("--sugeno: only with --out; constants are no part of the audit")

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
+from fem_reference.elements import chosen_element
 from fem_reference.exchange import calculix
 from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
-from fem_reference.memory import SHARE, available, needed
+from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.model import Method
 from fem_reference.solvers import solve_static
 from study.folders import replacing
@@ -108,10 +109,9 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
 
 
 def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
-    scene, (body, problem) = target.scene, _discretised(target, progress)
+    scene, (body, problem) = target.scene, _discretised(target, progress, steps=True)
     given = nodal_problem(body, scene.tissue, problem.foundation)
     motion = motion_of(scene, problem)
-    _check_memory(body)
     theirs = integrated(body, scene.tissue)
     with progress.stage("at rest under full load"):
         rest, own_rest = solve_static(theirs), solve_static(body)
@@ -128,22 +128,31 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
     _write(folder, files | {MARK: _about_calculix(scene, given, motion, differences)})
 
 
-def _check_memory(body: Body) -> None:
+def _check_memory(level: Level, scene: Scene) -> None:
     """Steps in time factor the matrix, here and in CalculiX."""
-    wanted, limit = needed(body.unknowns, body.element, stepping=True), SHARE * available()
+    element = chosen_element(scene.reference.element, scene.tissue.poisson_ratio)
+    count = unknowns(level.mesh, element)
+    wanted, limit = needed(count, element, stepping=True), SHARE * available()
     if wanted > limit:
         raise ValueError(
-            f"reference.element_size: {body.unknowns} unknowns stepped in time need "
+            f"reference.element_size: {count} unknowns stepped in time need "
             f"{wanted / 2**30:.1f} GiB of {limit / 2**30:.1f}; enlarge it, or export to vtu"
         )
 
 
-def _discretised(target: _Target, progress: Progress) -> tuple[Body, Problem]:
+def _discretised(
+    target: _Target, progress: Progress, *, steps: bool = False
+) -> tuple[Body, Problem]:
+    """The body and its problem; ValueError before it is assembled, for `steps` in time too."""
     with progress.stage("organ"):
         problem = problem_of(target.scene)
         level = _level(problem, target.elements)
+        prepared = reference_of(target.scene).prepare(problem)
+        prepared.refuse()
+        if steps:
+            _check_memory(level, target.scene)
     with progress.stage("assembly"):
-        return reference_of(target.scene).prepare(problem).body(level), problem
+        return prepared.body(level), problem
 
 
 def _level(problem: Problem, elements: int | None) -> Level:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Iterator
@@ -32,7 +33,8 @@ from study.results.records import (
     SystemEstimate,
 )
 from study.results.tables import BandSample, CurveSample, FieldDifference, SimilarityScore
-from study.scene.schema import Place, Scene, Tissue
+from study.scene.file import write_scene
+from study.scene.schema import Fuzzy, Place, Scene, Time, Tissue
 from study.similarity.score import MEASURES
 
 TITLE = "An octahedron under a tool"
@@ -71,9 +73,10 @@ def results_of(
 ) -> Results:
     """Results of these models and control points."""
     models, probes = models or MODELS, probes or PROBES
+    scene = _scene(models, probes, title)
     return Results(
-        _scene(probes, title),
-        _record(models, probes, title),
+        scene,
+        _record(models, probes, scene),
         curves=tuple(row for m in models for p in probes for row in _curve(m, p)),
         bands=tuple(row for p in probes if FUZZY[2] in models for row in _band(p)),
         scores=tuple(row for pair in _pairs(models) for p in probes for row in _scores(pair, p)),
@@ -81,6 +84,11 @@ def results_of(
         fields=_fields(models, len(probes)),
         fuzzy=_fuzzy_arrays(),
     )
+
+
+def whole() -> Results:
+    """Results that a folder may hold: without fuzzy systems, whose views the samples lack."""
+    return replace(results_of(["fem", "basafa"]), fuzzy={})
 
 
 def with_record(results: Results, **changes: Any) -> Results:
@@ -132,22 +140,30 @@ def printed(content: dict[str, Any]) -> list[str]:
     return [json.loads(piece) for piece in TEXT.findall(text)]
 
 
-def _scene(probes: list[str], title: str) -> Scene:
+def _scene(models: list[str], probes: list[str], title: str) -> Scene:
     return Scene(
         title=title,
+        models=tuple(dict.fromkeys("msm" if model in FUZZY else model for model in models)),
+        fuzzy=Fuzzy(systems=tuple(_systems(models)), sensitivity_readings=0),
+        time=Time(duration=1.0, samples=SAMPLES),
         tissue=Tissue(youngs_modulus=10e3),
         control_points=dict.fromkeys(probes, Place(side="anterior", at=(0.5, 0.5))),
     )
 
 
-def _record(models: list[str], probes: list[str], title: str) -> StudyRecord:
+def _systems(models: list[str]) -> list[str]:
+    return [model[4:] for model in models if model in FUZZY]
+
+
+def _record(models: list[str], probes: list[str], scene: Scene) -> StudyRecord:
     return StudyRecord(
-        title=title,
+        title=scene.title,
         probes=tuple(probes),
         fuzzy=FuzzyRecord(
-            systems={m[4:]: _estimate(m[4:]) for m in models if m in FUZZY}, rule_count=247
+            systems={system: _estimate(system) for system in _systems(models)}, rule_count=247
         ),
         models=tuple(model_record(model, probes) for model in models),
+        references=tuple(name for name in ("fem", "basafa") if name in models),
         checks=(
             Check(name="mass", value=0.01, limit=0.05, meaning="of the organ"),
             Check(name="step", value=0.02, limit=0.01, meaning="of time"),
@@ -163,7 +179,7 @@ def _record(models: list[str], probes: list[str], title: str) -> StudyRecord:
             platform="Linux",
             processor=None,
             seed=None,
-            scene_sha256=64 * "a",
+            scene_sha256=hashlib.sha256(write_scene(scene).encode()).hexdigest(),
             mesh_sha256=None,
         ),
         dimensionless=Dimensionless(

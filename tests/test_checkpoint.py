@@ -292,6 +292,59 @@ def test_a_damaged_state_is_refused(keep, tmp_path):
         go(press(), checkpoint=point)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_state_with_another_bit_somewhere_is_refused(seed, tmp_path):
+    """Or it is one that nothing depends on, as the date in a zip, and what is read is the same."""
+    path, rng = tmp_path / "state.npz", np.random.default_rng(seed)
+    arrays = {"u": rng.standard_normal((4, 3)), "t": np.asarray(0.1)}
+    states.write(path, "this", arrays)
+    data = bytearray(path.read_bytes())
+    data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+    path.write_bytes(data)
+    try:
+        found = states.read(path, "this")
+    except ValueError as error:
+        assert "run without --resume" in str(error)  # noqa: PT017 - either is right
+    else:
+        assert all(np.array_equal(found[name], array) for name, array in arrays.items())
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"[]", b"PK\x03\x04", b"\x93NUMPY\x01\x00", "array", "object"]
+)
+def test_a_file_that_is_no_state_is_refused(content, tmp_path):
+    path = tmp_path / "state.npz"
+    if content == "array":
+        with path.open("wb") as file:
+            np.save(file, np.zeros(3))
+    elif content == "object":
+        np.savez(path, identity=np.array({"a": 1}, dtype=object))
+    else:
+        path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"state\.npz: damaged state.*without --resume"):
+        states.read(path, "this")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda arrays: arrays | {"u": arrays["u"] + 1e-12},
+        lambda arrays: arrays | {"u": arrays["u"].T},
+        lambda arrays: {"t": arrays["t"]},
+        lambda arrays: arrays | {"v": arrays["u"]},
+    ],
+)
+def test_a_state_that_was_edited_is_refused(change, tmp_path):
+    """With the name of the run that it was of."""
+    path = tmp_path / "state.npz"
+    states.write(path, "this", {"u": np.ones((4, 3)), "t": np.asarray(0.1)})
+    with np.load(path) as file:
+        marks = {name: file[name] for name in (states.IDENTITY, states.DIGEST)}
+    np.savez(path, **marks, **change(states.read(path, "this")))
+    with pytest.raises(ValueError, match=r"damaged state of a run \(its arrays"):
+        states.read(path, "this")
+
+
 def test_a_failure_while_writing_leaves_the_state_before(tmp_path, monkeypatch):
     point = Checkpoint(tmp_path / "state.npz", seconds=0.0, resume=True)
     go(press(), checkpoint=point)

@@ -16,9 +16,10 @@ from study import export as exporting
 from study.commands import app
 from study.export import ExportRequest, export
 from study.progress import Silent
-from study.results.folder import Results, write
+from study.results.folder import write
 from study.results.records import ElementsRecord
 from tests.oracles.cases import build, ramp
+from tests.report_samples import with_model
 
 SMALL = ('organ.size=["60 mm", "40 mm", "30 mm"]', "tool.radius=15 mm", "tool.force=0.05 N")
 QUICK = (*SMALL, "reference.element_size=20 mm", "time.samples=17")
@@ -224,9 +225,8 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path):
 def results_of(results, elements, folder):
     """A results folder of a reference with so many elements."""
     used = ElementsRecord(element="p2", elements=elements, unknowns=1, method="ritz-vectors")
-    model = replace(results.model("fem"), elements=used)
     folder.mkdir()
-    write(Results(results.scene, replace(results.record, models=(model,))), folder)
+    write(with_model(results, "fem", elements=used), folder)
     return ExportRequest(target=str(folder), to="vtu")
 
 

@@ -138,6 +138,26 @@ def test_frames_before_the_one_that_a_run_continues_from_must_be_there(tmp_path)
         frames.write(3, *motion(mesh, 3))
 
 
+@pytest.mark.parametrize("damage", ["cut", "altered"])
+def test_frames_that_are_not_as_they_were_written_are_not_carried_on(damage, tmp_path):
+    """Of four, the third: two are left to go on from."""
+    mesh, path = cube_lattice(), tmp_path / "raw"
+    frames = Frames(path, len(mesh.points))
+    with frames.file:
+        for sample in range(4):
+            frames.write(sample, *motion(mesh, sample))
+    data = bytearray(path.read_bytes())
+    at = len(data) // 4 * 2 + 100
+    path.write_bytes(data[:at] if damage == "cut" else data[:at] + b"\xff" + data[at + 1 :])
+    frames = Frames(path, len(mesh.points), resume=True)
+    with frames.file:
+        assert frames.count == 2
+        u, v = motion(mesh, 1)
+        np.testing.assert_array_equal(frames.read(1)["velocity"], v)
+        with pytest.raises(ValueError, match=r"2 samples, .* or are damaged; run without --resume"):
+            frames.write(3, u, v)
+
+
 def test_without_resume_old_frames_are_dropped(tmp_path):
     mesh = tetrahedra()
     record(tmp_path, mesh, range(3), np.arange(3.0))

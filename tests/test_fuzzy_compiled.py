@@ -75,6 +75,8 @@ def parameters_of(kind, rng):
         "psigmf": (slopes[0], corners[0], slopes[1], corners[3]),
         "zmf": (corners[1], corners[2]),
         "smf": (corners[1], corners[2]),
+        "linzmf": (corners[1], corners[2]),
+        "linsmf": (corners[1], corners[2]),
     }[kind]
 
 

@@ -100,6 +100,8 @@ def drawn_set(rng):
         "psigmf": (abs(slopes[0]), centre, -abs(slopes[1]), centre + width[0]),
         "zmf": rising[:2],
         "smf": rising[:2],
+        "linzmf": rising[:2],
+        "linsmf": rising[:2],
     }.get(kind, rising)
     moved = rng.uniform(0, 0.1) if kind not in ("dsigmf", "psigmf") else 0.0
     widened = rng.uniform(0, 0.5) if kind not in ("dsigmf", "psigmf", "sigmf") else 0.0

@@ -191,6 +191,13 @@ def test_the_file_written_is_the_file_read(tipper):
     assert fis_text(tipper) == TIPPER
 
 
+def _beside(text, sets):
+    """The tipper's file with a second output, which no rule names."""
+    another = "[Output2]\nName='service charge'\nRange=[0 1]\n" + sets + "\n[Rules]"
+    text = text.replace("NumOutputs=1", "NumOutputs=2").replace("[Rules]", another)
+    return re.sub(r"(\d, \d) \(", r"\1 0 (", text)
+
+
 QUIRKS = {
     "byte order mark": lambda text: b"\xef\xbb\xbf" + text.encode(),
     "Windows line ends": lambda text: text.replace("\n", "\r\n"),
@@ -215,6 +222,21 @@ QUIRKS = {
         + text[text.index("[Rules]") :]
     ),
     "zeros filling parameters up": lambda text: text.replace("[1.5 0]", "[1.5 0 0 0]"),
+    "double quotes": lambda text: text.replace("'", '"'),
+    "statements of MATLAB": lambda text: text.replace("[0 10]\n", "[0 10];\n"),
+    "kinds in capitals": lambda text: text.replace("'gaussmf'", "'GaussMF'"),
+    "keys in capitals": lambda text: text.replace("Range=", "RANGE=").replace("MF1=", "mf1="),
+    "expressions": lambda text: text.replace("[1.5 0]", "[3/2 sqrt(4) - 2]").replace(
+        "[5 ", "[(1 + 2) * 2 - 1 "
+    ),
+    "a count with decimals": lambda text: text.replace("NumMFs=2", "NumMFs=2.0"),
+    "an output without sets": lambda text: _beside(text, "NumMFs=0\n"),
+    "an output that no rule names": lambda text: _beside(
+        text, "NumMFs=1\nMF1='all':'trimf',[0 1 2]\n"
+    ),
+    "a rule that names no output": lambda text: (
+        text.replace("Rules=3", "Rules=4") + "1 1, 0 (1) : 1\n"
+    ),
 }
 
 
@@ -226,6 +248,39 @@ def test_quirks_of_real_files_are_read(read, tipper, quirk):
 def test_names_may_hold_blanks_percent_and_number_signs(read):
     system = read(TIPPER.replace("'poor'", "'poor # 100 % '"))
     assert system.inputs[0].sets[0].name == "poor # 100 % "
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("'chef''s choice'", "chef's choice"),
+        ("'chef's choice'", "chef's choice"),
+        ('"chef\'s choice"', "chef's choice"),
+        ("'say \"hi\"'", 'say "hi"'),
+        ("'a [b], (c) : d'", "a [b], (c) : d"),
+    ],
+)
+def test_names_may_hold_quotes_brackets_and_commas(read, written, name):
+    system = read(TIPPER.replace("'poor'", written).replace("'tipper'", written))
+    assert (system.name, system.inputs[0].sets[0].name) == (name, name)
+
+
+def test_names_in_latin_1_are_read(read):
+    for encoding in ("utf-8", "latin-1"):
+        system = read(TIPPER.replace("poor", "mäßig").encode(encoding))
+        assert system.inputs[0].sets[0].name == "mäßig"
+
+
+def test_two_outputs_that_rules_name_are_refused(read):
+    text = _beside(TIPPER, "NumMFs=1\nMF1='all':'trimf',[0 1 2]\n")
+    with pytest.raises(FisError, match=r"fis:37: a second output that rules name; write one file"):
+        read(text.replace("1 1, 1 0", "1 1, 1 1"))
+
+
+def test_one_output_of_two_may_be_the_second(read, tipper):
+    first = "[Output1]\nName='x'\nRange=[0 1]\nNumMFs=0\n\n[Output2]"
+    text = TIPPER.replace("NumOutputs=1", "NumOutputs=2").replace("[Output1]", first)
+    assert read(re.sub(r", (\d) \(", r", 0 \1 (", text)) == tipper
 
 
 def test_negation_weight_and_connective_are_read(read):
@@ -263,6 +318,16 @@ def test_linear_consequents_are_read(read):
     assert infer(alone, X, "sugeno").value == pytest.approx([35.0], abs=1e-12)
 
 
+def test_zeros_filling_consequents_up_are_dropped(read):
+    padded = read(
+        SUGENO.replace("'constant',[25]", "'linear',[2 -0.5 20 0]").replace("[5]", "[5 0 0 0]")
+    )
+    plain = read(SUGENO.replace("'constant',[25]", "'linear',[2 -0.5 20]"))
+    assert padded == plain
+    with pytest.raises(FisError, match="a constant takes 1 parameter"):
+        read(SUGENO.replace("'constant',[5]", "'constant',[5 1]"))
+
+
 # --- .fis: what is refused --------------------------------------------------------------------
 
 REFUSALS = {
@@ -276,10 +341,21 @@ REFUSALS = {
     "a type-2 set": ("MF1='poor'", "MF1U='poor'", 18, "MF1U belongs to a type-2 system"),
     "a type-2 kind": ("'gaussmf',[1.5 0]", "'gaussmftype2',[1 0 2 0]", 18, "type-2 system"),
     "another type": ("'mamdani'", "'tsukamoto'", 3, "'tsukamoto': use mamdani or sugeno"),
-    "an aggregation": ("AggMethod='max'", "AggMethod='sum'", 11, "aggregation 'sum' .* set max"),
-    "a defuzzification": ("'centroid'", "'mom'", 12, "defuzzification 'mom' .* set centroid"),
-    "an operator": ("OrMethod='max'", "OrMethod='sum'", 9, "disjunction 'sum': use one of max"),
-    "two outputs": ("[Rules]", "[Output2]\n[Rules]", 37, "a second output; write one file"),
+    "an aggregation of one's own": (
+        "AggMethod='max'",
+        "AggMethod='joined'",
+        11,
+        "aggregation 'joined': functions of one's own .* use one of max, sum, probor",
+    ),
+    "Octave's own": (
+        "AggMethod='max'",
+        "AggMethod='einstein_sum'",
+        11,
+        "'einstein_sum': .* Octave",
+    ),
+    "a defuzzification": ("'centroid'", "'peak'", 12, "'peak': functions .* use one of centroid"),
+    "Sugeno's average": ("'centroid'", "'wtaver'", 12, "'wtaver': .* use one of centroid"),
+    "an operator": ("OrMethod='max'", "OrMethod='sum'", 9, "'sum': .* use one of max, probor"),
     "the number of outputs": ("NumOutputs=1", "NumOutputs=2", 6, "NumOutputs is 2, .* are 1"),
     "the number of inputs": ("NumInputs=2", "NumInputs=3", 5, "NumInputs is 3, .* are 2 inputs"),
     "the number of rules": ("NumRules=3", "NumRules=4", 7, "NumRules is 4, .* are 3 rules"),
@@ -301,11 +377,16 @@ REFUSALS = {
     "a range of one number": ("Range=[0 30]", "Range=[0]", 31, r"give two numbers, \[low high\]"),
     "a range without brackets": ("Range=[0 30]", "Range=0 30", 31, r"one pair of \[ \]"),
     "a range upside down": ("Range=[0 30]", "Range=[30 0]", 29, "low 30.0 must be below 0.0"),
-    "an expression": ("Range=[0 30]", "Range=[0 pi]", 31, "'pi' is no finite number"),
+    "an unknown word": ("Range=[0 30]", "Range=[0 tip]", 31, "'tip' is no finite number"),
+    "an expression of a variable": ("Range=[0 30]", "Range=[0 3*x]", 31, r"'3\*x' is no finite"),
+    "a division by 0": ("Range=[0 30]", "Range=[0 1/0]", 31, "'1/0' is no finite number"),
+    "an open parenthesis": ("Range=[0 30]", "Range=[0 (3]", 31, r"a \( without its \)"),
+    "a closed parenthesis": ("Range=[0 30]", "Range=[0 3)]", 31, r"a \) without its \("),
+    "no width": ("Range=[0 30]", "Range=[9 9]", 1, "universe 9 to 9 has no width"),
     "an unwritten number": ("[1.5 0]", "[NaN 0]", 18, "'NaN' is no finite number"),
-    "a number beyond doubles": ("[1.5 0]", "[1.5 1e999]", 18, "give finite numbers"),
+    "a number beyond doubles": ("[1.5 0]", "[1.5 1e999]", 18, "'1e999' is no finite number"),
     "an underscore": ("[1.5 0]", "[1_5 0]", 18, "'1_5' is no finite number"),
-    "an unknown kind": ("'gaussmf',[1.5 0]", "'rampmf',[1 0]", 18, "kind 'rampmf'; use gaussmf"),
+    "an unknown kind": ("'gaussmf',[1.5 0]", "'rampmf',[1 0]", 18, "'rampmf' is none of MATLAB's"),
     "a parameter too few": ("[1.5 0]", "[1.5]", 18, r"takes 2 parameters \(sd, centre\), got 1"),
     "a parameter too many": ("[1.5 0]", "[1.5 0 7]", 18, "takes 2 parameters .* got 3"),
     "a shapeless set": ("[0 5 10]", "[5 0 10]", 33, "do not form a trimf"),
@@ -319,7 +400,7 @@ REFUSALS = {
     "a rule too short": ("1 1, 1 (1) : 2", "1, 1 (1) : 2", 38, "2 sets for 2 inputs .* give 3"),
     "a set that is not there": ("1 1, 1", "1 3, 1", 38, "set 3 of 'food', which has 2"),
     "a consequent not there": ("1 1, 1", "1 1, 4", 38, "set 4 of 'tip', which has 3"),
-    "a negated consequent": ("1 1, 1", "1 1, -1", 38, "consequent -1: give the number"),
+    "a negated consequent": ("1 1, 1", "1 1, -1", 38, "consequent -1: NOT on the output"),
     "no antecedent": ("1 1, 1", "0 0, 1", 38, "the rule uses no input"),
     "a hedge": ("1 1, 1", "1.3 1, 1", 38, "1.3: hedges, Octave's decimals, are not computed"),
     "a weight above 1": ("1 1, 1 (1)", "1 1, 1 (1.5)", 38, "rule weight 1.5"),
@@ -357,8 +438,8 @@ def test_a_missing_section_is_named(read, section):
 def test_a_file_that_cannot_be_read_is_named(tmp_path, read):
     with pytest.raises(FisError, match=r"none\.fis: cannot be read \(No such file"):
         read_fis(tmp_path / "none.fis")
-    with pytest.raises(FisError, match=r"rules\.fis: is not UTF-8 text"):
-        read(TIPPER.encode().replace(b"poor", b"m\xe4\xdfig"))
+    with pytest.raises(FisError, match=r"rules\.fis: is UTF-16 text; save it as UTF-8"):
+        read(TIPPER.encode("utf-16"))
 
 
 def test_what_a_fis_file_cannot_hold_is_not_written(tmp_path, tipper):
@@ -492,7 +573,7 @@ FLAWS = {
     "a weight in quotes": (("rules", 0, "weight"), "1", r"weight: \"1\" is no number"),
     "a weight that is true": (("rules", 0, "weight"), True, "weight: true is no number"),
     "an operator": (("operators", "conjunction"), "product", "operators: conjunction 'product'"),
-    "an unknown operator": (("operators", "aggregation"), "max", "unknown key 'aggregation'"),
+    "an unknown operator": (("operators", "negation"), "max", "unknown key 'negation'"),
     "a range": (("output", "low"), 40, "output: variable 'tip': low 40.0 must be below 30.0"),
     "a name": (("output", "name"), 7, r"output\.name: 7.0 is no text; put it in quotes"),
     "a kind": (("inputs", 1, "sets", 0, "kind"), "trapez", r"inputs\[1\]\.sets\[0\]: .*'trapez'"),
@@ -561,7 +642,9 @@ def table(tmp_path):
         source.write_bytes(text if isinstance(text, bytes) else text.encode())
         notes = evaluate_table(system, source, target, kind, options)
         with target.open(newline="", encoding="utf-8") as file:
-            return notes, list(csv.reader(file))
+            parted = next((one for one in ";\t" if one in file.readline()), ",")
+            file.seek(0)
+            return notes, list(csv.reader(file, delimiter=parted))
 
     return evaluate
 
@@ -591,18 +674,53 @@ def test_type_2_adds_the_ends_of_its_interval(table, tipper):
         "service, food\n 2 , 1\n",
         "\nservice,food\n\n2,1\n\n",
         '"service","food"\n"2","1e0"',
+        "service;food\r\n2;1\r\n",
+        "service;food\n2,0;1\n;\n\n",
+        "sep=;\r\nservice;food\r\n2,0;1,0\r\n",
+        '"service"\t"food"\n"2,0"\t1\n',
+        b"\xef\xbb\xbfservice;food;;\r\n2;1;;\r\n;;;\r\n",
+        "service,food,,\n2,1,,\n,,,\n\n",
+        "service,food\n2,1,\n",
     ],
 )
 def test_quirks_of_spreadsheets_are_read(table, tipper, text):
     _, rows = table(tipper, text)
-    assert [f"{float(row[-1]):.4f}" for row in rows[1:]] == MATLABS_TIPS[:1]
+    assert [f"{float(row[-1].replace(',', '.')):.4f}" for row in rows[1:]] == MATLABS_TIPS[:1]
+
+
+def test_a_table_of_another_locale_is_answered_in_its_own(tmp_path, tipper):
+    source, target = tmp_path / "in.csv", tmp_path / "out.csv"
+    source.write_text("food;guest;service\n1;Ada, Countess;2,0\n5;Alan;4\n")
+    evaluate_table(tipper, source, target, "mamdani")
+    header, *lines = target.read_text().splitlines()
+    assert header == "food;guest;service;estimate"
+    tips = infer(tipper, READINGS, "mamdani").value.tolist()
+    expected = [repr(tip).replace(".", ",") for tip in tips]
+    assert lines == [f"1;Ada, Countess;2,0;{expected[0]}", f"5;Alan;4;{expected[1]}"]
+    # Columns that are no readings say nothing about the readings' decimals.
+    source.write_text("food;guest;service\n1;Ada, Countess;2\n")
+    evaluate_table(tipper, source, target, "mamdani")
+    answer = target.read_text().splitlines()[1].split(";")[-1]
+    assert float(answer) == pytest.approx(tips[0], rel=1e-12)
 
 
 TABLE_FLAWS = {
     "no such column": ("service,Food\n1,2", 1, "no column 'food' among .* did you mean 'Food'"),
     "no column alike": ("service,x\n1,2", 1, "no column 'food' among 'service', 'x'; add it"),
     "a column twice": ("food,service,food\n1,2,3", 1, "column 'food' stands there twice"),
-    "semicolons": ("service;food\n1;2", 1, "parted by semicolons"),
+    "decimal commas between commas": (
+        'service,food\n"1,5",2',
+        2,
+        "service: '1,5' is no number; write a point, or part columns by semicolons",
+    ),
+    "points beside decimal commas": (
+        "service;food\n1,5;2\n1.234;3",
+        3,
+        "service: '1.234' stands beside decimal commas",
+    ),
+    "groups of thousands": ("service;food\n1.234,5;2", 2, "'1.234,5' stands beside"),
+    "two decimal commas": ("service;food\n1,234,5;2", 2, "'1,234,5' is no number"),
+    "a decimal comma in one column": ("service\n2,5", 2, "2 cells under 1 columns"),
     "an estimate already": ("service,food,estimate\n1,2,3", 1, "a column 'estimate' already"),
     "a word": ("service,food\n1,2\n3,abc", 3, "food: 'abc' is no number"),
     "an empty cell": ("service,food\n1,2\n\n,3", 4, "service: the cell is empty"),

@@ -310,10 +310,12 @@ def test_incomplete_systems_are_refused():
     system = narrow()
     with pytest.raises(ValueError, match="no rules"):
         FuzzySystem(system.inputs, system.output, ())
-    with pytest.raises(ValueError, match="no set"):
-        Variable("x", 0, 1, ())
+    with pytest.raises(ValueError, match="output 'y': has no set"):
+        FuzzySystem(system.inputs, Variable("y", 0, 1, ()), system.rules)
     with pytest.raises(ValueError, match="must be below"):
-        Variable("x", 1, 1, system.output.sets)
+        Variable("x", 2, 1, system.output.sets)
+    with pytest.raises(ValueError, match=r"1 to 1 has no width.* centroid .* widen it"):
+        FuzzySystem(system.inputs, Variable("y", 1, 1, system.output.sets), system.rules)
     with pytest.raises(ValueError, match="share a name"):
         Variable("x", 0, 1, system.output.sets * 2)
     with pytest.raises(ValueError, match="name of its own"):

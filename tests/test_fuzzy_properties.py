@@ -120,6 +120,8 @@ def fuzzy_sets(draw):
         "gbellmf": (steps[0], steps[1], corners[0]),
         "zmf": corners[:2],
         "smf": corners[:2],
+        "linzmf": corners[:2],
+        "linsmf": corners[:2],
     }.get(kind, corners)
     footprint = Footprint(draw(st.floats(0, 2)), draw(st.floats(0, 0.8)))
     return FuzzySet("s", kind, parameters, footprint)

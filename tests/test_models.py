@@ -283,6 +283,14 @@ def test_a_model_that_keeps_no_fields_says_so_where_they_are_wanted(small_scene,
     assert not ready.run(SILENT).notes
 
 
+def test_a_superposition_beyond_small_strain_is_warned_about():
+    words = ('models=["superposition"]', "superposition.count=2", "time.samples=33")
+    for force, warned in (("0.01 N", False), ("1 N", True)):
+        found = run_study(read_scene("block", (*SMALL, *words, f"tool.force={force}")))
+        texts = [text for text in found.record.warnings if "superposition, which is linear" in text]
+        assert bool(texts) is warned
+
+
 def test_a_superposition_in_a_scene_has_record_scores_and_an_error_by_steps():
     words = ('models=["fem", "superposition"]', "superposition.count=6")
     scene = read_scene("block", (*SMALL, *WAVE, "time.samples=33", *words))
@@ -291,6 +299,7 @@ def test_a_superposition_in_a_scene_has_record_scores_and_an_error_by_steps():
     assert record.elements.method == "ritz"
     assert record.elements.subspace_vectors == 6
     assert record.elements.unknowns == found.model("fem").elements.unknowns
+    assert record.largest_strain == pytest.approx(found.model("fem").largest_strain, rel=0.05)
     scored = [row for row in found.scores if row.model == "superposition"]
     assert len(scored) == 2 * 7  # control points and measures
     assert {row.reference for row in scored} == {"fem"}

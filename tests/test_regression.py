@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from study.results import manifest
 from study.results.folder import MARK, read, write
 from study.run.study import run_study
 from tests import kept_results
@@ -239,6 +240,7 @@ def test_results_of_a_checkout_with_changes_are_not_believed(left, commit):
     folder, made_by, before = left
     path = folder / MARK
     path.write_text(path.read_text().replace(json.dumps(made_by.commit), json.dumps(commit)))
+    manifest.write(folder, manifest.digests(folder))
     os.utime(path, (before + 1e3, before + 1e3))
     now = dataclasses.replace(made_by, commit=commit)
     assert origin(read(folder))[0] == now

@@ -29,6 +29,7 @@ from tests.report_samples import (
     MODELS,
     TITLE,
     results_of,
+    whole,
     with_elements,
     with_model,
     with_record,
@@ -53,36 +54,37 @@ def _quick(monkeypatch, of_no_run):
     )
 
 
-def pdf_of(results: Results, folder: Path) -> bytes:
+def kept(folder: Path) -> bytes:
+    """The report of whole results in a folder."""
     folder.mkdir()
-    write(results, folder)
+    write(whole(), folder)
     report.make_report(folder)
     return (folder / "report.pdf").read_bytes()
 
 
 def test_a_second_report_is_the_same_byte_by_byte(tmp_path):
-    first = pdf_of(results_of(), tmp_path / "a")
+    first = kept(tmp_path / "a")
     report.make_report(tmp_path / "a")
     assert first.startswith(b"%PDF")
     assert (tmp_path / "a" / "report.pdf").read_bytes() == first
 
 
 def test_another_process_makes_the_same_bytes(tmp_path):
-    first = pdf_of(without_arrays(), tmp_path / "a")
-    code = "import sys, pathlib; from reports.report import make_report; "
-    code += "make_report(pathlib.Path(sys.argv[1]))"
+    first = kept(tmp_path / "a")
+    code = "import sys, pathlib; from reports import renders; renders.WINDOWS = (); "
+    code += "from reports.report import make_report; make_report(pathlib.Path(sys.argv[1]))"
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "a")], check=True, cwd=ROOT)
     assert (tmp_path / "a" / "report.pdf").read_bytes() == first
 
 
-def test_other_numbers_make_other_bytes(tmp_path):
+def test_other_numbers_make_other_bytes():
     """Negative control of the two tests above."""
     results = without_arrays()
     fuzzy = results.record.fuzzy
     sugeno = replace(fuzzy.systems["sugeno"], estimate_pa=1.01 * 12e3)
     fuzzy = replace(fuzzy, systems=fuzzy.systems | {"sugeno": sugeno})
     other = with_record(results, fuzzy=fuzzy)
-    assert pdf_of(results, tmp_path / "a") != pdf_of(other, tmp_path / "b")
+    assert report.pdf(results) != report.pdf(other)
 
 
 def test_a_folder_without_results_is_refused(tmp_path):
@@ -102,7 +104,7 @@ def test_results_of_an_older_schema_are_refused_with_their_version_and_the_remed
 
 def test_a_report_that_fails_leaves_the_earlier_one(tmp_path, monkeypatch):
     folder = tmp_path / "a"
-    first = pdf_of(without_arrays(), folder)
+    first = kept(folder)
     names = sorted(path.name for path in folder.iterdir())
     broken = report.template() + b"\nSee @nowhere.\n"
     monkeypatch.setattr(report, "template", lambda: broken)
@@ -117,46 +119,46 @@ def test_a_folder_that_cannot_be_written_is_said_so(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / "a").mkdir()
-    write(without_arrays(), tmp_path / "a")
+    write(whole(), tmp_path / "a")
     monkeypatch.setattr(report.tempfile, "mkstemp", refuse)
     with pytest.raises(ResultsError, match=r"report.pdf: cannot be written \(Permission denied\)"):
         report.make_report(tmp_path / "a")
 
 
 @pytest.mark.parametrize("models", [["fem"], ["basafa"], ["fem", "basafa"], FUZZY, FUZZY[:1]])
-def test_models_may_be_missing(models, tmp_path):
-    assert pdf_of(without_arrays(results_of(models)), tmp_path / "a")
+def test_models_may_be_missing(models):
+    assert report.pdf(without_arrays(results_of(models)))
 
 
 @pytest.mark.parametrize("models", [["fem"], ["basafa", "msm-sugeno"]])
-def test_fields_of_some_models_are_drawn(models, tmp_path):
-    assert pdf_of(replace(results_of(models), fuzzy={}), tmp_path / "a")
+def test_fields_of_some_models_are_drawn(models):
+    assert report.pdf(replace(results_of(models), fuzzy={}))
 
 
-def test_what_only_some_scenes_have_may_be_missing(tmp_path):
+def test_what_only_some_scenes_have_may_be_missing():
     results = without_arrays(with_elements(mesh_error=None))
     nothing = {"time_step_s": None, "critical_time_step_s": None, "steps": None, "wall_s": None}
     for name in MODELS:
         results = with_model(results, name, time_step_errors={}, **nothing)
     results = with_record(results, lattice_limits=None, dimensionless=None)
     results = with_record(results, checks=(), notes=(), assumptions=())
-    assert pdf_of(results, tmp_path / "a")
+    assert report.pdf(results)
 
 
 @pytest.mark.parametrize(("count", "left_out"), [(1, 0), (4, 2)])
-def test_control_points_may_be_few_or_many(count, left_out, tmp_path, monkeypatch):
+def test_control_points_may_be_few_or_many(count, left_out, monkeypatch):
     monkeypatch.setattr(motion_figures, "PROBES_PER_FIGURE", 1)
     monkeypatch.setattr(motion_figures, "MOST_PROBES", 2)
     results = without_arrays(results_of(probes=[f"point-{i}" for i in range(count)]))
-    assert pdf_of(results, tmp_path / "a")
+    assert report.pdf(results)
     assert document(results)["probes_left_out"] == left_out
 
 
-def test_names_and_titles_are_inert_whatever_they_hold(tmp_path):
+def test_names_and_titles_are_inert_whatever_they_hold():
     """Typst's and matplotlib's markup, scripts without a glyph, a word longer than the page."""
     nasty = '#import "x" $ * _ @nowhere <b> & \\frac{ $x_{ 肝臓 \x07 --> ' + 400 * "w"
     results = with_record(results_of(probes=[nasty], title=nasty), warnings=(nasty,))
-    assert pdf_of(replace(results, fuzzy={}), tmp_path / "a")
+    assert report.pdf(replace(results, fuzzy={}))
 
 
 def diverged(late: bool) -> Results:
@@ -184,9 +186,9 @@ def diverged(late: bool) -> Results:
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_a_model_that_diverged_is_shown_so_and_has_no_score(late, tmp_path):
+def test_a_model_that_diverged_is_shown_so_and_has_no_score(late):
     results = diverged(late)
-    assert pdf_of(results, tmp_path / "a")
+    assert report.pdf(results)
     content = document(results)
     rows = {row[0]: row for row in content["models"]}
     assert rows["MSM Mamdani"][-1] == "diverged at 0.310 s"
@@ -197,19 +199,17 @@ def test_a_model_that_diverged_is_shown_so_and_has_no_score(late, tmp_path):
     assert "MSM Mamdani" not in scored
 
 
-def test_no_curve_at_all_still_makes_a_report(tmp_path):
+def test_no_curve_at_all_still_makes_a_report():
     bare = replace(results_of(), fields={}, curves=(), bands=(), scores=(), field_differences=())
-    assert pdf_of(bare, tmp_path / "a")
+    assert report.pdf(bare)
 
 
-def test_a_number_that_is_not_finite_is_refused(tmp_path):
+def test_a_number_that_is_not_finite_is_refused():
     results = without_arrays()
     first, *others = results.scores
     results = replace(results, scores=(first._replace(score=float("nan")), *others))
-    (tmp_path / "a").mkdir()
-    write(results, tmp_path / "a")
     with pytest.raises(ValueError, match="nan is not a number that a report can print"):
-        report.make_report(tmp_path / "a")
+        report.pdf(results)
     with pytest.raises(ValueError, match="not JSON compliant"):
         report.compile_pdf(document(results_of()) | {"drawing": float("inf")}, {})
 
@@ -249,7 +249,7 @@ def with_toy(results: Results, **changes) -> Results:
     return replace(results, fields=fields, fuzzy={}, **like)
 
 
-def test_a_model_that_the_report_does_not_know_is_legible_everywhere(tmp_path):
+def test_a_model_that_the_report_does_not_know_is_legible_everywhere():
     """Under its label and in a look of its own."""
     results = with_toy(results_of(), system=None)
     content, seen = document(results), looks(results)
@@ -265,7 +265,7 @@ def test_a_model_that_the_report_does_not_know_is_legible_everywhere(tmp_path):
     assert "Toy model" in [one.look.label for one in motion_figures.motions(results, "tool")]
     assert "Toy model" in [panel.title for panel in views(results).sheets[0].panels]
     assert "Toy model, at the peak" in [bar.name for bar in bars(results)]
-    assert pdf_of(results, tmp_path / "a")
+    assert report.pdf(results)
 
 
 def test_a_model_that_the_report_does_not_know_is_ranked_where_it_has_a_fuzzy_system():

@@ -1,5 +1,6 @@
 """Scenes: what is read, what is refused, and with which words."""
 
+import codecs
 import time
 from dataclasses import replace
 
@@ -253,3 +254,83 @@ def test_scenes_are_frozen():
     assert replace(scene, title="other") != scene
     with pytest.raises(AttributeError):
         scene.title = "other"
+
+
+PLAIN = 'title = "\u00e9"\n\n[tool]\nforce = "1 N"\n'
+
+
+@pytest.mark.parametrize(
+    "data", [codecs.BOM_UTF8 + PLAIN.encode(), PLAIN.replace("\n", "\r\n").encode()]
+)
+def test_a_byte_order_mark_and_other_line_ends_change_nothing(data, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_bytes(data)
+    assert read_scene(str(path)) == read_scene(str(_written(tmp_path, PLAIN.encode())))
+
+
+def _written(folder, data):
+    path = folder / "plain.toml"
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (PLAIN.encode("utf-16"), "plain.toml: is UTF-16; save it as UTF-8"),
+        (PLAIN.encode("utf-32"), "plain.toml: is UTF-32; save it as UTF-8"),
+        (PLAIN.encode("latin-1"), "plain.toml, line 1: byte 0xe9 is not UTF-8"),
+        (PLAIN.encode() + b'force = "2 N"\n', "line 5: .*given twice; remove one"),
+        (PLAIN.encode() + b"[tool]\n", "line 5: .*the table is given twice"),
+        (PLAIN.replace('"1 N"', "1 N").encode(), "line 4: .*stands in quotes"),
+        (PLAIN.replace('"1 N"', "N").encode(), "line 4: .*stand in quotes"),
+        (PLAIN.replace('"1 N"', '"1 N').encode(), "line 4: .*closing quote is missing"),
+        (PLAIN.encode() + b"force\n", "line 5: .*not `key = value`"),
+        (PLAIN.replace('"1 N"', "[1]").encode(), r"tool\.force: .* \[line 4\]"),
+        (PLAIN.replace("force", "froce").encode(), r"did you mean 'force'\? \[line 4\]"),
+        (PLAIN.encode() + b"[reference]\nmodes = 3\n", r"reference\.modes: .* \[line 6\]"),
+        (b"time = { samples = 3 }\n", r"time\.samples: .* \[line 1\]"),
+    ],
+)
+def test_a_fault_of_a_file_is_told_by_its_line(data, message, tmp_path):
+    with pytest.raises(SceneError, match=message):
+        read_scene(str(_written(tmp_path, data)))
+
+
+def test_what_an_override_gives_is_on_no_line(tmp_path):
+    """Negative control: the line of the value that it replaced would mislead."""
+    path = str(_written(tmp_path, PLAIN.encode()))
+    for override in ("tool.force=1 kg", "tool.froce=1 N"):
+        with pytest.raises(SceneError) as refused:
+            read_scene(path, [override])
+        assert "line" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "hint"),
+    [
+        ("tool.radius=12 MM", "did you mean 'mm'"),
+        ("tool.radius=12 Mm", "did you mean 'mm'"),
+        ("organ.volume=1 ML", "did you mean 'ml'"),
+        ("tissue.youngs_modulus=9 kpa", "did you mean 'kPa'"),
+        ("support.stiffness=20 mpa/m", "did you mean 'MPa/m'"),
+        ("tool.radius=1,5 mm", "the decimal sign is a point"),
+        ("radius=12 mm", "did you mean 'tool.radius'"),
+        ("tool.force=nan", "must be finite"),
+        ("tool.force=-inf", "must be finite"),
+        ("models=3", "should be a list"),
+        ("lattice=3", "should be a table"),
+    ],
+)
+def test_a_mistaken_value_or_key_is_told_what_was_meant(override, hint):
+    with pytest.raises(SceneError, match=hint):
+        read_scene("liver", [override])
+
+
+def test_space_round_a_quantity_is_no_mistake():
+    assert read_scene("liver", ['tool.radius=" 12mm "']).tool.radius == 0.012
+
+
+def test_a_name_that_no_file_can_have_is_refused():
+    with pytest.raises(SceneError, match="neither a file nor a built-in scene"):
+        read_scene("n" * 5000)

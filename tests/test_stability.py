@@ -15,8 +15,17 @@ from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS, UNBOUNDED
 from msm.kinematics import inverted_cells
 from msm.lattice import build, node_volumes
-from msm.laws import Basafa, Hooke
-from msm.model import Automatic, Counts, Fixed, Rate, critical_time_step, run
+from msm.laws import Basafa, Hooke, piecewise
+from msm.model import (
+    Automatic,
+    Counts,
+    Fixed,
+    LatticeStepper,
+    Rate,
+    critical_time_step,
+    refuse,
+    run,
+)
 from msm.springs import Springs, connect
 from msm.stability import Follower, cell_bound, frequency_bound, largest_frequency, longest_step
 from msm.statics import stiffness_at_rest
@@ -357,3 +366,29 @@ def test_the_coupling_of_damping_and_oscillation_does_not_touch_implicit_damping
     assert longest_step(method, 10.0, 1e9) == pytest.approx(0.2)
     assert longest_step(method, 0.0, 0.0) == float("inf")
     assert stability.SHARED < 1.0
+
+
+def test_the_step_at_rest_is_that_of_the_steeper_side_of_a_corner():
+    """Of a law twice as steep towards compression; the other way round nothing changes."""
+    (body, _), strain = column((2, 2, 3)), [-0.1, 0.0, 0.1]
+    steep = critical_time_step(body, Material(Hooke(20.0)))
+    for tension in ([-2.0, 0.0, 1.0], [-1.0, 0.0, 2.0], [-2.0, 0.0, 2.0]):
+        cornered = Material(piecewise(strain, tension))
+        assert critical_time_step(body, cornered) == pytest.approx(steep, rel=1e-3)
+        stepper = LatticeStepper(body, cornered, np.ones_like)
+        assert stepper.limit_at_rest == pytest.approx(steep, rel=2e-3)
+    soft = critical_time_step(body, Material(piecewise(strain, [-1.0, 0.0, 1.0])))
+    assert soft > 1.05 * steep
+
+
+def test_steps_are_limited_as_they_are_asked_for_and_not_where_they_are_halved(monkeypatch):
+    """A run that was let through is not refused when its error is to be told."""
+    body, material = column((2, 2, 3))
+    seen = watch(body, 0.1, 17)
+    asked = run(body, material, np.ones_like, seen)
+    monkeypatch.setattr("msm.model.MAX_STEPS", asked.steps)
+    halved = run(body, material, np.ones_like, seen, Counts(2 * asked.substeps))
+    assert halved.steps == 2 * asked.steps
+    for step, remedy in ((Fixed(0.1 / 16 / 64), "time_step"), (Rate(64 * 160.0), "step_rate")):
+        with pytest.raises(ValueError, match=f"lattice.{remedy}"):
+            refuse(body, material, seen, step)

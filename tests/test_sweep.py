@@ -129,13 +129,16 @@ def damaged(path, how):
             "empty": "",
             "altered": text.replace('"square":9', '"square":8'),
             "not an object": "[1]",
+            "nested": 100_000 * "[",
             "not text": text.replace("{", "\x00"),
         }[how]
     )
     assert path.read_text() != text
 
 
-@pytest.mark.parametrize("how", ["truncated", "empty", "altered", "not an object", "not text"])
+@pytest.mark.parametrize(
+    "how", ["truncated", "empty", "altered", "not an object", "nested", "not text"]
+)
 def test_a_damaged_result_is_run_again_and_mended(store, log, how):
     tasks = squares(5, log=str(log))
     sound = run(tasks, store)

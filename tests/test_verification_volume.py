@@ -23,7 +23,7 @@ from study.organ.block import block_mesh
 from study.organ.occupancy import ImplicitBody, MeshBody
 
 E, H, RHO = 4e3, 0.01, 1060.0
-RATIOS = [0.25, 0.3, 0.45, 0.49, 0.4999]
+RATIOS = [0.25, 0.3, 0.45, 0.49, 0.4999, 0.49999]
 MIXES = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.9), (0.5, 0.4)]
 QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -139,7 +139,7 @@ def test_a_quarter_leaves_springs_alone():
     assert abs(difference).max() == 0.0
 
 
-@pytest.mark.parametrize("nu", [-0.1, 0.0, 0.2499, 0.49991, 0.5, float("nan")])
+@pytest.mark.parametrize("nu", [-0.1, 0.0, 0.2499, 0.499991, 0.5, float("nan")])
 def test_ratios_that_the_term_cannot_carry_are_refused(nu):
     with pytest.raises(ValueError, match=r"from 0\.25 to 0\.4999.*change tissue\.poisson_ratio"):
         volume_term(block_lattice((1, 1, 1)), E, nu)
@@ -176,7 +176,7 @@ def test_finite_forces_are_minus_the_gradient_of_the_energy(make, nu, rng):
         assert found[node, axis] == pytest.approx(-slope, abs=1e-12 * np.abs(found).max())
 
 
-@pytest.mark.parametrize("nu", [0.25, 0.45, 0.4999])
+@pytest.mark.parametrize("nu", [0.25, 0.45, 0.4999, 0.49999])
 @pytest.mark.parametrize("make", [block_lattice, ball_lattice])
 def test_linear_forces_are_minus_stiffness_times_displacement(make, nu, rng):
     """The stiffness comes from the assembled operators, whose energy the uniform strains check."""

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fuzzy.systems import kernel
-from fuzzy.systems.kinds import SYSTEMS, check_kind
+from fuzzy.systems.kinds import SYSTEMS, check_kind, is_compiled
 from fuzzy.systems.options import OUT_OF_RANGE, InferenceOptions
 from fuzzy.systems.policy import LEAST_STRENGTH, answered, require_readings
 from fuzzy.systems.quadrature import Output, is_exact, sampled
@@ -25,6 +25,7 @@ from fuzzy.systems.sets import (
     FuzzySet,
     Parameters,
     core,
+    has_core,
     lower_membership,
     membership,
     upper_membership,
@@ -41,6 +42,8 @@ KERNEL_FORMS: dict[str, tuple[int, Callable[[Parameters], tuple[float, ...]]]] =
     "pimf": (kernel.SPLINE, lambda p: p),
     "zmf": (kernel.SPLINE, lambda p: (-np.inf, -np.inf, *p)),
     "smf": (kernel.SPLINE, lambda p: (*p, np.inf, np.inf)),
+    "linzmf": (kernel.TRAPEZOID, lambda p: (-np.inf, -np.inf, *p)),
+    "linsmf": (kernel.TRAPEZOID, lambda p: (*p, np.inf, np.inf)),
     "gbellmf": (kernel.BELL, lambda p: (*p, 0.0)),
     "sigmf": (kernel.SIGMOID_PRODUCT, lambda p: (*p, 1.0, -np.inf)),
     "dsigmf": (kernel.SIGMOID_DIFFERENCE, lambda p: p),
@@ -145,6 +148,11 @@ def compiled(
             "sampling = 'exact' is not compiled: evaluate it with infer, or choose matlab or "
             "octave sampling with more samples"
         )
+    if not is_compiled(system, kind):
+        raise ValueError(
+            f"{system.name}: aggregation {system.operators.aggregation} and defuzzification "
+            f"{system.operators.defuzzification} are not compiled: evaluate it with infer"
+        )
     return _compiled(system, kind, options, pruned)
 
 
@@ -158,7 +166,7 @@ def _compiled(system: FuzzySystem, kind: str, options: InferenceOptions, pruned:
         _packed_sets(system, rules, used, type_1=kind != "interval-type-2"),
         _packed_rules(system, rules, used, summed),
     )
-    universes = np.array([(variable.low, variable.high) for variable in system.inputs])
+    universes = np.array([variable.reach for variable in system.inputs])
     return Compiled(system, kind, options, universes, (*packed, *_output(system, kind, options)))
 
 
@@ -184,10 +192,7 @@ def _packed_sets(
         np.array([i for i, _ in used]),
         np.array([place in negated for place in used], dtype=np.int64),
         np.array(
-            [
-                (*four(one.parameters), *_core(one))
-                for one, (_, four) in zip(sets, forms, strict=True)
-            ]
+            [(*four(one.shape), *_core(one)) for one, (_, four) in zip(sets, forms, strict=True)]
         ),
         np.array([(f.mean, f.spread, f.scale, f.lag) for f in footprints]),
     )
@@ -195,7 +200,7 @@ def _packed_sets(
 
 def _core(one: FuzzySet) -> tuple[float, float]:
     # Sets without a core have no footprint that would ask for it.
-    return (-np.inf, np.inf) if one.kind in ("dsigmf", "psigmf") else core(one)
+    return core(one) if has_core(one) else (-np.inf, np.inf)
 
 
 def _packed_rules(

@@ -19,7 +19,8 @@ def sugeno_of(system: FuzzySystem, sampling: str = "matlab", samples: int = 101)
         FuzzySet(one.name, "constant", (centroid,))
         for one, centroid in zip(system.output.sets, centroids, strict=True)
     )
-    return replace(system, output=replace(system.output, sets=sets))
+    operators = replace(system.operators, aggregation="max", defuzzification="centroid")
+    return replace(system, output=replace(system.output, sets=sets), operators=operators)
 
 
 def type_1_of(system: FuzzySystem) -> FuzzySystem:

@@ -81,7 +81,8 @@ def _points(variable: Variable) -> Array:
 
 def gaps(system: FuzzySystem, threshold: float) -> tuple[Gap, ...]:
     """Gaps of each input by itself; their ends are right to a thousandth of the universe."""
-    return tuple(gap for variable in system.inputs for gap in _gaps_of(variable, threshold))
+    judged = (one for one in system.inputs if one.sets and one.low < one.high)
+    return tuple(gap for variable in judged for gap in _gaps_of(variable, threshold))
 
 
 def _gaps_of(variable: Variable, threshold: float) -> Iterator[Gap]:

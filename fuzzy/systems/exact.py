@@ -12,7 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy.systems.sets import Array, FuzzySet, core, corners, lower_membership, upper_membership
+from fuzzy.systems.sets import (
+    Array,
+    FuzzySet,
+    core,
+    corners,
+    has_core,
+    lower_membership,
+    upper_membership,
+)
 from fuzzy.systems.system import FuzzySystem, Membership, Variable, memberships
 
 TOLERANCE = 1e-10
@@ -29,8 +37,8 @@ STILL = 1e-13
 HAIR = 1e-14
 # Smaller areas lose their digits to underflow.
 LEAST_AREA = 1e-290
-RISING_FROM_0 = ("trimf", "trapmf", "pimf", "smf")
-FALLING_TO_0 = ("trimf", "trapmf", "pimf", "zmf")
+RISING_FROM_0 = ("trimf", "trapmf", "pimf", "smf", "linsmf")
+FALLING_TO_0 = ("trimf", "trapmf", "pimf", "zmf", "linzmf")
 
 
 def _clenshaw_curtis(intervals: int) -> tuple[Array, Array]:
@@ -360,10 +368,11 @@ def _support(output: Variable, heights: Array) -> tuple[float, float]:
 
 def _span(one: FuzzySet) -> tuple[float, float]:
     """Where the upper membership is not 0."""
-    p, shift, stretch = one.parameters, one.footprint.mean, 1.0 + one.footprint.spread
+    p, shift, stretch = one.shape, one.footprint.mean, 1.0 + one.footprint.spread
+    ends = core(one) if has_core(one) else (p[0], p[-1])  # which then have nothing to stretch
     left, right = -np.inf, np.inf
     if one.kind in RISING_FROM_0:
-        left = core(one)[0] + stretch * (p[0] - core(one)[0]) - shift
+        left = ends[0] + stretch * (p[0] - ends[0]) - shift
     if one.kind in FALLING_TO_0:
-        right = core(one)[1] + stretch * (p[-1] - core(one)[1]) + shift
+        right = ends[1] + stretch * (p[-1] - ends[1]) + shift
     return left, right

@@ -20,10 +20,10 @@ from fuzzy.systems.system import (
     MERGES,
     FuzzySystem,
     Rule,
+    aggregated,
     firing_strengths,
     memberships,
     merged,
-    union,
 )
 
 
@@ -56,8 +56,9 @@ class Firing(NamedTuple):
 class OutputSet(NamedTuple):
     """An output set and the height at which it is implied.
 
-    `lower_rules` and `upper_rules`: numbers of the rules that set it; empty where strengths are
-    added. A Sugeno system gives each set a `constant` and its `share` of the total weight.
+    `lower_rules` and `upper_rules`: numbers of the rules that set it; empty where strengths or
+    curves are added. A Sugeno system gives each set a `constant` and its `share` of the total
+    weight.
     """
 
     name: str
@@ -174,10 +175,11 @@ def _fire(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -
     low, high = SYSTEMS[kind].bounds
     lower, upper = firing_strengths(system, X, low, high), firing_strengths(system, X, high, low)
     adds = kind == "sugeno" and MERGES[options.sugeno_aggregation].adds
+    every_counts = adds or (kind != "sugeno" and system.operators.aggregation != "max")
     consequents = np.array([rule.consequent for rule in system.rules])
     heights = [merged(system, strengths, "sum" if adds else "max") for strengths in (lower, upper)]
     sets = [
-        (strengths > 0) & (strengths == height[consequents]) & (not adds)
+        (strengths > 0) & (strengths == height[consequents]) & (not every_counts)
         for strengths, height in zip((lower, upper), heights, strict=True)
     ]
     columns = (part[:, 0] for part in (lower, upper, *sets, *heights))
@@ -250,10 +252,10 @@ def _outputs(
 
 def _curve(system: FuzzySystem, fired: _Fired, kind: str, samples: int) -> OutputCurve:
     y = sampled(system.output, samples, "matlab").y
-    heights = (fired.lower_heights, fired.upper_heights)
+    strengths = (fired.lower, fired.upper)
     lower, upper = (
-        union(level[:, np.newaxis], memberships(system.output, y, bound), system.operators)[0]
-        for level, bound in zip(heights, SYSTEMS[kind].bounds, strict=True)
+        aggregated(system, level[:, np.newaxis], memberships(system.output, y, bound))[0]
+        for level, bound in zip(strengths, SYSTEMS[kind].bounds, strict=True)
     )
     return OutputCurve(y, lower, upper)
 

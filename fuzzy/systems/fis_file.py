@@ -3,19 +3,29 @@
 Every number is written with the digits that give it back, so a system that is written and read is
 the same system; only the terms of a rule come back in the order of the inputs. What such a file
 cannot say is refused with the remedy: footprints, a rule with two terms of one input, quotes in
-names. What a file says and this package does not do is refused likewise: other aggregations and
-defuzzifications, hedges, negated consequents, several outputs.
+names. Where MATLAB or Octave answer to a file, so does this package; the exceptions are refused by
+name, with the reason: functions of one's own, which are no part of the file, hedges, negated
+consequents, several outputs. Outputs that no rule names are left out.
 """
 
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
-from fuzzy.systems.fis_sections import TYPE_2, FisError, Line, Section, Values, read_sections, words
+from fuzzy.systems.fis_sections import (
+    TYPE_2,
+    FisError,
+    Line,
+    Section,
+    Values,
+    read_sections,
+    unquoted,
+    words,
+)
 from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
-from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
+from fuzzy.systems.system import OPERATORS, Connective, FuzzySystem, Operators, Rule, Term, Variable
 
 SYSTEM_KEYS = (
     "Name",
@@ -31,14 +41,24 @@ SYSTEM_KEYS = (
     "DefuzzMethod",
 )
 VARIABLE_KEYS = ("Name", "Range", "NumMFs")
-OPERATORS = {"AndMethod": "conjunction", "OrMethod": "disjunction", "ImpMethod": "implication"}
+METHODS = {
+    "AndMethod": "conjunction",
+    "OrMethod": "disjunction",
+    "ImpMethod": "implication",
+    "AggMethod": "aggregation",
+    "DefuzzMethod": "defuzzification",
+}
 # By type. A weighted average has nothing to aggregate: `sum` is MATLAB's word for that.
-AGGREGATIONS = {"mamdani": ("max",), "sugeno": ("sum", "max")}
-DEFUZZIFICATIONS = {"mamdani": ("centroid",), "sugeno": ("wtaver",)}
+DEFUZZIFICATIONS = {
+    "mamdani": {one: one for one in OPERATORS["defuzzification"] if one != "wtsum"},
+    "sugeno": {"wtaver": "centroid", "wtsum": "wtsum"},
+}
 # Octave's names for what MATLAB calls otherwise.
 SYNONYMS = {"algebraic_product": "prod", "algebraic_sum": "probor"}
 
-_SET = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*(\[.*\])")
+_SET = re.compile(
+    r"""(?P<name>(['"]).*\2)\s*:\s*(['"])(?P<kind>[^'"]*)\3\s*,\s*(?P<numbers>\[.*\])"""
+)
 _RULE = re.compile(r"([^()]*)\(\s*([^()\s]*)\s*\)\s*:\s*([12])")
 
 
@@ -48,12 +68,17 @@ def read_fis(path: Path) -> FuzzySystem:
     values = sections["system"].values(SYSTEM_KEYS)
     kind = _kind(values)
     inputs = tuple(_variable(section) for section in sections.numbered("input"))
-    output = _only_output(sections.numbered("output"), kind)
+    outputs = sections.numbered("output")
     lines = sections["rules"].body
     values.check_count("NumInputs", len(inputs), "inputs")
-    values.check_count("NumOutputs", 1, "outputs")
+    values.check_count("NumOutputs", len(outputs), "outputs")
     values.check_count("NumRules", len(lines), "rules")
-    rules = tuple(_rule(line, inputs, output) for line in lines)
+    rows = [_row(line, len(inputs), len(outputs)) for line in lines]
+    column = _only_column(rows, outputs)
+    output = _output(outputs[column], kind, len(inputs))
+    # A rule that names no set of the output says nothing about it, in MATLAB and in Octave.
+    speaking = (row for row in rows if row.consequents[column])
+    rules = tuple(_rule(row, column, inputs, output) for row in speaking)
     name = values["Name"].unquoted()
     with values.head.blamed():
         return FuzzySystem(inputs, output, rules, _operators(values, kind), name)
@@ -63,45 +88,48 @@ def _kind(values: Values) -> str:
     kind = values["Type"].unquoted().lower()
     if "type2" in kind:
         raise values["Type"].fault(f"Type {kind!r} {TYPE_2}")
-    if kind not in AGGREGATIONS:
+    if kind not in DEFUZZIFICATIONS:
         raise values["Type"].fault(f"Type {kind!r}: use mamdani or sugeno")
     return kind
 
 
 def _operators(values: Values, kind: str) -> Operators:
-    _check_method(values["AggMethod"], "aggregation", AGGREGATIONS[kind])
-    _check_method(values["DefuzzMethod"], "defuzzification", DEFUZZIFICATIONS[kind])
     operators = Operators()
-    for key, field in OPERATORS.items():
+    for key, field in METHODS.items():
         name = values[key].unquoted().lower()
-        chosen: Any = {field: SYNONYMS.get(name, name)}
         with values[key].blamed():
-            operators = replace(operators, **chosen)
+            operators = replace(operators, **_method(field, SYNONYMS.get(name, name), kind))
     return operators
 
 
-def _check_method(line: Line, what: str, allowed: tuple[str, ...]) -> None:
-    if line.unquoted().lower() not in allowed:
-        raise line.fault(
-            f"{what} {line.text} is not computed here; if the answers may differ, set "
-            f"{' or '.join(allowed)}"
-        )
+def _method(field: str, name: str, kind: str) -> Any:
+    """The operator of a field, by name; that of an aggregation in vain is checked and dropped."""
+    if field == "defuzzification":
+        known = DEFUZZIFICATIONS[kind]
+        if name not in known:
+            raise ValueError(
+                f"{field} {name!r}: functions of one's own are no part of the file; in a {kind} "
+                f"system use one of {', '.join(known)}"
+            )
+        return {field: known[name]}
+    if field == "aggregation" and kind == "sugeno":
+        Operators(aggregation=cast(Any, name))
+        return {}
+    return {field: name}
 
 
-def _only_output(sections: list[Section], kind: str) -> Variable:
-    if len(sections) > 1:
-        raise sections[1].head.fault("a second output; write one file for each output")
-    output = _variable(sections[0])
-    for one, line in zip(output.sets, sections[0].values(VARIABLE_KEYS).sets(), strict=True):
+def _output(section: Section, kind: str, input_count: int) -> Variable:
+    output = _variable(section, input_count)
+    for one, line in zip(output.sets, section.values(VARIABLE_KEYS).sets(), strict=True):
         if (one.kind in FUNCTION_KINDS) != (kind == "sugeno"):
             wanted = "constant or linear" if kind == "sugeno" else "a membership function"
             raise line.fault(f"set {one.name!r} is {one.kind}; in a {kind} system give {wanted}")
     return output
 
 
-def _variable(section: Section) -> Variable:
+def _variable(section: Section, input_count: int = 0) -> Variable:
     values = section.values(VARIABLE_KEYS)
-    sets = tuple(_fuzzy_set(line) for line in values.sets())
+    sets = tuple(_fuzzy_set(line, input_count) for line in values.sets())
     values.check_count("NumMFs", len(sets), "sets")
     ends = values["Range"].numbers()
     if len(ends) != 2:
@@ -110,25 +138,38 @@ def _variable(section: Section) -> Variable:
         return Variable(values["Name"].unquoted(), *ends, sets)
 
 
-def _fuzzy_set(line: Line) -> FuzzySet:
+def _fuzzy_set(line: Line, input_count: int) -> FuzzySet:
     parts = _SET.fullmatch(line.text)
     if not parts:
         raise line.fault(f"{line.text}: write a set as 'name':'kind',[parameters]")
-    name, kind, numbers = parts.groups()
+    kind = parts["kind"].strip().lower()
     if kind.endswith("type2"):
         raise line.fault(f"{kind} {TYPE_2}")
-    parameters = _unpadded(cast(Kind, kind), line._replace(text=numbers).numbers())
+    given = line._replace(text=parts["numbers"]).numbers()
     with line.blamed():
-        return FuzzySet(name, cast(Kind, kind), parameters)
+        parameters = _unpadded(kind, given, input_count)
+        return FuzzySet(unquoted(parts["name"]), cast(Kind, kind), parameters)
 
 
-def _unpadded(kind: Kind, parameters: tuple[float, ...]) -> tuple[float, ...]:
-    """The parameters without the zeros by which older MATLAB files fill them up to four."""
-    count = len(FORMS[kind].parameters.split()) if kind in FORMS else len(parameters)
+def _unpadded(kind: str, parameters: tuple[float, ...], input_count: int) -> tuple[float, ...]:
+    """The parameters without the zeros by which older MATLAB files fill them up."""
+    counts = {"constant": 1, "linear": input_count + 1}
+    counts |= {one: len(form.parameters.split()) for one, form in FORMS.items()}
+    count = counts.get(kind, len(parameters))
     return parameters if any(parameters[count:]) else parameters[:count]
 
 
-def _rule(line: Line, inputs: tuple[Variable, ...], output: Variable) -> Rule:
+class _Row(NamedTuple):
+    """The numbers of a rule: a set of each input and each output, weight and connective."""
+
+    line: Line
+    antecedents: list[int]
+    consequents: list[int]
+    weight: float
+    connective: Connective
+
+
+def _row(line: Line, input_count: int, output_count: int) -> _Row:
     parts = _RULE.fullmatch(line.text)
     if not parts:
         raise line.fault(
@@ -136,21 +177,44 @@ def _rule(line: Line, inputs: tuple[Variable, ...], output: Variable) -> Rule:
             "and 1 for AND or 2 for OR, as in `1 0 -2, 3 (1) : 1`"
         )
     numbers = [_index(line, word) for word in words(parts[1])]
-    if len(numbers) != len(inputs) + 1:
+    due = input_count + output_count
+    if len(numbers) != due:
+        outputs = "one output" if output_count == 1 else f"{output_count} outputs"
         raise line.fault(
-            f"{len(numbers)} sets for {len(inputs)} inputs and one output; give "
-            f"{len(inputs) + 1}, with 0 for an input that the rule does not use"
+            f"{len(numbers)} sets for {input_count} inputs and {outputs}; give {due}, with 0 for "
+            "an input that the rule does not use"
         )
-    *chosen, consequent = numbers
-    if consequent <= 0:
-        raise line.fault(f"consequent {consequent}: give the number of a set of the output")
+    antecedents, consequents = numbers[:input_count], numbers[input_count:]
+    connective: Connective = "and" if parts[3] == "1" else "or"
+    return _Row(line, antecedents, consequents, line.parsed(parts[2]), connective)
+
+
+def _only_column(rows: list[_Row], outputs: list[Section]) -> int:
+    """The place of the one output that rules name; the first if none is named."""
+    named = [k for k in range(len(outputs)) if any(row.consequents[k] for row in rows)]
+    if len(named) > 1:
+        raise outputs[named[1]].head.fault(
+            "a second output that rules name; write one file for each output"
+        )
+    return named[0] if named else 0
+
+
+def _rule(row: _Row, column: int, inputs: tuple[Variable, ...], output: Variable) -> Rule:
+    line, consequent = row.line, row.consequents[column]
+    if consequent < 0:
+        raise line.fault(
+            f"consequent {consequent}: NOT on the output is not computed; give the number of a set "
+            "of the output, one of its own for what is meant"
+        )
     _check_index(line, consequent, output)
-    terms = tuple(_terms(line, chosen, inputs))
+    terms = tuple(_terms(line, row.antecedents, inputs))
     if not terms:
-        raise line.fault("the rule uses no input; give at least one a set other than 0")
-    weight = line.parsed(parts[2])
+        raise line.fault(
+            "the rule uses no input, so that nothing says how far it fires (Octave fails there); "
+            "give at least one a set other than 0"
+        )
     with line.blamed():
-        return Rule(terms, consequent - 1, "and" if parts[3] == "1" else "or", weight)
+        return Rule(terms, consequent - 1, row.connective, row.weight)
 
 
 def _terms(line: Line, chosen: list[int], inputs: tuple[Variable, ...]) -> Iterator[Term]:
@@ -229,11 +293,17 @@ def _system_lines(system: FuzzySystem) -> list[str]:
         f"{len(system.inputs)}",
         "1",
         f"{len(system.rules)}",
-        *(f"'{getattr(system.operators, field)}'" for field in OPERATORS.values()),
-        f"'{AGGREGATIONS[kind][0]}'",
-        f"'{DEFUZZIFICATIONS[kind][0]}'",
+        *(f"'{method}'" for method in _methods(system)),
     )
     return ["[System]", *(f"{k}={v}" for k, v in zip(SYSTEM_KEYS, values, strict=True))]
+
+
+def _methods(system: FuzzySystem) -> list[str]:
+    methods: list[str] = [getattr(system.operators, field) for field in METHODS.values()]
+    if not system.is_sugeno:
+        return methods
+    names = {one: name for name, one in DEFUZZIFICATIONS["sugeno"].items()}
+    return [*methods[:-2], "sum", names[methods[-1]]]
 
 
 def _variable_lines(header: str, variable: Variable) -> list[str]:

@@ -1,5 +1,6 @@
 """The lines of a `.fis` file, its sections and their values, before anything is made of them."""
 
+import codecs
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,12 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from fuzzy.systems import arithmetic
+
 TYPE_2 = "belongs to a type-2 system, which is not read from .fis: give the system as JSON"
 
-_CODE = re.compile(r"(?:[^'%#]|'[^']*'?)*")  # a line up to its comment, if any
+# A line up to its comment, if any.
+_CODE = re.compile(r"""(?:[^'"%#]|'[^']*'?|"[^"]*"?)*""")
+_QUOTED = re.compile(r"""(['"])(.*)\1""")
 _HEADER = re.compile(r"\[\s*([a-z]+)\s*(\d*)\s*\]", re.IGNORECASE)
 _KNOWN_HEADER = re.compile(r"system|rules|(in|out)put[1-9]\d*")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SET_KEY = re.compile(r"mf[1-9]\d*")
 _TYPE_2_KEY = re.compile(r"type.+|mf\d+[ul]")
 
@@ -43,24 +47,25 @@ class Line(NamedTuple):
             raise self.fault(str(error)) from error
 
     def unquoted(self) -> str:
-        """The text of the line without its single quotes, which may be missing."""
-        text = re.fullmatch(r"'([^']*)'|[^']*", self.text)
-        if not text:
+        """The text of the line without its quotes, single or double, which may be missing."""
+        if _QUOTED.fullmatch(self.text):
+            return unquoted(self.text)
+        if "'" in self.text:
             raise self.fault(f"{self.text}: put the text between one pair of single quotes")
-        return text[0] if text[1] is None else text[1]
+        return self.text
 
     def numbers(self) -> tuple[float, ...]:
-        """The numbers between brackets, parted by blanks or commas."""
+        """The numbers between brackets, parted by blanks or commas; each may be an expression."""
         inside = re.fullmatch(r"\[([^][]*)\]", self.text)
         if not inside:
             raise self.fault(f"{self.text}: write the numbers between one pair of [ ]")
-        return tuple(self.parsed(word) for word in words(inside[1]))
+        with self.blamed():
+            return tuple(arithmetic.number(part) for part in arithmetic.parts(inside[1]))
 
     def parsed(self, word: str) -> float:
         """A word of the line as a number; FisError if it is no finite one."""
-        if not _NUMBER.fullmatch(word):
-            raise self.fault(f"{word!r} is no finite number; correct it")
-        return float(word)
+        with self.blamed():
+            return arithmetic.number(word)
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,7 @@ class Values:
 
     def check_count(self, key: str, found: int, what: str) -> None:
         """FisError if a Num... key, which may be missing, disagrees with what the file holds."""
-        if key in self and self[key].text != str(found):
+        if key in self and self[key].parsed(self[key].text) != found:
             raise self[key].fault(
                 f"{key} is {self[key].text}, but there are {found} {what}; correct one of both"
             )
@@ -110,7 +115,7 @@ class Section(NamedTuple):
             _check_key(line, key, keys)
             if key.lower() in values:
                 raise line.fault(f"a second {key}; remove one of both")
-            values[key.lower()] = line._replace(text=value)
+            values[key.lower()] = line._replace(text=value.rstrip("; \t"))
         return Values(self.head, values)
 
 
@@ -122,6 +127,11 @@ def _check_key(line: Line, key: str, keys: tuple[str, ...]) -> None:
         raise line.fault(f"{key} {TYPE_2}")
     if not ("NumMFs" in keys and _SET_KEY.fullmatch(name)):
         raise line.fault(f"{key!r} is no key of this section ({', '.join(keys)}); remove the line")
+
+
+def unquoted(text: str) -> str:
+    """What stands between a pair of quotes, in which a quote written twice stands for one."""
+    return text[1:-1].replace(2 * text[0], text[0])
 
 
 def words(text: str) -> list[str]:
@@ -180,8 +190,13 @@ def _lines(path: Path) -> Iterator[Line]:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        content = path.read_bytes()
     except OSError as error:
         raise FisError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise FisError(f"{path}: is not UTF-8 text; save it in that encoding") from None
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise FisError(f"{path}: is UTF-16 text; save it as UTF-8")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:  # MATLAB's older files are in the encoding of their machine
+        text = content.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")

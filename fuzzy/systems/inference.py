@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from fuzzy.systems.kinds import SYSTEMS, check_kind
+from fuzzy.systems.kinds import SYSTEMS, check_kind, is_compiled
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.policy import answered
 from fuzzy.systems.quadrature import Output, is_exact
@@ -51,7 +51,8 @@ def infer(
 
 
 def _evaluate(system: FuzzySystem, kind: str, options: InferenceOptions, X: Array) -> Output:
-    if not is_exact(options.sampling) and len(X) >= COMPILED_FROM_ROWS:
+    fast = is_compiled(system, kind) and not is_exact(options.sampling)
+    if fast and len(X) >= COMPILED_FROM_ROWS:
         from fuzzy.systems.compiled import compiled  # numba, which few rows do not repay
 
         return compiled(system, kind, options).evaluate(X)

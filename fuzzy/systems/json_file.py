@@ -26,7 +26,8 @@ Kinds and parameters are those of `fuzzy.systems.sets`, which are MATLAB's; a Su
 of kind `constant` or `linear` on its output. A footprint has `mean`, `spread`, `scale` and `lag`, a
 rule a `connective` and a `weight`; what is left out takes the default of `Footprint` and `Rule`,
 which is not written either. Operators: `conjunction` min or prod, `disjunction` max or probor,
-`implication` min or prod. JSON knows no comments. Unknown keys are refused.
+`implication` min or prod, `aggregation` max, sum or probor, `defuzzification` centroid, bisector,
+mom, som or lom, for Sugeno wtsum. JSON knows no comments. Unknown keys are refused.
 """
 
 import difflib
@@ -254,12 +255,18 @@ def json_text(system: FuzzySystem) -> str:
         "format": FORMAT,
         "version": VERSION,
         "name": system.name,
-        "operators": asdict(system.operators),
+        "operators": _operators_entry(system.operators),
         "inputs": [_variable_entry(variable) for variable in system.inputs],
         "output": _variable_entry(system.output),
         "rules": [_rule_entry(rule, system) for rule in system.rules],
     }
     return _laid_out(document) + "\n"
+
+
+def _operators_entry(operators: Operators) -> dict[str, str]:
+    """All operators but those added since version 1 was first written, if they do as it did."""
+    late = {"aggregation": "max", "defuzzification": "centroid"}
+    return {key: one for key, one in asdict(operators).items() if late.get(key) != one}
 
 
 def _variable_entry(variable: Variable) -> dict[str, Any]:

@@ -403,7 +403,7 @@ def degree(kind: int, p: float, q: float, r: float, t: float, x: float) -> float
         return min(rise, fall) if p <= x <= t else 0.0
     if kind == SPLINE:
         rise, fall = spline(x, p, q), spline(x, t, r)
-        return min(rise, fall) if p <= x <= t else 0.0
+        return rise * fall if p <= x <= t else 0.0
     if kind == BELL:
         return 1.0 / (1.0 + math.pow(abs((x - r) / p), 2.0 * q))
     rise, fall = sigmoid(x, p, q), sigmoid(x, r, t)

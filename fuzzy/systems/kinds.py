@@ -40,3 +40,12 @@ def check_kind(system: FuzzySystem, kind: str) -> None:
             f"{system.name}: its consequents are constants, so it can only be evaluated as sugeno; "
             f"give its output membership functions for {kind}"
         )
+    if kind == "interval-type-2":
+        mamdani.require_centroid_of_union(system, kind)
+
+
+def is_compiled(system: FuzzySystem, kind: str) -> bool:
+    """Whether there are compiled loops for what the system does, if not for how it is sampled."""
+    if kind == "sugeno":
+        return system.operators.defuzzification != "wtsum"
+    return system.operators.is_centroid_of_union

@@ -60,8 +60,7 @@ def in_range(
 
     ValueError if the policy is `raise` and one is outside its universe.
     """
-    low = np.array([variable.low for variable in system.inputs])
-    high = np.array([variable.high for variable in system.inputs])
+    low, high = np.array([variable.reach for variable in system.inputs]).T
     outside = (low > X) | (high < X)
     notes = tuple(
         _outside(system.inputs[i], X[:, i], outside[:, i], policy, unit)

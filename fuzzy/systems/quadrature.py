@@ -13,11 +13,13 @@ class Sampling(NamedTuple):
     """How areas under the output curve are found.
 
     `weights` gives those of so many equidistant samples, shape (M,), and is None where the curve
-    itself is integrated. `words` name it; {samples} in them is the number of samples.
+    itself is integrated. `words` name it; {samples} in them is the number of samples. `size`
+    says which place of several is the smallest: MATLAB takes the nearest to 0, Octave the first.
     """
 
     weights: Callable[[int], Array] | None
     words: str
+    size: Callable[[Array], Array] = np.abs
 
 
 def _trapezoidal(samples: int) -> Array:
@@ -28,7 +30,7 @@ def _trapezoidal(samples: int) -> Array:
 
 SAMPLINGS: dict[str, Sampling] = {
     "matlab": Sampling(np.ones, "sums over {samples} points"),
-    "octave": Sampling(_trapezoidal, "the trapezoidal rule over {samples} points"),
+    "octave": Sampling(_trapezoidal, "the trapezoidal rule over {samples} points", np.positive),
     "exact": Sampling(None, "integration between the kinks of the curve"),
 }
 """By name: MATLAB's `evalfis` weighs all samples alike, Octave's toolkit halves both ends."""
@@ -72,3 +74,42 @@ def centroid(quadrature: Quadrature, mu: Array) -> Array:
     area = mu @ weights
     moment = mu @ (weights * y)
     return np.divide(moment, area, out=np.full_like(area, np.nan), where=area > 0)
+
+
+def bisector(quadrature: Quadrature, mu: Array) -> Array:
+    """The first point up to which there is half the area under mu (..., M), shape (...).
+
+    Octave's toolkit gives the number of the sample instead of the place.
+    """
+    area = np.cumsum(mu * quadrature.weights, axis=-1)
+    return np.asarray(quadrature.y[(area >= 0.5 * area[..., -1:]).argmax(axis=-1)])
+
+
+def mean_of_maximum(quadrature: Quadrature, mu: Array) -> Array:
+    """The mean of the points where mu (..., M) is largest, shape (...)."""
+    largest = mu == mu.max(axis=-1, keepdims=True)
+    return np.asarray((largest @ quadrature.y) / largest.sum(axis=-1))
+
+
+def smallest_of_maximum(y: Array, mu: Array, size: Callable[[Array], Array]) -> Array:
+    """Of the points y (M,) where mu (..., M) is largest, the one of the smallest size."""
+    largest = mu == mu.max(axis=-1, keepdims=True)
+    return np.asarray(y[np.where(largest, size(y), np.inf).argmin(axis=-1)])
+
+
+DEFUZZIFICATIONS: dict[str, Callable[[Quadrature, Array, Sampling], Array]] = {
+    "centroid": lambda quadrature, mu, _: centroid(quadrature, mu),
+    "bisector": lambda quadrature, mu, _: bisector(quadrature, mu),
+    "mom": lambda quadrature, mu, _: mean_of_maximum(quadrature, mu),
+    "som": lambda quadrature, mu, how: smallest_of_maximum(quadrature.y, mu, how.size),
+    "lom": lambda quadrature, mu, how: smallest_of_maximum(
+        quadrature.y, mu, lambda y: -how.size(y)
+    ),
+}
+"""By MATLAB's names: a number for a curve."""
+
+
+def defuzzified(quadrature: Quadrature, mu: Array, defuzzification: str, sampling: str) -> Array:
+    """The number that stands for each curve mu (..., M), shape (...); NaN where it is 0."""
+    found = DEFUZZIFICATIONS[defuzzification](quadrature, mu, SAMPLINGS[sampling])
+    return np.where((mu > 0).any(axis=-1), found, np.nan)

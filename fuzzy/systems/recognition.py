@@ -56,7 +56,7 @@ def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
     samples = _Samples(x, mu, int(top[0]), int(top[-1]))
     for kind, exact in _candidates(samples):
         parameters = tuple(float(f"{p:.10g}") for p in exact)  # without the rounding of the fit
-        if not (np.isfinite(parameters).all() and FORMS[kind].valid(parameters)):
+        if not (np.isfinite(parameters).all() and _ordinary(kind, parameters)):
             continue
         one = FuzzySet(name, kind, parameters)
         if np.abs(membership(one, x) - mu).max() <= TOLERANCE:
@@ -64,6 +64,14 @@ def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
     raise ValueError(
         f"set {name!r}: its samples are of no triangle, trapezoid, one- or two-sided Gaussian, "
         "bell, Z, S or pi spline and sigmoid; give it as one of these, or sample it more finely"
+    )
+
+
+def _ordinary(kind: Kind, parameters: Parameters) -> bool:
+    """Whether these are the parameters that one would write: a core, nothing to be straightened."""
+    form = FORMS[kind]
+    return (
+        form.valid(parameters) and form.plain(parameters) == parameters and form.peaks(parameters)
     )
 
 

@@ -63,8 +63,11 @@ def _met_before(system: FuzzySystem, *, same_consequent: bool) -> Iterator[Pair]
 def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
     """Every dominated rule, with the shortest rule that it gives way to.
 
-    Rules of weight 0 are left out. Of rules that are equal, the first one stays.
+    Rules of weight 0 are left out. Of rules that are equal, the first one stays. Where aggregation
+    adds every rule counts, and none is dominated.
     """
+    if system.operators.aggregation != "max":
+        return ()
     forms = [form(rule, system.operators) for rule in system.rules]
 
     def gives_way(i: int, j: int) -> bool:

@@ -77,6 +77,17 @@ def _check(system: FuzzySystem) -> None:
             f"{system.name}: scikit-fuzzy has no Sugeno inference; give the output membership "
             "functions"
         )
+    if not system.operators.is_centroid_of_union:
+        raise ValueError(
+            f"aggregation {system.operators.aggregation}, defuzzification "
+            f"{system.operators.defuzzification}: only max and centroid are handed on; use these"
+        )
+    for variable in (*system.inputs, system.output):
+        if variable.low == variable.high:
+            raise ValueError(
+                f"{variable.name}: its universe has no width, on which scikit-fuzzy cannot sample "
+                "its sets; widen it"
+            )
     if system.operators.implication != "min":
         raise ValueError("implication 'prod': scikit-fuzzy clips only; use min")
     if system.output.name in {variable.name for variable in system.inputs}:

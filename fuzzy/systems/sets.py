@@ -1,7 +1,9 @@
 """Fuzzy sets: a membership function and its footprint of uncertainty.
 
 Kinds and the order of their parameters are those of MATLAB's `.fis` files, which Octave and
-scikit-fuzzy share: a Gaussian is (sd, centre).
+scikit-fuzzy share: a Gaussian is (sd, centre). So is what becomes of odd parameters: the sign of a
+width does not count, equal corners are a step or a spike, an S or a Z in falling order is a step
+half-way. A Gaussian without width is a spike, where Octave has no number at the centre.
 
 A footprint says how far the function may lie from where it is drawn. The upper and the lower
 membership are the largest and the smallest value met on the way; every function with a footprint
@@ -31,9 +33,13 @@ Kind = Literal[
     "zmf",
     "smf",
     "pimf",
+    "linzmf",
+    "linsmf",
     "constant",
     "linear",
 ]
+NO_WIDTH = float(np.finfo(np.float64).tiny)
+"""Width of a spike: nothing but its centre is near enough to be a member."""
 FUNCTION_KINDS: tuple[Kind, ...] = ("constant", "linear")
 """Consequents of Sugeno systems: numbers, not sets."""
 
@@ -83,9 +89,17 @@ class FuzzySet:
     def __post_init__(self) -> None:
         kinds = (*FORMS, *FUNCTION_KINDS)
         if self.kind not in kinds:
-            raise ValueError(f"set {self.name!r}: kind {self.kind!r}; use {', '.join(kinds)}")
+            raise ValueError(
+                f"set {self.name!r}: kind {self.kind!r} is none of MATLAB's, and functions of "
+                f"one's own are no part of a file; use {', '.join(kinds)}"
+            )
         _check_parameters(self)
         _check_footprint(self)
+
+    @property
+    def shape(self) -> Parameters:
+        """The parameters as the function takes them, without the signs that do not matter."""
+        return FORMS[self.kind].plain(self.parameters)
 
 
 def _check_parameters(one: FuzzySet) -> None:
@@ -105,7 +119,7 @@ def _check_parameters(one: FuzzySet) -> None:
     if not form.valid(one.parameters):
         raise ValueError(
             f"set {one.name!r}: parameters {one.parameters} do not form a {one.kind}; "
-            f"{REMEDIES.get(one.kind, 'give positive widths and slopes other than 0')}"
+            f"{REMEDIES[one.kind]}"
         )
 
 
@@ -115,9 +129,10 @@ def _check_footprint(one: FuzzySet) -> None:
     if one.kind in FUNCTION_KINDS:
         raise ValueError(f"set {one.name!r}: a {one.kind} consequent takes no footprint")
     moved, widened = one.footprint.mean > 0, one.footprint.spread > 0
-    if one.kind in ("dsigmf", "psigmf") and (moved or widened):
+    if not has_core(one) and (moved or widened):
         raise ValueError(
-            f"set {one.name!r}: a {one.kind} has no core to move or widen; use scale and lag"
+            f"set {one.name!r}: a {one.kind} of {one.parameters} has no core to move or widen; "
+            "use scale and lag"
         )
     if one.kind == "sigmf" and widened:
         raise ValueError(
@@ -127,7 +142,8 @@ def _check_footprint(one: FuzzySet) -> None:
 
 def gaussian(x: Array, sd: float, centre: float) -> Array:
     """exp(-(x - centre)^2 / 2 sd^2)."""
-    return np.asarray(np.exp(-0.5 * ((x - centre) / sd) ** 2))
+    with np.errstate(over="ignore"):  # exp(-inf) is the 0 that it should be
+        return np.asarray(np.exp(-0.5 * ((x - centre) / sd) ** 2))
 
 
 def _ramp(x: Array, foot: float, top: float) -> Array:
@@ -158,7 +174,8 @@ def _spline(x: Array, foot: float, top: float) -> Array:
 
 
 def _pi(x: Array, a: float, b: float, c: float, d: float) -> Array:
-    return _inside(x, a, d, np.minimum(_spline(x, a, b), _spline(x, d, c)))
+    # MATLAB's product of an S and a Z, which is their minimum unless the tops cross.
+    return _inside(x, a, d, _spline(x, a, b) * _spline(x, d, c))
 
 
 def _two_sided(x: Array, p: Parameters) -> Array:
@@ -166,35 +183,66 @@ def _two_sided(x: Array, p: Parameters) -> Array:
 
 
 def _bell(x: Array, half_width: float, slope: float, centre: float) -> Array:
-    with np.errstate(over="ignore"):  # 1 / inf is the 0 that it should be
+    with np.errstate(over="ignore", divide="ignore"):  # 1 / inf is the 0 that it should be
         return 1.0 / (1.0 + np.abs((x - centre) / half_width) ** (2.0 * slope))
 
 
 def _rising(p: Parameters) -> bool:
-    return p[0] < p[-1] and list(p) == sorted(p)
+    return list(p) == sorted(p)
+
+
+def _always(_: Parameters) -> bool:
+    return True
+
+
+def _as_given(p: Parameters) -> Parameters:
+    return p
+
+
+def _width(width: float) -> float:
+    """The width without its sign, which is squared away; of 0 one that leaves the centre alone."""
+    return abs(width) or NO_WIDTH
+
+
+def _flank(foot: float, top: float) -> Parameters:
+    """A rising flank, (foot, top); in falling order MATLAB has a step half-way between."""
+    return (foot, top) if foot < top else (0.5 * (foot + top),) * 2
+
+
+def _linear_z(p: Parameters) -> Parameters:
+    """Top and foot; at a step the foot itself is 0, unlike that of all other kinds."""
+    return p if p[0] < p[1] else (float(np.nextafter(p[0], -np.inf)),) * 2
 
 
 class MembershipForm(NamedTuple):
-    """One kind: names of its parameters, when they are valid, the function, ends of its core."""
+    """One kind: names of its parameters, when they are valid, the function, ends of its core.
+
+    Function and core take the `plain` parameters; `peaks` says whether these reach 1 at a core.
+    """
 
     parameters: str
     valid: Callable[[Parameters], bool]
     function: Callable[[Array, Parameters], Array]
     core: Callable[[Parameters], tuple[float, float]] | None
+    plain: Callable[[Parameters], Parameters] = _as_given
+    peaks: Callable[[Parameters], bool] = _always
 
 
 FORMS: dict[str, MembershipForm] = {
     "gaussmf": MembershipForm(
         "sd centre",
-        lambda p: p[0] > 0,
+        _always,
         lambda x, p: gaussian(x, *p),
         lambda p: (p[1], p[1]),
+        lambda p: (_width(p[0]), p[1]),
     ),
     "gauss2mf": MembershipForm(
         "sd_left centre_left sd_right centre_right",
-        lambda p: p[0] > 0 and p[2] > 0 and p[1] <= p[3],
+        _always,
         _two_sided,
         lambda p: (p[1], p[3]),
+        lambda p: (_width(p[0]), p[1], _width(p[2]), p[3]),
+        lambda p: p[1] <= p[3],
     ),
     "trimf": MembershipForm(
         "foot_left peak foot_right",
@@ -204,81 +252,108 @@ FORMS: dict[str, MembershipForm] = {
     ),
     "trapmf": MembershipForm(
         "foot_left top_left top_right foot_right",
-        _rising,
+        lambda p: p[0] <= p[1] and p[2] <= p[3],
         lambda x, p: _trapezoid(x, *p),
         lambda p: (p[1], p[2]),
+        peaks=lambda p: p[1] <= p[2],
     ),
     "gbellmf": MembershipForm(
         "half_width slope centre",
-        lambda p: p[0] > 0 and p[1] > 0,
+        lambda p: p[0] != 0,
         lambda x, p: _bell(x, *p),
         lambda p: (p[2], p[2]),
+        lambda p: (abs(p[0]), p[1], p[2]),
+        lambda p: p[1] > 0,
     ),
     "sigmf": MembershipForm(
         "slope centre",
-        lambda p: p[0] != 0,
+        _always,
         lambda x, p: _sigmoid(x, *p),
         lambda p: (np.inf, np.inf) if p[0] > 0 else (-np.inf, -np.inf),
+        peaks=lambda p: p[0] != 0,
     ),
     "dsigmf": MembershipForm(
         "slope_1 centre_1 slope_2 centre_2",
-        lambda p: p[0] != 0 and p[2] != 0,
+        _always,
         lambda x, p: np.abs(_sigmoid(x, p[0], p[1]) - _sigmoid(x, p[2], p[3])),
         None,
     ),
     "psigmf": MembershipForm(
         "slope_1 centre_1 slope_2 centre_2",
-        lambda p: p[0] != 0 and p[2] != 0,
+        _always,
         lambda x, p: _sigmoid(x, p[0], p[1]) * _sigmoid(x, p[2], p[3]),
         None,
     ),
     "zmf": MembershipForm(
         "top foot",
-        lambda p: p[0] < p[1],
-        lambda x, p: _spline(x, p[1], p[0]),
+        _always,
+        lambda x, p: _inside(x, -np.inf, p[1], _spline(x, p[1], p[0])),
         lambda p: (-np.inf, p[0]),
+        lambda p: _flank(*p),
     ),
     "smf": MembershipForm(
         "foot top",
-        lambda p: p[0] < p[1],
-        lambda x, p: _spline(x, p[0], p[1]),
+        _always,
+        lambda x, p: _inside(x, p[0], np.inf, _spline(x, p[0], p[1])),
         lambda p: (p[1], np.inf),
+        lambda p: _flank(*p),
     ),
     "pimf": MembershipForm(
         "foot_left top_left top_right foot_right",
-        _rising,
+        _always,
         lambda x, p: _pi(x, *p),
         lambda p: (p[1], p[2]),
+        lambda p: (*_flank(*p[:2]), *_flank(*p[2:])),
+        lambda p: p[1] <= p[2],
+    ),
+    "linzmf": MembershipForm(
+        "top foot",
+        _rising,
+        lambda x, p: _inside(x, -np.inf, p[1], _ramp(x, p[1], p[0])),
+        lambda p: (-np.inf, p[0]),
+        _linear_z,
+    ),
+    "linsmf": MembershipForm(
+        "foot top",
+        _rising,
+        lambda x, p: _inside(x, p[0], np.inf, _ramp(x, p[0], p[1])),
+        lambda p: (p[1], np.inf),
     ),
 }
 """Every kind of membership function, by its name in `.fis` files."""
 
 
-_CORNERS = "give corners in rising order, the first below the last"
 REMEDIES: dict[str, str] = {
-    **dict.fromkeys(("trimf", "trapmf", "zmf", "smf", "pimf"), _CORNERS),
-    "gauss2mf": "give positive widths, and centre_left at most centre_right: the other way round, "
-    "which MATLAB allows, it has no core and stays below 1",
+    **dict.fromkeys(("trimf", "linzmf", "linsmf"), "give corners in rising order"),
+    "trapmf": "give both feet outside their tops",
+    "gbellmf": "give a half-width other than 0, as MATLAB and Octave ask; trimf [c c c] is a spike",
 }
-"""What to do about parameters that are not valid, for kinds with more to say than most."""
+"""What to do about parameters that are not valid, for the kinds that have such."""
+
+
+def has_core(one: FuzzySet) -> bool:
+    """Whether the membership rises to 1 and then falls, either of which may take it for ever."""
+    form = FORMS[one.kind]
+    return form.core is not None and form.peaks(one.shape)
 
 
 def core(one: FuzzySet) -> tuple[float, float]:
     """Ends of the interval where the membership is 1; infinite where it is open."""
     ends = FORMS[one.kind].core
-    if ends is None:
-        raise ValueError(f"set {one.name!r}: a {one.kind} has no core")
-    return ends(one.parameters)
+    if ends is None or not has_core(one):
+        raise ValueError(f"set {one.name!r}: a {one.kind} of {one.parameters} has no core")
+    return ends(one.shape)
 
 
 def corners(one: FuzzySet) -> tuple[float, ...]:
     """Positions where the function, or a bound of its footprint, is not smooth or may be steep."""
-    p, shift, widths = one.parameters, one.footprint.mean, one.footprint.spread
+    p, shift, widths = one.shape, one.footprint.mean, one.footprint.spread
     places: tuple[float, ...]
     match one.kind:
-        case "trimf" | "trapmf" | "pimf" | "zmf" | "smf":
-            halves = (0.5 * (p[0] + p[1]), 0.5 * (p[-2] + p[-1]))
-            places = (*p, *(halves if one.kind in ("pimf", "zmf", "smf") else ()))
+        case "pimf" | "zmf" | "smf":
+            places = (*p, 0.5 * (p[0] + p[1]), 0.5 * (p[-2] + p[-1]))
+        case "trimf" | "trapmf" | "linzmf" | "linsmf":
+            places = p if has_core(one) else (*p, _meeting(*p))
         case "gauss2mf":
             places = (p[1], p[3])
         case "gbellmf":
@@ -296,6 +371,12 @@ def corners(one: FuzzySet) -> tuple[float, ...]:
         places = tuple(q + factor * (x - q) for x, q in nearest for factor in factors)
     crossing = (_crossing(one),) if shift > 0 and np.isfinite([low, high]).all() else ()
     return (*crossing, *(x + s for x in places for s in (-shift, 0.0, shift)))
+
+
+def _meeting(a: float, b: float, c: float, d: float) -> float:
+    """Where the flanks of a trapezoid meet whose tops cross."""
+    width = (b - a) + (d - c)
+    return (a * (d - c) + d * (b - a)) / width if width > 0 else a
 
 
 BISECTIONS = 80
@@ -318,7 +399,9 @@ def _crossing(one: FuzzySet) -> float:
 @lru_cache(maxsize=1024)
 def _turns(one: FuzzySet) -> Parameters:
     """Where a product of two sigmoids is largest, and a difference largest or 0."""
-    (c_1, c_2), (a_1, a_2) = one.parameters[1::2], one.parameters[::2]
+    (c_1, c_2), (a_1, a_2) = one.shape[1::2], one.shape[::2]
+    if a_1 == 0 or a_2 == 0:  # what is left rises or falls throughout, and passes 1/2 at its centre
+        return ()
     reach = abs(c_1 - c_2) + 750.0 / min(abs(a_1), abs(a_2))  # exp(-750) is 0
     if one.kind == "psigmf":
         # The slope of its logarithm falls throughout, from above 0 to below it if it has a peak.
@@ -361,7 +444,7 @@ def membership(one: FuzzySet, x: Array) -> Array:
     """Type-1 membership of x, any shape, with the set in its principal form."""
     if one.kind in FUNCTION_KINDS:
         raise ValueError(f"set {one.name!r}: a {one.kind} consequent has no membership")
-    return np.asarray(FORMS[one.kind].function(x, one.parameters))
+    return np.asarray(FORMS[one.kind].function(x, one.shape))
 
 
 def upper_membership(one: FuzzySet, x: Array) -> Array:

@@ -7,8 +7,9 @@ of the whole set on the output's universe, and rules and operators stay.
 import numpy as np
 
 from fuzzy.systems import exact
+from fuzzy.systems.mamdani import require_centroid_of_union
 from fuzzy.systems.options import InferenceOptions
-from fuzzy.systems.quadrature import Output, centroid, is_exact, sampled
+from fuzzy.systems.quadrature import Output, defuzzified, is_exact, sampled
 from fuzzy.systems.sets import Array, membership
 from fuzzy.systems.system import MERGES, FuzzySystem, firing_strengths, joins, memberships, merged
 
@@ -28,15 +29,17 @@ def consequents(system: FuzzySystem, sampling: str, samples: int) -> Array:
 
 
 def constants(system: FuzzySystem, sampling: str, samples: int) -> Array:
-    """Centroid of each whole output set on the output's universe, shape (sets,).
+    """The number that stands for each whole output set, its centroid or as the system has it.
 
-    NaN for a set without mass on it.
+    Shape (sets,); NaN for a set without mass on the universe.
     """
     if is_exact(sampling):
+        require_centroid_of_union(system, "sampling = 'exact'")
         whole = np.eye(len(system.output.sets))
         return np.array([exact.centroid(system, heights, membership) for heights in whole])
     quadrature = sampled(system.output, samples, sampling)
-    return centroid(quadrature, memberships(system.output, quadrature.y, membership))
+    mu = memberships(system.output, quadrature.y, membership)
+    return defuzzified(quadrature, mu, system.operators.defuzzification, sampling)
 
 
 def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output:
@@ -52,13 +55,16 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
     # A set without weight has no say, even if it is off the universe and so without a constant.
     weighted = np.multiply(weights, answers, out=np.zeros_like(weights), where=weights > 0)
     moment, total = weighted.sum(axis=0), weights.sum(axis=0)
+    if system.operators.defuzzification == "wtsum":
+        return Output(np.where(total > 0, moment, np.nan), None, strengths.max(axis=0))
     value = np.divide(moment, total, out=np.full_like(total, np.nan), where=total > 0)
     return Output(value, None, strengths.max(axis=0))
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
     """One sentence on how Sugeno answers are computed."""
-    average = f"weighted average over every {MERGES[options.sugeno_aggregation].weighed}"
+    how = "sum" if system.operators.defuzzification == "wtsum" else "average"
+    average = f"weighted {how} over every {MERGES[options.sugeno_aggregation].weighed}"
     if system.is_sugeno:
         return f"Sugeno: {joins(system.operators)}, {average}"
     return f"Sugeno: constants by {options.points} over each output set, {average}"

@@ -36,6 +36,16 @@ MERGES: dict[str, Merge] = {
 }
 
 
+OPERATORS: dict[str, tuple[str, ...]] = {
+    "conjunction": ("min", "prod"),
+    "disjunction": ("max", "probor"),
+    "implication": ("min", "prod"),
+    "aggregation": ("max", "sum", "probor"),
+    "defuzzification": ("centroid", "bisector", "mom", "som", "lom", "wtsum"),
+}
+"""What the operators of a system may be; wtsum, the weighted sum, is for Sugeno alone."""
+
+
 class Term(NamedTuple):
     """One `input is [not] set` of an antecedent, by index."""
 
@@ -46,7 +56,11 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class Variable:
-    """An input or the output on the universe [low, high], with its sets."""
+    """An input or the output on the universe [low, high], with its sets.
+
+    A universe without width, low = high, is one that nobody gave: `reach` is then the whole line.
+    An input without sets takes part in linear consequents only.
+    """
 
     name: str
     low: float
@@ -54,13 +68,19 @@ class Variable:
     sets: tuple[FuzzySet, ...]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
-            raise ValueError(f"variable {self.name!r}: low {self.low} must be below {self.high}")
-        if not self.sets:
-            raise ValueError(f"variable {self.name!r}: has no set; give at least one")
+        if not (np.isfinite([self.low, self.high]).all() and self.low <= self.high):
+            raise ValueError(
+                f"variable {self.name!r}: low {self.low} must be below {self.high}, which MATLAB "
+                "and Octave ask for too; exchange them"
+            )
         names = [one.name for one in self.sets]
         if len(set(names)) < len(names):
             raise ValueError(f"variable {self.name!r}: two sets share a name; rename one")
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Where a reading is expected: the universe, and anywhere if that has no width."""
+        return (self.low, self.high) if self.low < self.high else (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -74,27 +94,39 @@ class Rule:
 
     def __post_init__(self) -> None:
         if not 0 <= self.weight <= 1:
-            raise ValueError(f"rule weight {self.weight}: give a number from 0 to 1")
+            raise ValueError(
+                f"rule weight {self.weight}: give a number from 0 to 1, as MATLAB asks"
+            )
         if self.connective not in get_args(Connective):
             raise ValueError(f"rule connective {self.connective!r}: use and, or")
 
 
 @dataclass(frozen=True)
 class Operators:
-    """AND, OR and implication; aggregation is max, for which rules merge to heights."""
+    """AND, OR, implication, aggregation and defuzzification, by MATLAB's names.
+
+    Aggregation by max lets rules merge to heights. The default of `defuzzification` is the centroid
+    of a curve and, for a Sugeno system, the weighted average.
+    """
 
     conjunction: Literal["min", "prod"] = "min"
     disjunction: Literal["max", "probor"] = "max"
     implication: Literal["min", "prod"] = "min"
+    aggregation: Literal["max", "sum", "probor"] = "max"
+    defuzzification: Literal["centroid", "bisector", "mom", "som", "lom", "wtsum"] = "centroid"
 
     def __post_init__(self) -> None:
-        for key, allowed in (
-            ("conjunction", ("min", "prod")),
-            ("disjunction", ("max", "probor")),
-            ("implication", ("min", "prod")),
-        ):
+        for key, allowed in OPERATORS.items():
             if getattr(self, key) not in allowed:
-                raise ValueError(f"{key} {getattr(self, key)!r}: use one of {', '.join(allowed)}")
+                raise ValueError(
+                    f"{key} {getattr(self, key)!r}: functions of one's own and those of Octave "
+                    f"alone are not computed; use one of {', '.join(allowed)}"
+                )
+
+    @property
+    def is_centroid_of_union(self) -> bool:
+        """Whether the answer is the centroid of the maximum, which need not be sampled."""
+        return self.aggregation == "max" and self.defuzzification == "centroid"
 
 
 @dataclass(frozen=True)
@@ -115,6 +147,7 @@ class FuzzySystem:
         names = [variable.name for variable in self.inputs]
         if not names or len(set(names)) < len(names):
             raise ValueError("inputs: give at least one, each with a name of its own")
+        _check_output(self.output)
         if not self.rules:
             raise ValueError("the system has no rules: give at least one")
         for number, rule in enumerate(self.rules, start=1):
@@ -123,6 +156,7 @@ class FuzzySystem:
                     f"rule {number}: {rule} names an input or a set the system does not have"
                 )
         _check_kinds(self)
+        _check_operators(self)
 
     @property
     def is_sugeno(self) -> bool:
@@ -136,6 +170,29 @@ def _fits(rule: Rule, system: FuzzySystem) -> bool:
         for term in rule.antecedents
     )
     return bool(rule.antecedents) and known and 0 <= rule.consequent < len(system.output.sets)
+
+
+def _check_output(output: Variable) -> None:
+    if not output.sets:
+        raise ValueError(f"output {output.name!r}: has no set; give at least one")
+    if output.low == output.high and output.sets[0].kind not in FUNCTION_KINDS:
+        raise ValueError(
+            f"output {output.name!r}: the universe {output.low:g} to {output.high:g} has no width, "
+            "and so no area whose centroid could be the answer (Octave refuses it too); widen it"
+        )
+
+
+def _check_operators(system: FuzzySystem) -> None:
+    aggregation, defuzzification = system.operators.aggregation, system.operators.defuzzification
+    if system.is_sugeno and (aggregation != "max" or defuzzification not in ("centroid", "wtsum")):
+        raise ValueError(
+            f"output {system.output.name!r}: a Sugeno system has no curve for aggregation "
+            f"{aggregation} and defuzzification {defuzzification}; leave them out, or take wtsum"
+        )
+    if not system.is_sugeno and defuzzification == "wtsum":
+        raise ValueError(
+            f"output {system.output.name!r}: wtsum is for constants; choose another defuzzification"
+        )
 
 
 def _check_kinds(system: FuzzySystem) -> None:
@@ -157,7 +214,8 @@ def _check_kinds(system: FuzzySystem) -> None:
         if one.kind == "linear" and len(one.parameters) != width:
             raise ValueError(
                 f"output set {one.name!r}: linear takes {width} parameters, one per input and the "
-                f"constant, got {len(one.parameters)}"
+                f"constant, got {len(one.parameters)}; it does not say which are missing, "
+                "and MATLAB and Octave refuse it too"
             )
 
 
@@ -165,7 +223,7 @@ def joins(operators: Operators) -> str:
     """Words for a system's operators, as methods name them."""
     return (
         f"AND {operators.conjunction}, OR {operators.disjunction}, "
-        f"implication {operators.implication}, aggregation max"
+        f"implication {operators.implication}, aggregation {operators.aggregation}"
     )
 
 
@@ -225,3 +283,15 @@ def union(fired: Array, output: Array, operators: Operators) -> Array:
     """Max of the output sets (K, M) implied at the heights (K, N), shape (N, M)."""
     imply = np.minimum if operators.implication == "min" else np.multiply
     return np.asarray(imply(fired[:, :, None], output[:, None, :]).max(axis=0))
+
+
+def aggregated(system: FuzzySystem, strengths: Array, output: Array) -> Array:
+    """The curve (N, M) of the rules at their strengths (rules, N), from the output sets (K, M)."""
+    if system.operators.aggregation == "max":
+        return union(merged(system, strengths), output, system.operators)
+    imply = np.minimum if system.operators.implication == "min" else np.multiply
+    curve = np.zeros((strengths.shape[1], output.shape[1]))
+    for rule, strength in zip(system.rules, strengths, strict=True):
+        part = imply(strength[:, None], output[rule.consequent])
+        curve += part if system.operators.aggregation == "sum" else part * (1.0 - curve)
+    return curve

@@ -1,11 +1,9 @@
 """Tables of readings: a CSV file in, the same file with the answers of a fuzzy system out."""
 
-import csv
 import difflib
 import math
 import re
-import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +13,7 @@ from fuzzy.systems.inference import Inferred, infer
 from fuzzy.systems.kinds import check_kind
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Array
+from fuzzy.systems.spreadsheet import Table, TableError, read_table, write_table
 from fuzzy.systems.system import FuzzySystem
 
 VALUE = "estimate"
@@ -23,22 +22,23 @@ BOUNDS = ("lower", "upper")
 _ROW = r"\(row (\d+)(?: of \d+)?"
 
 
-class TableError(ValueError):
-    """A table that cannot be read or written; the message names file, line and remedy."""
+class Blanks(NamedTuple):
+    """What a blank cell means: `value` stands in for the reading, and `note` says so.
+
+    `system` gives the system that answers where only the inputs named have a reading.
+    """
+
+    value: float
+    system: Callable[[tuple[str, ...]], FuzzySystem]
+    note: str
 
 
-class Table(NamedTuple):
-    """Cells of a CSV file, and the lines on which the header and each row begin."""
+class _Group(NamedTuple):
+    """Rows (n,) of a table that one system answers, and their readings (n, inputs)."""
 
-    file: str
-    header_line: int
-    header: list[str]
-    rows: list[list[str]]
-    lines: list[int]
-
-    def fault(self, line: int, what: str) -> TableError:
-        """The TableError that blames a line of the file."""
-        return TableError(f"{self.file}:{line}: {what}")
+    system: FuzzySystem
+    rows: list[int]
+    X: Array
 
 
 def evaluate_table(
@@ -49,13 +49,15 @@ def evaluate_table(
     options: InferenceOptions | None = None,
     unit: str = "",
     plausible: tuple[float, float] = (-math.inf, math.inf),
+    blanks: Blanks | None = None,
 ) -> tuple[str, ...]:
     """Write the table with the column `estimate`, for type-2 also `lower` and `upper`; its notes.
 
     Columns are found by the names of the inputs, in their units; all columns are passed on as they
-    are, empty lines are left out. An earlier `csv_out` is replaced once everything is computed; it
-    may not be `csv_in`. Raises ValueError naming file, line, column and remedy, also for a reading
-    outside the `plausible` ones.
+    are, parted as they were, empty lines are left out. A blank cell is refused unless `blanks` says
+    what it means. An earlier `csv_out` is replaced once everything is computed; it may not be
+    `csv_in`. Raises ValueError naming file, line, column and remedy, also for a reading outside the
+    `plausible` ones.
     """
     check_kind(system, kind)
     if csv_out.resolve() == csv_in.resolve():
@@ -63,16 +65,55 @@ def evaluate_table(
     table = read_table(csv_in)
     added = (VALUE, *BOUNDS) if kind == "interval-type-2" else (VALUE,)
     _check_header(table, added)
-    X = _readings(table, system)
+    X = _readings(table, system, blanks=blanks is not None)
     _check_plausible(X, table, system, plausible, unit)
-    try:
-        inferred = infer(system, X, kind, options, unit)
-    except ValueError as error:
-        raise TableError(f"{table.file}: {_with_lines(str(error), table, system)}") from error
-    answers = _columns(inferred).tolist()
-    rows = (cells + answer for cells, answer in zip(table.rows, answers, strict=True))
-    _write(csv_out, [*table.header, *added], rows)
-    return tuple(_with_lines(note, table, system) for note in inferred.notes)
+    answers = np.empty((len(X), len(added)))
+    notes = [] if blanks is None else _on_blanks(X, table, system, blanks)
+    for group in _groups(X, table, system, blanks):
+        part = table._replace(lines=[table.lines[row] for row in group.rows])
+        try:
+            inferred = infer(group.system, group.X, kind, options, unit)
+        except ValueError as error:
+            raise TableError(f"{table.file}: {_with_lines(str(error), part, system)}") from error
+        answers[group.rows] = _columns(inferred)
+        notes += [_with_lines(note, part, system) for note in inferred.notes]
+    point = "," if _decimal_commas(table, system) else "."
+    texts = ([repr(x).replace(".", point) for x in row] for row in answers.tolist())
+    rows = (cells + answer for cells, answer in zip(table.rows, texts, strict=True))
+    write_table(csv_out, [*table.header, *added], rows, table.delimiter)
+    return tuple(dict.fromkeys(notes))
+
+
+def _on_blanks(X: Array, table: Table, system: FuzzySystem, blanks: Blanks) -> list[str]:
+    notes = []
+    for i, variable in enumerate(system.inputs):
+        rows = np.flatnonzero(np.isnan(X[:, i]))
+        if rows.size:
+            more = f" and {rows.size - 1} more" if rows.size > 1 else ""
+            line = table.lines[rows[0]]
+            notes.append(f"{variable.name}: no reading (line {line}{more}); {blanks.note}")
+    return notes
+
+
+def _groups(X: Array, table: Table, system: FuzzySystem, blanks: Blanks | None) -> Iterator[_Group]:
+    """The rows by the system that answers them, without blanks."""
+    if blanks is None or not np.isnan(X).any():
+        yield _Group(system, list(range(len(X))), X)
+        return
+    known = ~np.isnan(X)
+    systems: dict[tuple[bool, ...], FuzzySystem] = {}
+    rows: dict[FuzzySystem, list[int]] = {}
+    for row, mask in enumerate(map(tuple, known.tolist())):
+        if mask not in systems:
+            names = (one.name for one, has in zip(system.inputs, mask, strict=True) if has)
+            try:
+                systems[mask] = blanks.system(tuple(names))
+            except ValueError as error:
+                raise table.fault(table.lines[row], str(error)) from error
+        rows.setdefault(systems[mask], []).append(row)
+    filled = np.where(known, X, blanks.value)
+    for one, places in rows.items():
+        yield _Group(one, places, filled[places])
 
 
 def _check_plausible(
@@ -88,49 +129,18 @@ def _check_plausible(
         )
 
 
-def read_readings(path: Path, system: FuzzySystem) -> Array:
-    """The readings of a table, shape (rows, inputs), in the order of the system's inputs."""
-    return _readings(read_table(path), system)
+def read_readings(path: Path, system: FuzzySystem, *, blanks: bool = False) -> Array:
+    """The readings of a table, shape (rows, inputs), in the order of the system's inputs.
 
-
-def read_table(path: Path) -> Table:
-    """The cells of a CSV file with a header; TableError naming file, line and remedy."""
-    lines: list[int] = []
-    rows: list[list[str]] = []
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file, strict=True)
-            after = 0
-            for cells in reader:
-                if cells:
-                    rows.append(cells)
-                    lines.append(after + 1)
-                after = reader.line_num
-    except OSError as error:
-        raise TableError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise TableError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
-    except csv.Error as error:
-        raise TableError(f"{path}:{reader.line_num}: {error}; export the table again") from None
-    if len(rows) < 2:
-        raise TableError(f"{path}: holds no readings; give a header and at least one row")
-    table = Table(str(path), lines[0], rows[0], rows[1:], lines[1:])
-    _check_widths(table)
-    return table
-
-
-def _check_widths(table: Table) -> None:
-    for cells, line in zip(table.rows, table.lines, strict=True):
-        if len(cells) != len(table.header):
-            raise table.fault(
-                line, f"{len(cells)} cells under {len(table.header)} columns; correct the row"
-            )
+    With `blanks`, NaN where there is none.
+    """
+    return _readings(read_table(path), system, blanks=blanks)
 
 
 def _check_header(table: Table, added: Sequence[str]) -> None:
     names = [name.strip() for name in table.header]
     for name in names:
-        if names.count(name) > 1:
+        if name and names.count(name) > 1:
             raise table.fault(
                 table.header_line, f"column {name!r} stands there twice; rename or remove one"
             )
@@ -140,26 +150,39 @@ def _check_header(table: Table, added: Sequence[str]) -> None:
             )
 
 
-def _readings(table: Table, system: FuzzySystem) -> Array:
-    """The columns of the inputs as numbers, shape (rows, inputs)."""
+def _readings(table: Table, system: FuzzySystem, *, blanks: bool) -> Array:
+    """The columns of the inputs as numbers, shape (rows, inputs); NaN where blank, if allowed."""
     names = [name.strip() for name in table.header]
-    inputs = [variable.name for variable in system.inputs]
-    columns = [_column(name, names, inputs, table) for name in inputs]
+    columns = _input_columns(table, system)
+    commas = _decimal_commas(table, system)
     return np.array(
         [
-            [_reading(cells[column], table, line, names[column]) for column in columns]
+            [
+                math.nan
+                if blanks and not cells[column].strip()
+                else _reading(cells[column], table, line, names[column], commas=commas)
+                for column in columns
+            ]
             for cells, line in zip(table.rows, table.lines, strict=True)
         ]
     )
 
 
+def _input_columns(table: Table, system: FuzzySystem) -> list[int]:
+    names = [name.strip() for name in table.header]
+    inputs = [variable.name for variable in system.inputs]
+    return [_column(name, names, inputs, table) for name in inputs]
+
+
+def _decimal_commas(table: Table, system: FuzzySystem) -> bool:
+    """Whether readings are written with decimal commas, as where semicolons part the columns."""
+    columns = _input_columns(table, system)
+    return table.delimiter != "," and any("," in row[k] for row in table.rows for k in columns)
+
+
 def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int:
-    if name in names:
-        return names.index(name)
-    if len(names) == 1 and ";" in names[0]:
-        raise table.fault(
-            table.header_line, "columns are parted by semicolons; export with commas and points"
-        )
+    if name.strip() in names:
+        return names.index(name.strip())
     # Never another input's column: two diseases may have names alike.
     folded = {present.casefold(): present for present in names if present not in inputs}
     closest = difflib.get_close_matches(name.casefold(), folded, 1)
@@ -168,12 +191,19 @@ def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int
     raise table.fault(table.header_line, f"no column {name!r} among {present}{hint}")
 
 
-def _reading(cell: str, table: Table, line: int, name: str) -> float:
+def _reading(cell: str, table: Table, line: int, name: str, *, commas: bool) -> float:
+    if commas and "." in cell:
+        raise table.fault(
+            line, f"{name}: {cell!r} stands beside decimal commas; write it as the others"
+        )
     try:
-        value = float(cell)
+        value = float(cell.replace(",", ".") if commas else cell)
     except ValueError:
         what = f"{cell!r} is no number" if cell.strip() else "the cell is empty"
-        raise table.fault(line, f"{name}: {what}; give a number or remove the row") from None
+        remedy = "give a number or remove the row"
+        if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
+            remedy = "write a point, or part columns by semicolons for decimal commas"
+        raise table.fault(line, f"{name}: {what}; {remedy}") from None
     if not math.isfinite(value) or "_" in cell:
         raise table.fault(line, f"{name}: {cell!r} is no finite number; correct it")
     return value
@@ -194,17 +224,3 @@ def _with_lines(message: str, table: Table, system: FuzzySystem) -> str:
 def _columns(inferred: Inferred) -> Array:
     value = inferred.value[:, None]
     return value if inferred.interval is None else np.hstack([value, inferred.interval])
-
-
-def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[str | float]]) -> None:
-    """Write the file aside and move it into place; numbers with all their digits."""
-    try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as aside:
-            partial = Path(aside) / path.name
-            with partial.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(header)
-                writer.writerows(rows)
-            partial.replace(path)
-    except OSError as error:
-        raise TableError(f"{path}: cannot be written ({error.strerror})") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from dataclasses import dataclass
@@ -17,7 +18,20 @@ if TYPE_CHECKING:
 _NUMBER = r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)"
 _UNIT = r"[A-Za-z]{1,12}(\^-?[1-4])?"
 _TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>%|({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
+_COMMA = re.compile(r"[+-]?\d+,\d")
 _LONGEST_TEXT = 80
+USUAL = {
+    "m": ("mm", "cm", "m", "um"),
+    "m^3": ("ml", "l", "L", "m^3", "mm^3", "cm^3"),
+    "kg": ("g", "kg", "mg"),
+    "N": ("mN", "N", "kN", "uN"),
+    "Pa": ("Pa", "kPa", "MPa"),
+    "Pa/m": ("Pa/m", "kPa/m", "MPa/m", "N/m^3"),
+    "s": ("s", "ms", "us", "min"),
+    "Hz": ("Hz", "kHz"),
+    "kg/m^3": ("kg/m^3", "g/cm^3"),
+}
+"""Units that are suggested, by the SI unit."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +52,9 @@ class Quantity:
         if not math.isfinite(number):
             raise ValueError("must be finite")
         if not self.low <= number <= self.high:
-            raise ValueError(f"must lie between {self.low:g} and {self.high:g} {self.unit}".strip())
+            hint = _hint(value, self.unit) if isinstance(value, str) else ""
+            limits = f"must lie between {self.low:g} and {self.high:g} {self.unit}".strip()
+            raise ValueError(limits + hint)
         return number
 
     def text(self, value: float) -> str:
@@ -72,7 +88,8 @@ def _parsed(text: str, unit: str) -> float:
     match = _TEXT.fullmatch(text.strip()) if len(text) <= _LONGEST_TEXT else None
     example = f'write for example "1 {unit}"' if unit else "write a plain number"
     if match is None:
-        raise ValueError(f"not one number with a unit; {example}")
+        comma = "; the decimal sign is a point" if _COMMA.match(text.strip()) else ""
+        raise ValueError(f"not one number with a unit{comma}; {example}")
     if match["unit"] == "%" and not unit:
         return float(f"{0.01 * float(match['number']):.15g}")
     if not match["unit"]:
@@ -92,13 +109,34 @@ def _factor(name: str, unit: str, example: str) -> float:
         return float(given.to(unit or "dimensionless").magnitude)
     except pint.UndefinedUnitError:
         raise ValueError(
-            f"{name!r} is not a known unit (upper and lower case matter); {example}"
+            f"{name!r} is not a known unit (upper and lower case matter){_near(name, unit)}; "
+            f"{example}"
         ) from None
     except pint.DimensionalityError:
         kind = f"a unit like {unit}" if unit else "a number without unit"
-        raise ValueError(f"{name!r} is not {kind}; {example}") from None
+        raise ValueError(f"{name!r} is not {kind}{_near(name, unit)}; {example}") from None
     except pint.PintError as error:
         raise ValueError(f"{name!r}: {error}; {example}") from None
+
+
+def _near(name: str, unit: str) -> str:
+    """The usual unit that a name is nearest to, first whatever the case, or nothing."""
+    usual = USUAL.get(unit, ())
+    same = [one for one in usual if one.lower() == name.lower()]
+    near = same or difflib.get_close_matches(name, usual, n=1)
+    return f", did you mean {near[0]!r}?" if near else ""
+
+
+def _hint(text: str, unit: str) -> str:
+    """For a value out of range: the usual unit that differs from its own by the case of letters."""
+    match = _TEXT.fullmatch(text.strip())
+    name = match["unit"] if match else ""
+    usual = USUAL.get(unit, ())
+    return _near(name, unit) if name not in usual and _differs_by_case(name, usual) else ""
+
+
+def _differs_by_case(name: str, usual: tuple[str, ...]) -> bool:
+    return name.lower() in {one.lower() for one in usual}
 
 
 @cache

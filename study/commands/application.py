@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 from cyclopts import App
 
 from study.commands.check import check
+from study.commands.compare import compare
 from study.commands.estimate import estimate
 from study.commands.export import export
 from study.commands.flags import EXIT_BAD_INPUT
@@ -57,7 +58,7 @@ def _leave(number: int, _: FrameType | None) -> NoReturn:
 
 
 for command in (
-    *(run, scenes, check, report, export, verify),
+    *(run, scenes, check, report, compare, export, verify),
     *(tradeoff, recommend, stability, robustness, estimate, rules),
 ):
     app.command(command)

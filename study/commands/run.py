@@ -41,12 +41,14 @@ def run(
     from study.models.keeping import Keeping
     from study.models.model import Watch
     from study.progress import on_stderr
-    from study.results.folder import continuing, replacing, write
+    from study.results.folder import continuing, default_folder, replacing, write
     from study.run.study import run_study
     from study.scene.file import read_scene
 
     chosen = read_scene(scene, set_ or ())
-    folder = out or Path("results") / Path(scene).stem
+    if fields and chosen.is_point:
+        raise ValueError("--fields: a single point has none; leave it out")
+    folder = out or default_folder(scene)
     with (
         replacing(folder) as partial,
         continuing(folder, resume=resume) as state,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from study.folders import refuse_unwritable
 from study.known import table
 from study.known.case import Case, CaseVerdict
 from study.known.finding import Finding
@@ -60,14 +61,25 @@ class StabilityRequest:
         """The cases that are asked for."""
         return stability_cases(read_scene(self.scene), quick=self.quick)
 
+    def refuse(self) -> None:
+        """ValueError, before anything is run, for a scene, folder or workers that will not do."""
+        _ = How(self.workers, self.scheduler)
+        for folder in (self.folder, self.store.folder):
+            refuse_unwritable(folder, lambda _: None, "stability study")
+        from study.known.stability.cases import own_scene  # compiled, as suite's
+
+        own_scene.refuse(read_scene(self.scene))
+
 
 def planned(request: StabilityRequest) -> str:
     """What a request would run, and for how long."""
+    request.refuse()
     return str(plan([case.task for case in request.cases()], request.store))
 
 
 def study(request: StabilityRequest, progress: Tell = silent) -> list[CaseVerdict]:
     """Verdicts on all cases asked for, which are also written as a table."""
+    request.refuse()
     chosen = request.cases()
     how = How(request.workers, request.scheduler)
     outcomes = run([case.task for case in chosen], request.store, how, progress)

@@ -50,6 +50,11 @@ class PointSpring:
     bounds: tuple[Make, Make] | None = None
     system: str | None = None
 
+    def refuse(self, problem: PointProblem) -> None:
+        """ValueError for a spring or a dashpot that cannot be, at the bounds too."""
+        for make in (self.make, *(self.bounds or ())):
+            make(problem)
+
     def run(self, problem: PointProblem, watch: Watch) -> ModelRun:
         """The motion, by a solver to a tight tolerance, and that at both bounds of stiffness."""
         oscillator = self.make(problem)

@@ -91,6 +91,7 @@ def estimated_run(
         diverged_near_m=place(found.trajectory),
         time_step_s=found.step,
         wall_s=wall,
+        largest_strain=found.largest_strain,
         time_step_errors=errors,
     )
     wanted = watch.keeping is not None and watch.keeping.fields is not None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fem_reference import model as fem
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body
+from fem_reference.grid import Projection
 from fem_reference.observation import at_points, evaluation
 from fem_reference.pace import Pace
 from fem_reference.solvers import solve_static
@@ -24,8 +25,10 @@ from study.models.linear_limits import is_large
 from study.models.mesh_error import MeshSolution, is_too_coarse, mesh_error, next_size, why_unknown
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
+from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
+from study.problem.tissue import Tissue
 from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import (
@@ -101,16 +104,32 @@ class PreparedElements:
         finer = ", refined for reference.accuracy" if asked else ""
         return [f"finite-element mesh: {tetrahedra} tetrahedra{finer}"]
 
-    def body(self, level: Level | None = None) -> Body:
-        """The body on a level, that of the model by default. ValueError if there is no such."""
-        found = level or self.problem.geometry.level(self.model.level)
+    def refuse(self) -> None:
+        """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
+        self._refuse(self._level())
+
+    def _refuse(self, level: Level) -> None:
+        fem.refuse(level.mesh, *self._on(), self.model.reference.method)
+
+    def _on(self) -> tuple[Tissue, Foundation, ToolPatch, str, Projection | None]:
+        """What a body is made of beside its mesh."""
+        problem, element = self.problem, self.model.reference.element
+        geometry = problem.geometry
+        return problem.tissue, problem.foundation, problem.tool, element, geometry.project
+
+    def _level(self) -> Level:
+        """That of the model. ValueError if the organ has no such."""
+        found = self.problem.geometry.level(self.model.level)
         if found is None:
             raise ValueError(
                 f"level {self.model.level}: the organ has no such mesh; choose another level"
             )
-        chosen, problem = self.model.reference, self.problem
-        where = (problem.foundation, problem.tool, chosen.element, problem.geometry.project)
-        return fem.build(found.mesh, problem.tissue, *where, chosen.method)
+        return found
+
+    def body(self, level: Level | None = None) -> Body:
+        """The body on a level, that of the model by default. ValueError if there is no such."""
+        found = level or self._level()
+        return fem.build(found.mesh, *self._on(), self.model.reference.method)
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion on one level, by the table's steps, those of the rate, or equal ones."""
@@ -167,8 +186,8 @@ class PreparedElements:
 
         Own steps that hold several samples are halved until it is small enough.
         """
-        levels = map(self.problem.geometry.level, range(-COARSER, 1))
-        coarsest = self.solved_on(next(filter(None, levels)), progress)
+        coarser = self._usable(range(-COARSER, 0))
+        coarsest = self.solved_on(next(coarser, None) or self._level(), progress)
         while True:
             half = self._halved(coarsest, progress)
             whole = coarsest.found.trajectory
@@ -188,8 +207,8 @@ class PreparedElements:
     ) -> tuple[list[MeshSolution], DiscretisationError | None]:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
-        levels = filter(None, (geometry.level(k) for k in range(-COARSER, 1)))
-        rest = [level for level in levels if level is not coarsest.level]
+        levels = [*self._usable(range(-COARSER, 0)), geometry.level(0)]
+        rest = [one for one in levels if one is not None and one is not coarsest.level]
         solved = [coarsest, *(self.solved_on(level, progress) for level in rest)]
         error = mesh_error(self.problem, solved)
         while is_too_coarse(accuracy, error):
@@ -203,10 +222,19 @@ class PreparedElements:
     def _finer(self, last: Level, share: float) -> Level | None:
         """The level expected to be accurate enough, or the finest there is, if it is finer."""
         found: Level | None = None
-        for level in filter(None, map(self.problem.geometry.level, range(1, FINER + 1))):
+        for level in self._usable(range(1, FINER + 1)):
             if level.size < last.size and (found is None or found.size > share * last.size):
                 found = level
         return found
+
+    def _usable(self, numbers: range) -> Iterator[Level]:
+        """Levels that there are and that a body can be made on."""
+        for level in filter(None, map(self.problem.geometry.level, numbers)):
+            try:
+                self._refuse(level)
+            except ValueError:  # too coarse to meet the tool, or too fine for the memory
+                continue
+            yield level
 
     def solved_on(self, level: Level, progress: Progress) -> MeshSolution:
         """Body and motion on one of the organ's meshes."""

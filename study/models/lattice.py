@@ -124,6 +124,24 @@ class PreparedLattice:
         integrator = self.model.lattice.integrator
         return float(msm.critical_time_step(self.assembly, self.springs.material, integrator))
 
+    def refuse(self) -> None:
+        """ValueError for steps that do not suit, at the bounds of the stiffness too."""
+        for make in (None, *(self.model.bounds or ())):
+            one = self if make is None else self._with(make)
+            lattice = self.model.lattice
+            msm.refuse(
+                one.assembly,
+                one.springs.material,
+                self.problem.observation,
+                asked_step(lattice),
+                integrator=lattice.integrator,
+                linear=self.linear,
+            )
+
+    def _with(self, make: Make) -> PreparedLattice:
+        """The same lattice of other springs."""
+        return replace(self, springs=make(self.model.scene, self.assembly.lattice))
+
     def describe(self) -> list[str]:
         """Nodes and springs, then modulus, critical step and damping."""
         where = "lattice" if self.model.lattice.springs == "lattice" else "springs on the mesh"
@@ -217,7 +235,7 @@ class PreparedLattice:
 
     def _bound(self, make: Make, side: str, watch: Watch) -> Trajectory:
         name = self.model.name
-        other = replace(self, springs=make(self.model.scene, self.assembly.lattice))
+        other = self._with(make)
         with watch.progress.stage(f"{name}: {side} bound") as advance:
             step = asked_step(self.model.lattice)
             return other._march(step, advance, watch, f"{name}-{side}").trajectory

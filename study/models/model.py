@@ -33,13 +33,15 @@ class Simulation:
     """The motion of a model, and the steps that it took.
 
     `step` [s]: the shortest; `margin`: smallest ratio of the critical step to one that was taken;
-    `inverted_cells`: turned inside out.
+    `inverted_cells`: turned inside out; `largest_strain`: absolute, in the kept frames, None where
+    it is not known.
     """
 
     trajectory: Trajectory
     step: float
     margin: float = float("inf")
     inverted_cells: int = 0
+    largest_strain: float | None = None
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,21 @@ from numpy.typing import NDArray
 
 from fem_reference import model as fem
 from fem_reference.elasticity import Body
+from fem_reference.elements import chosen_element
+from fem_reference.grid import Projection
+from fem_reference.memory import unknowns
 from fem_reference.observation import at_points, evaluation
 from fem_reference.subspace import Subspace, SubspaceMotion, modal_subspace, ritz_subspace
-from fem_reference.superposition import subspace_trajectory
+from fem_reference.superposition import subspace_motion
 from msm.timestep import whole_steps
+from study.mesh.kinds import TetrahedralMesh
 from study.models.damping import reference_damping
 from study.models.errors import estimated_run
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
+from study.problem.tissue import Tissue
 from study.results.records import ElementsRecord
 from study.scene import Scene
 
@@ -52,7 +58,7 @@ class SuperpositionModel:
         return replace(self, **settings)
 
     def prepare(self, problem: Problem) -> PreparedSuperposition:
-        """Assemble the body; vectors are solved for when they are needed.
+        """Set up; body and vectors are computed when they are needed.
 
         ValueError if the organ has no such level.
         """
@@ -61,17 +67,31 @@ class SuperpositionModel:
             raise ValueError(
                 f"level {self.level}: the organ has no such mesh; choose another level"
             )
-        where = (problem.foundation, problem.tool, self.element, problem.geometry.project)
-        return PreparedSuperposition(self, problem, fem.build(level.mesh, problem.tissue, *where))
+        return PreparedSuperposition(self, problem, level.mesh)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedSuperposition:
-    """The body, and its subspace."""
+    """The body on a mesh, and its subspace."""
 
     model: SuperpositionModel
     problem: Problem
-    body: Body
+    mesh: TetrahedralMesh
+
+    def refuse(self) -> None:
+        """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
+        fem.refuse(self.mesh, *self._on())
+
+    def _on(self) -> tuple[Tissue, Foundation, ToolPatch, str, Projection | None]:
+        """What the body is made of beside its mesh."""
+        problem, element = self.problem, self.model.element
+        geometry = problem.geometry
+        return problem.tissue, problem.foundation, problem.tool, element, geometry.project
+
+    @cached_property
+    def body(self) -> Body:
+        """Assembled once."""
+        return fem.build(self.mesh, *self._on())
 
     @cached_property
     def subspace(self) -> Subspace:
@@ -87,7 +107,9 @@ class PreparedSuperposition:
     def describe(self) -> list[str]:
         """Unknowns and vectors."""
         kind = "Ritz vectors" if self.model.vectors == "ritz" else "modes and the rest"
-        return [f"{self.model.name}: {self.model.count} {kind} of {self.body.unknowns} unknowns"]
+        element = chosen_element(self.model.element, self.problem.tissue.poisson_ratio)
+        size = unknowns(self.mesh, element)
+        return [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion, exact in the subspace for a load that is linear over steps of a frame."""
@@ -95,7 +117,8 @@ class PreparedSuperposition:
         sample = float(seen.times[1])
         every = whole_steps(sample, longest or STEP)
         where = (self.model.damping, self.problem.factor, seen, every)
-        return Simulation(subspace_trajectory(self.body, subspace, *where), sample / every)
+        found = subspace_motion(self.body, subspace, *where)
+        return Simulation(found.trajectory, sample / every, largest_strain=found.strain)
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its error by the steps of the load, and what it is made of."""

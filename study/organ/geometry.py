@@ -28,6 +28,9 @@ REFINE_ABOVE = 1.3
 MAX_TETRAHEDRA = 60_000
 TETRAHEDRA_PER_CUBE = 12
 """Of the body-centred lattice; a block has six."""
+COARSEST = 0.5
+"""Largest element size over the cube root of the built-in liver's volume. There a mesh has about a
+hundred tetrahedra and four fifths of the volume; a little above, its lobes are lost, then all."""
 
 
 @dataclass(frozen=True)
@@ -86,19 +89,30 @@ def _check_count(volume: float, element_size: float) -> None:
         )
 
 
+def _check_coarseness(volume: float, element_size: float, largest: float) -> None:
+    if element_size > largest:
+        raise ValueError(
+            f"reference.element_size: {1e3 * element_size:.3g} mm is too large for an organ.volume "
+            f"of {1e3 * volume:.3g} L, of whose shape nothing would be left; "
+            f"{1e3 * largest * (1.0 - 1e-3):.2g} mm fits"
+        )
+
+
 def built_in_liver(volume: float, element_size: float) -> Geometry:
     """The built-in liver of a volume [m^3] in elements of about `element_size` [m].
 
-    ValueError for elements so small that they are too many.
+    ValueError for elements so small that they are too many, or so large that they lose the shape.
     """
     _check_count(volume, element_size)
+    largest = COARSEST * volume ** (1.0 / 3.0)
+    _check_coarseness(volume, element_size, largest)
     body = ImplicitBody(lambda points: liver.signed_function(points, volume))
     box = liver.bounding_box(volume)
 
     @cache
     def level(k: int) -> Level | None:
         size = element_size / FINER**k
-        if TETRAHEDRA_PER_CUBE * volume / size**3 > MAX_TETRAHEDRA:
+        if size > largest or TETRAHEDRA_PER_CUBE * volume / size**3 > MAX_TETRAHEDRA:
             return None
         return Level(stuff(body.signed, *box, size), size)
 

@@ -6,6 +6,7 @@ motion of a run that was interrupted, too, which goes on in it.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+CHECKSUM = 4
+"""Bytes after each frame."""
 
 
 class Mesh(NamedTuple):
@@ -28,8 +32,9 @@ class Mesh(NamedTuple):
 class Frames:
     """Displacement [m] and velocity [m/s] of all nodes, (n, 3) each, at samples 0 to `count` - 1.
 
-    On a raw file of 64-bit numbers, unbuffered: what was written outlives the program. With
-    `resume`, those that are in it stay until written over.
+    On a raw file of 64-bit numbers, unbuffered: what was written outlives the program. Each frame
+    ends with a checksum. With `resume`, those that are in it stay until written over, up to the
+    first one that is cut or altered.
     """
 
     def __init__(self, path: Path, nodes: int, *, resume: bool = False) -> None:
@@ -37,28 +42,48 @@ class Frames:
         self.size = 8 * int(np.prod(self.shape))
         keep = resume and path.exists()
         self.file = path.open("r+b" if keep else "w+b", buffering=0)
-        self.count = path.stat().st_size // self.size
+        self.count = self._whole() if keep else 0
+
+    def _whole(self) -> int:
+        """How many frames are whole, from the first on."""
+        count = self.path.stat().st_size // (self.size + CHECKSUM)
+        return next((k for k in range(count) if self._frame(k) is None), count)
+
+    def _frame(self, sample: int) -> bytes | None:
+        """What is written of a sample, None if it is not whole."""
+        with self.path.open("rb") as file:
+            file.seek(sample * (self.size + CHECKSUM))
+            data, checksum = file.read(self.size), file.read(CHECKSUM)
+        return data if checksum == _checksum(data) else None
 
     def write(self, sample: int, u: Floats, v: Floats) -> None:
         """Keep a sample as the last one. ValueError if those before it are missing."""
         if sample > self.count:
             raise ValueError(
                 f"{self.path}: holds the fields of {self.count} samples, and sample {sample} is to "
-                "follow: they were not kept before the interruption; run without --resume"
+                "follow: they were not kept before the interruption, or are damaged; run without "
+                "--resume"
             )
-        self.file.seek(sample * self.size)
-        frame = memoryview(np.array([u, v], dtype=np.float64).tobytes())
+        self.file.seek(sample * (self.size + CHECKSUM))
+        data = np.array([u, v], dtype=np.float64).tobytes()
+        frame = memoryview(data + _checksum(data))
         while frame:  # an unbuffered file may take less than all
             frame = frame[self.file.write(frame) :]
         self.count = sample + 1
 
     def read(self, sample: int) -> dict[str, Floats]:
-        """Displacement and velocity of a sample, by these names."""
+        """Displacement and velocity of a sample, by these names. OSError if it is not whole."""
         if not 0 <= sample < self.count:
             raise IndexError(f"{self.path}: no sample {sample} among {self.count}")
-        values = np.fromfile(self.path, count=self.size // 8, offset=sample * self.size)
-        u, v = values.reshape(self.shape)
+        data = self._frame(sample)
+        if data is None:
+            raise OSError(f"{self.path}: sample {sample} is not as it was written")
+        u, v = np.frombuffer(data).reshape(self.shape)
         return {"displacement": u, "velocity": v}
+
+
+def _checksum(data: bytes) -> bytes:
+    return zlib.crc32(data).to_bytes(CHECKSUM, "little")
 
 
 @contextmanager

@@ -6,24 +6,32 @@ similarity.csv  score of each pair         errors.csv      differences of the wh
 sensitivity.csv choices of the fuzzy side
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
 MODEL.vtkhdf    motion of all nodes, if asked for
+SHA256SUMS      checksums of all these, which `sha256sum -c` verifies too
+
+Whoever reads it gets the whole folder checked: checksums, and rows and arrays against the scene.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study import folders
 from study.problem.response import Motion
+from study.results import arrays as npz
+from study.results import manifest
+from study.results.arrays import Arrays
+from study.results.content import check
+from study.results.errors import ResultsError
 from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
 from study.results.tables import (
     BandSample,
@@ -40,19 +48,13 @@ from study.scene.schema import Scene
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-Floats = NDArray[np.float64]
-Arrays = dict[str, NDArray[Any]]
+__all__ = ["Arrays", "Results", "ResultsError", "read", "replacing", "write"]
 
-MARK = "results.json"
-FILES = {
-    *(MARK, "scene.toml", "report.pdf", "fields.npz", "fuzzy.npz", "export"),
-    *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
-}
-OURS, FIELDS = ".report.pdf", ".vtkhdf"
-
-
-class ResultsError(ValueError):
-    """A folder that cannot be read or written; the message says what to do."""
+MARK, SCENE = "results.json", "scene.toml"
+FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, "export"}
+OURS, FIELDS = ".report.pdf", manifest.FIELDS
+CHECKSUMS = "sha256"
+"""Where results.json has the checksums of the other files, so that two runs are not mixed."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class Results:
 
     @classmethod
     def load(cls, folder: Path | str) -> Results:
-        """Content of a folder. ResultsError if it holds no results, or those of another version."""
+        """Content of a folder, checked whole; see `read`."""
         return read(Path(folder))
 
     def model(self, name: str) -> ModelRecord:
@@ -100,11 +102,11 @@ class Results:
 
 
 def write(results: Results, folder: Path) -> None:
-    """Write the files of a results folder into an empty folder; see `replacing`."""
-    (folder / "scene.toml").write_text(write_scene(results.scene), encoding="utf-8")
-    plain = _adapter().dump_python(results.record, mode="json")
-    text = json.dumps(plain, indent=1, allow_nan=False)
-    (folder / MARK).write_text(text + "\n", encoding="utf-8")
+    """Write the files of a results folder into a folder with nothing but fields; see `replacing`.
+
+    Their checksums last: they cover the fields of all nodes that the models have left there.
+    """
+    (folder / SCENE).write_text(write_scene(results.scene), encoding="utf-8")
     write_table(folder / "curves.csv", CurveSample, results.curves)
     write_table(folder / "bands.csv", BandSample, results.bands)
     write_table(folder / "similarity.csv", SimilarityScore, results.scores)
@@ -113,25 +115,35 @@ def write(results: Results, folder: Path) -> None:
     for stem, arrays in (("fields", results.fields), ("fuzzy", results.fuzzy)):
         if arrays:
             np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
+    sums = manifest.digests(folder)
+    _write_record(results.record, folder / MARK, sums)
+    manifest.write(folder, sums | {MARK: manifest.digest(folder / MARK)})
+
+
+def _write_record(record: StudyRecord, path: Path, sums: Mapping[str, str]) -> None:
+    plain = _adapter().dump_python(record, mode="json") | {CHECKSUMS: sums}
+    text = json.dumps(plain, indent=1, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 def read(folder: Path) -> Results:
-    """Read a results folder. ResultsError if it is none, or of another version."""
+    """Read a results folder and check it whole.
+
+    Raises ResultsError, with file and, in a table, line, for a folder that holds no results or
+    those of another version, that lacks a file or has one of another run, or in which a row or an
+    array is missing, one too many, changed or not of its scene.
+    """
     try:
-        table = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        table = _numbers(folder)
         _check_version(folder, table)
-        scene = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
-        return Results(
-            validate(scene, "scene.toml"),
-            _adapter().validate_python(table),
-            read_table(folder / "curves.csv", CurveSample),
-            read_table(folder / "bands.csv", BandSample),
-            read_table(folder / "similarity.csv", SimilarityScore),
-            read_table(folder / "errors.csv", FieldDifference),
-            read_table(folder / "sensitivity.csv", SensitivityEntry),
-            _read_arrays(folder / "fields.npz"),
-            _read_arrays(folder / "fuzzy.npz"),
-        )
+        altered = manifest.altered(folder)
+        for name in altered:
+            if name.endswith(".npz"):  # says nothing of use to whoever opens it
+                _refuse(folder, name)
+        results = _content(folder, table)
+        if altered:
+            _refuse(folder, altered[0])
+        _check_mixed(folder, table, manifest.read(folder))
     except FileNotFoundError as error:
         missing = Path(error.filename).name
         raise ResultsError(
@@ -140,7 +152,88 @@ def read(folder: Path) -> Results:
     except ResultsError:
         raise
     except (OSError, ValueError) as error:
-        raise ResultsError(f"{folder}: damaged results: {error}") from None
+        raise ResultsError(f"{folder}: damaged results: {error}; {manifest.REMEDY}") from None
+    return results
+
+
+def _content(folder: Path, table: Mapping[str, object]) -> Results:
+    """All files in memory. ValueError naming file and line of what is damaged or does not fit."""
+    record, scene = _record(table), _scene(folder)
+    results = Results(
+        scene,
+        record,
+        read_table(folder / "curves.csv", CurveSample),
+        read_table(folder / "bands.csv", BandSample),
+        read_table(folder / "similarity.csv", SimilarityScore),
+        read_table(folder / "errors.csv", FieldDifference),
+        read_table(folder / "sensitivity.csv", SensitivityEntry),
+        npz.read(folder / "fields.npz"),
+        npz.read(folder / "fuzzy.npz"),
+    )
+    check(results)
+    if manifest.digest(folder / SCENE) != record.provenance.scene_sha256:
+        raise ValueError(f"{SCENE}: is not the scene of {MARK} (provenance.scene_sha256 differs)")
+    return results
+
+
+def _refuse(folder: Path, name: str) -> NoReturn:
+    raise ResultsError(
+        f"{folder / name}: is not as the run left it (its checksum in {manifest.NAME} differs); "
+        f"{manifest.REMEDY}"
+    )
+
+
+def _check_mixed(folder: Path, table: Mapping[str, object], sums: Mapping[str, str]) -> None:
+    """Checksums that somebody made again do not make the files of two runs one."""
+    wanted = table.get(CHECKSUMS)
+    wanted = wanted if isinstance(wanted, dict) else {}
+    for name in sorted(sums.keys() | wanted.keys() - {MARK}):
+        if name != MARK and sums.get(name) != wanted.get(name):
+            raise ResultsError(
+                f"{folder / name}: is of another run than {MARK}, which has another checksum for "
+                f"it; {manifest.REMEDY}"
+            )
+
+
+def _numbers(folder: Path) -> dict[str, object]:
+    """What results.json holds. ValueError naming the line that is not JSON."""
+    try:
+        text = (folder / MARK).read_text(encoding="utf-8")
+        table = json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{MARK}, line {error.lineno}: not JSON ({error.msg})") from None
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{MARK}: not JSON ({error})") from None
+    if not isinstance(table, dict):
+        raise ValueError(f"{MARK}: holds no table of numbers by name")  # noqa: TRY004 - the file is at fault
+    return table
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value
+
+
+def _record(table: Mapping[str, object]) -> StudyRecord:
+    """ValueError naming the key that is missing or no value of its kind."""
+    from pydantic import ValidationError
+
+    try:
+        return _adapter().validate_python(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        key = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{MARK}: {key}: {first['msg']}") from None
+
+
+def _scene(folder: Path) -> Scene:
+    try:
+        text = (folder / SCENE).read_text(encoding="utf-8")
+        return validate(tomllib.loads(text), SCENE)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ValueError(f"{SCENE}: not valid TOML: {error}") from None
 
 
 def _adapter() -> TypeAdapter[StudyRecord]:
@@ -149,11 +242,11 @@ def _adapter() -> TypeAdapter[StudyRecord]:
     return TypeAdapter(StudyRecord)
 
 
-def _check_version(folder: Path, table: object) -> None:
-    version = table.get("schema_version") if isinstance(table, dict) else None
+def _check_version(folder: Path, table: Mapping[str, object]) -> None:
+    version = table.get("schema_version")
     if version != SCHEMA_VERSION:
         raise ResultsError(
-            f"{folder}: results of schema {version}, this program reads {SCHEMA_VERSION}; "
+            f"{folder / MARK}: results of schema {version}, this program reads {SCHEMA_VERSION}; "
             "run the scene again"
         )
 
@@ -164,6 +257,16 @@ def replacing(folder: Path) -> AbstractContextManager[Path]:
     FolderError before the block if `folder` holds anything but results, or cannot be written.
     """
     return folders.replacing(folder, _foreign, "run")
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """FolderError if `replacing` would refuse the folder; nothing is left behind."""
+    folders.refuse_unwritable(folder, _foreign, "run")
+
+
+def default_folder(scene: str) -> Path:
+    """Where a run of a scene by name or file puts its results."""
+    return Path("results") / Path(scene).stem
 
 
 def _foreign(present: set[str]) -> str | None:
@@ -187,11 +290,3 @@ def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             state.rmdir()  # where nothing was kept
-
-
-def _read_arrays(path: Path) -> Arrays:
-    """Arrays of a file, none if it is missing: a single point has no fields."""
-    if not path.exists():
-        return {}
-    with np.load(path, allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}

@@ -321,12 +321,16 @@ class Provenance:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRecord:
-    """The whole of results.json."""
+    """The whole of results.json but for the checksums of the other files.
+
+    `references`: names of the models that the others are compared with, in order.
+    """
 
     title: str
     probes: tuple[str, ...]
     fuzzy: FuzzyRecord
     models: tuple[ModelRecord, ...]
+    references: tuple[str, ...] = ()
     checks: tuple[Check, ...]
     warnings: tuple[str, ...]
     assumptions: tuple[str, ...]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator
+import io
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
@@ -63,6 +65,21 @@ class SensitivityEntry(NamedTuple):
     readings: float
 
 
+QUANTITIES = (
+    *("field-relative-l2-peak", "field-relative-l2-final", "field-l2-final-over-peak"),
+    *("field-best-factor-peak", "field-relative-l2-peak-at-best-factor"),
+)
+"""Of errors.csv, in the order of its rows."""
+
+
+def pairs(models: Sequence[str], references: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Candidate and reference: every model against each reference, and no pair the other way."""
+    for rank, reference in enumerate(references):
+        for model in models:
+            if reference in models and model not in references[: rank + 1]:
+                yield model, reference
+
+
 Entry = TypeVar("Entry", bound=NamedTuple)
 
 
@@ -76,22 +93,57 @@ def write_table(path: Path, kind: type[Entry], rows: Iterable[Entry]) -> None:
 
 def read_table(path: Path, kind: type[Entry]) -> tuple[Entry, ...]:
     """Rows of a table. ValueError naming file and line of what is not one."""
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.reader(file)
-        header = tuple(next(reader, ()))
-        if header != kind._fields:
-            raise ValueError(f"{path.name} has columns {', '.join(header)}")
-        return tuple(_rows(path, kind, reader))
+    text = path.read_bytes()
+    reader = csv.reader(io.StringIO(_text(path, text), newline=""))
+    header = tuple(next(reader, ()))
+    if header != kind._fields:
+        raise ValueError(
+            f"{path.name}, line 1: columns {', '.join(header) or 'none'}, not "
+            f"{', '.join(kind._fields)}"
+        )
+    rows = tuple(_rows(path, kind, reader))
+    if not text.endswith(b"\n"):
+        raise ValueError(f"{path.name}, line {len(rows) + 1}: is cut, it has no end of line")
+    return rows
+
+
+def _text(path: Path, data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{path.name}, line {line}: is no text in UTF-8") from None
 
 
 def _rows(path: Path, kind: type[Entry], reader: Iterable[list[str]]) -> Iterator[Entry]:
-    hints = get_type_hints(kind)
-    convert = [hints[name] for name in kind._fields]
-    for number, cells in enumerate(reader, 2):
-        try:
-            yield kind._make(make(text) for make, text in zip(convert, cells, strict=True))
-        except ValueError as error:
-            raise ValueError(f"{path.name}, line {number}: {error}") from None
+    hints, number = get_type_hints(kind), 1
+    try:
+        for cells in reader:
+            number += 1
+            yield kind._make(_values(kind._fields, hints, cells))
+    except csv.Error as error:
+        raise ValueError(f"{path.name}, line {number + 1}: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"{path.name}, line {number}: {error}") from None
+
+
+def _values(names: Sequence[str], kinds: Mapping[str, type], cells: list[str]) -> list[object]:
+    if len(cells) != len(names):
+        raise ValueError(f"{len(cells)} cells, not {len(names)}")
+    return [_value(name, kinds[name], text) for name, text in zip(names, cells, strict=True)]
+
+
+def _value(name: str, kind: type, text: str) -> object:
+    """A name, or a finite number. ValueError naming the column of what is none."""
+    if kind is str:
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {text!r}, no finite number")
+    return value
 
 
 def _cell(value: Any) -> str:

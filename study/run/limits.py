@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.calibration import SPRING_POISSON_RATIO
+from msm.calibration import LARGEST_POISSON_RATIO, SPRING_POISSON_RATIO
 from study.models.finite_elements import PreparedElements
 from study.models.model import Prepared
 from study.models.tissue import models
@@ -35,7 +35,8 @@ def lattice_limits(
         spacing, field = _at_rest(scene, problem, volume_term=False)
         truth, quarter = reference.rest(), reference.rest_at(SPRING_POISSON_RATIO)
     factor = best_factor(field, truth, volumes)
-    can_have_term = nu > SPRING_POISSON_RATIO and scene.lattice.springs == "lattice"
+    is_cubic = scene.lattice.springs == "lattice"
+    can_have_term = is_cubic and SPRING_POISSON_RATIO < nu <= LARGEST_POISSON_RATIO
     return LatticeLimits(
         spacing_m=spacing,
         poisson_ratio=nu,

@@ -9,8 +9,8 @@ import numpy as np
 
 from study.models.estimates import FuzzySide, run_fuzzy
 from study.models.linear_limits import STRAIN_LIMIT
-from study.models.model import SILENT, ModelRun, Prepared, Watch
-from study.models.table import is_tuned, models_of, point_models_of, references
+from study.models.model import SILENT, ModelRun, Watch
+from study.models.table import is_tuned, references
 from study.problem.problem import Problem
 from study.problem.response import Response
 from study.results.folder import Arrays, Results
@@ -26,11 +26,11 @@ from study.results.records import (
 from study.run.assumptions import assumptions
 from study.run.budget import error_budgets
 from study.run.dimensionless import dimensionless
+from study.run.ready import Ready, ReadyPoint, ready
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
 from study.scene.file import write_scene
-from study.scene.problem import point_problem_of, problem_of
 
 
 @dataclass(frozen=True)
@@ -50,23 +50,26 @@ class Compared:
 def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
     """Run all that the scene names and gather the results.
 
-    Raises ValueError for an organ, support or tool that cannot be used.
+    Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
     """
     started = time.perf_counter()
+    given = ready(scene, watch.progress)
     made_by = provenance(write_scene(scene), scene.organ.mesh)  # as it is now, not after the run
     with watch.progress.stage("fuzzy systems"):
         fuzzy = run_fuzzy(scene) if is_tuned(scene) else FuzzySide()
-    compared = (_on_point if scene.is_point else _on_organ)(scene, fuzzy, watch)
+    if isinstance(given, ReadyPoint):
+        compared = _on_point(given, watch)
+    else:
+        compared = _on_organ(scene, given, watch, tuned=bool(fuzzy.estimates))
     with watch.progress.stage("similarity"):
         results = _results(scene, fuzzy, compared, made_by)
     record = replace(results.record, study_wall_s=time.perf_counter() - started)
     return replace(results, record=record)
 
 
-def _on_point(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
-    problem = point_problem_of(scene)
-    models = point_models_of(scene, fuzzy.estimates)
-    runs = {model.name: model.run(problem, watch) for model in models}
+def _on_point(given: ReadyPoint, watch: Watch) -> Compared:
+    problem = given.problem
+    runs = {model.name: model.run(problem, watch) for model in given.models}
     point = ControlPoint(mass_kg=problem.mass, rest_length_m=problem.rest_length)
     keeping = watch.keeping
     wanted = keeping is not None and keeping.fields is not None
@@ -74,29 +77,27 @@ def _on_point(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
     return Compared(problem.response, runs, notes, control_point=point)
 
 
-def _on_organ(scene: Scene, fuzzy: FuzzySide, watch: Watch) -> Compared:
-    with watch.progress.stage("organ"):
-        problem = problem_of(scene)
-    ready: dict[str, Prepared] = {}
-    for model in models_of(scene, fuzzy.estimates):  # all before any runs: one may be refused
-        with watch.progress.stage(f"{model.name}: set up"):
-            ready[model.name] = model.prepare(problem)
+def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compared:
+    problem, notes = given.problem, list(given.problem.geometry.notes)
     runs: dict[str, ModelRun] = {}
     limits = None
-    for name, prepared in ready.items():
+    for name, prepared in given.models.items():
         runs[name] = prepared.run(watch)
-        if name == "fem" and fuzzy.estimates:
+        if name == "fem" and tuned:
             from study.run.limits import lattice_limits
 
-            limits = lattice_limits(scene, problem, prepared, watch.progress)
+            try:
+                limits = lattice_limits(scene, problem, prepared, watch.progress)
+            except ValueError as error:  # of a lattice beside those of the scene
+                notes.append(f"What the lattice cannot do at rest is not known: {error}.")
     return Compared(
         problem.response,
         runs,
-        problem.geometry.notes,
+        tuple(notes),
         _fields(problem, runs),
         dimensionless(scene, problem),
         limits,
-        budgets=error_budgets(scene, problem, ready, runs, watch.progress),
+        budgets=error_budgets(scene, problem, given.models, runs, watch.progress),
     )
 
 
@@ -124,6 +125,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         probes=response.probes,
         fuzzy=fuzzy.record,
         models=models,
+        references=tuple(compared_with),
         checks=checks,
         warnings=warnings(scene, models, checks),
         assumptions=assumptions(scene, found.control_point),

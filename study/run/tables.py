@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from study.problem.response import Response
 from study.problem.trajectory import Trajectory
-from study.results.tables import BandSample, CurveSample, FieldDifference, SimilarityScore
+from study.results.tables import (
+    BandSample,
+    CurveSample,
+    FieldDifference,
+    SimilarityScore,
+    pairs,
+)
 from study.similarity.fields import best_factor, norm, relative_l2
 from study.similarity.score import scores
 
@@ -34,14 +40,6 @@ def band_rows(response: Response, model: str, bounds: Sequence[Trajectory]) -> I
         for t, *values in zip(response.times, *columns, strict=True):
             if np.isfinite(values).all():
                 yield BandSample(model, probe, float(t), *map(float, values))
-
-
-def pairs(models: Sequence[str], references: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Candidate and reference: every model against each reference, and no pair the other way."""
-    for rank, reference in enumerate(references):
-        for model in models:
-            if reference in models and model not in references[: rank + 1]:
-                yield model, reference
 
 
 def similarity_rows(

@@ -41,7 +41,7 @@ def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
     if strain is not None and strain > STRAIN_LIMIT:
         yield (
-            f"The largest strain of the linear reference is {100 * strain:.1f} %; above "
+            f"The largest strain of {_name(record)} is {100 * strain:.1f} %; above "
             f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(elements)}. "
             "Reduce tool.force or enlarge tool.radius."
         )
@@ -57,6 +57,10 @@ def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]
             f"{100 * elements.mesh_error.worst.displacement:.2g} %. Ask for less, or simplify "
             "the organ or its load."
         )
+
+
+def _name(record: ModelRecord) -> str:
+    return "the linear reference" if record.name == "fem" else f"{record.name}, which is linear,"
 
 
 def _at_large_strain(elements: ElementsRecord) -> str:

@@ -46,6 +46,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield "fuzzy.surface: names one reading twice; name two different ones"
     if scene.fuzzy.sampling == "exact" and "samples" in table.get("fuzzy", {}):
         yield "fuzzy.samples: has no effect with exact sampling; remove it"
+    yield from _unknown_reading(scene)
     if scene.reference.method != "modal" and "modes" in table.get("reference", {}):
         yield "reference.modes: only the method modal takes it; remove it"
     yield from _lattice_contradictions(scene, table)
@@ -74,6 +75,16 @@ def _model_contradictions(scene: Scene) -> Iterator[str]:
         yield "models: reading needs a reading; give one in [patient] or leave it out"
 
 
+def _unknown_reading(scene: Scene) -> Iterator[str]:
+    """A reading of Table I that there is not, or not with the sets of this placement."""
+    from fuzzy.liver.settings import LiverSettings
+
+    try:
+        LiverSettings(reading=scene.fuzzy.reading, placement=scene.fuzzy.placement)
+    except ValueError as error:
+        yield f"fuzzy.{error}"
+
+
 def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
     lattice, nu = scene.lattice, scene.tissue.poisson_ratio
     if lattice.springs == "tetrahedra":
@@ -89,6 +100,19 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield from _integrator_contradictions(scene)
     if lattice.time_step is not None and lattice.step_rate is not None:
         yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
+    elif lattice.time_step is not None and not scene.is_point:
+        yield from _undivided_samples(scene, lattice.time_step)
+
+
+def _undivided_samples(scene: Scene, seconds: float) -> Iterator[str]:
+    from msm.timestep import Fixed, planned
+
+    intervals = scene.time.samples - 1
+    try:
+        planned(Fixed(seconds), scene.time.duration / intervals, intervals)
+    except ValueError as error:
+        message = str(error).removeprefix("step.seconds: ")
+        yield f"lattice.time_step: {message.replace('give a rate', 'give lattice.step_rate')}"
 
 
 def _integrator_contradictions(scene: Scene) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
@@ -13,17 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 from study.annotation.quantity import Quantity
 from study.scene import Scene, SpringLaw
 from study.scene.consistency import MESH_ONLY, Table, contradictions
+from study.scene.error import SceneError
+from study.scene.text import key_lines, parsed, read_text
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 BUILT_IN = ("liver", "block", "paper")
-MAX_BYTES = 65_536
-MAX_LINE = 1_000
-
-
-class SceneError(ValueError):
-    """A scene that cannot be used; the message lists every problem with its key and remedy."""
 
 
 def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
@@ -31,32 +27,45 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
 
     Raises SceneError naming file, key, value and remedy.
     """
-    table, base = _load(name)
+    text, base = _load(name)
+    table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_mesh(table, base)
     for override in overrides:
-        _apply(table, override)
+        lines[_apply(table, override)] = 0  # on no line
     _resolve_mesh(table, Path.cwd())
-    return validate(table, name)
+    return validate(table, name, lines)
 
 
-def validate(table: Table, source: str) -> Scene:
-    """Scene of a parsed TOML table; SceneError lists all problems, `source` names the file."""
+def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) -> Scene:
+    """Scene of a parsed TOML table; SceneError lists all problems, `source` names the file.
+
+    `lines`: numbers of the lines that give keys, which a message then names; 0 for no line.
+    """
     from pydantic import TypeAdapter, ValidationError
 
     try:
         scene = TypeAdapter(Scene).validate_python(table)
     except ValidationError as error:
-        lines = sorted({_line(problem) for problem in error.errors(include_url=False)})
-        raise SceneError(_summary(source, lines)) from None
-    problems = list(contradictions(scene, table))
+        problems = sorted({_line(problem) for problem in error.errors(include_url=False)})
+    else:
+        problems = list(contradictions(scene, table))
     if problems:
-        raise SceneError(_summary(source, problems))
+        found = lines or {}
+        raise SceneError(_summary(source, [_placed(one, found) for one in problems]))
     return scene
+
+
+def _placed(problem: str, lines: Mapping[str, int]) -> str:
+    """A problem with the line of its key, or of the nearest table or key round it."""
+    key = problem.partition(":")[0]
+    while key and key not in lines:
+        key = key.rpartition(".")[0]
+    return f"{problem} [line {lines[key]}]" if lines.get(key) else problem
 
 
 def built_in_title(name: str) -> str:
     """Title of a built-in scene."""
-    return str(_load(name)[0]["title"])
+    return str(parsed(_load(name)[0], name)["title"])
 
 
 def write_scene(scene: Scene) -> str:
@@ -104,35 +113,26 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield ("superposition",)
 
 
-def _load(name: str) -> tuple[Table, Path]:
+def _load(name: str) -> tuple[str, Path]:
+    """Text of a scene, and the folder that a mesh is looked for in."""
     if name in BUILT_IN:
         file = resources.files("study.scene.built_in").joinpath(f"{name}.toml")
-        return tomllib.loads(file.read_text(encoding="utf-8")), Path()
+        return file.read_text(encoding="utf-8"), Path()
     path = Path(name)
-    if not path.is_file():
+    if not _is_file(path):
         near = difflib.get_close_matches(name, BUILT_IN, n=1)
         hint = f", did you mean {near[0]!r}?" if near else ""
         raise SceneError(
             f"{name}: neither a file nor a built-in scene ({', '.join(BUILT_IN)}){hint}"
         )
-    return _parse(path), path.parent
+    return read_text(path), path.parent
 
 
-def _parse(path: Path) -> Table:
+def _is_file(path: Path) -> bool:
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
-    # The parser takes seconds over absurd keys and nestings that a scene never has.
-    if len(data) > MAX_BYTES:
-        raise SceneError(f"{path}: larger than {MAX_BYTES} bytes; a scene is a short text file")
-    for number, line in enumerate(data.splitlines(), 1):
-        if len(line) > MAX_LINE:
-            raise SceneError(f"{path}, line {number}: longer than {MAX_LINE} bytes")
-    try:
-        return tomllib.loads(data.decode("utf-8"))
-    except (ValueError, RecursionError) as error:  # bad UTF-8, bad TOML, absurd numbers or nesting
-        raise SceneError(f"{path}: not valid TOML: {error}") from None
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 def _resolve_mesh(table: Table, base: Path) -> None:
@@ -142,7 +142,8 @@ def _resolve_mesh(table: Table, base: Path) -> None:
         organ["mesh"] = str((base / organ["mesh"]).absolute())
 
 
-def _apply(table: Table, override: str) -> None:
+def _apply(table: Table, override: str) -> str:
+    """Set what an override sets; its key."""
     path, separator, text = override.partition("=")
     keys = [key.strip() for key in path.split(".")]
     if not separator or not all(keys):
@@ -152,6 +153,7 @@ def _apply(table: Table, override: str) -> None:
         if not isinstance(table, dict):
             raise SceneError(f"--set {override}: {'.'.join(keys[: depth + 1])} is not a table")
     table[keys[-1]] = _value(text.strip())
+    return ".".join(keys)
 
 
 def _value(text: str) -> object:
@@ -166,9 +168,13 @@ def _line(problem: ErrorDetails) -> str:
     location = [str(part) for part in problem["loc"] if not str(part).startswith("function-")]
     key = ".".join(location)
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
-        near = difflib.get_close_matches(location[-1], _fields(location[:-1]), n=1)
+        near = [
+            *difflib.get_close_matches(location[-1], _fields(location[:-1]), n=1),
+            *_elsewhere(location[-1]),
+        ]
         return f"{key}: unknown key" + (f", did you mean {near[0]!r}?" if near else "; remove it")
     message = problem["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
+    message = message.replace("a valid tuple", "a list").replace("a valid dictionary", "a table")
     if problem["type"] == "dataclass_type":
         message = "should be a table"
     return f"{key}: {message} (got {_short(problem['input'])})"
@@ -189,6 +195,12 @@ def _fields(location: Sequence[str]) -> list[str]:
         if kind is None:
             return _place_fields() if location[0] == "control_points" else []
     return [f.name for f in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
+
+
+def _elsewhere(key: str) -> list[str]:
+    """Full names of the keys of this name in the tables of a scene."""
+    tables = {f.name: _fields([f.name]) for f in dataclasses.fields(Scene)}
+    return [f"{table}.{key}" for table, keys in tables.items() if key in keys]
 
 
 def _place_fields() -> list[str]:

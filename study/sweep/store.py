@@ -93,6 +93,6 @@ def _read(path: Path) -> Stored | None:
         whole = record.pop("sha256") == digest(record)
         stored = Stored(**record)
         named = key(stored.function, stored.arguments, stored.program)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
     return stored if whole and named == path.stem else None

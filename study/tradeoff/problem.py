@@ -48,6 +48,8 @@ def sampled(scene: Scene) -> Scene:
             'organ.shape: "point" has no displacement field to be accurate in; choose a scene with '
             "an organ"
         )
+    free = replace(scene.lattice, time_step=None, step_rate=None)  # contenders have their own
+    scene = replace(scene, lattice=free)
     count = int(scene.time.duration / SAMPLING * (1.0 + 1e-9))
     if count + 1 < FEWEST_SAMPLES:
         return scene

@@ -7,7 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from study.folders import refuse_unwritable_file
+from study.models.table import model
+from study.problem.problem import Problem
 from study.progress import Progress
+from study.run.ready import set_up
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.sweep.plan import plan
@@ -16,7 +20,7 @@ from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.lineup import configurations
-from study.tradeoff.problem import sampled
+from study.tradeoff.problem import arguments, sampled, stated
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
 
 
@@ -52,16 +56,35 @@ class TradeoffRequest:
         return read_scene(self.scene, self.overrides)
 
 
+def _ready(request: TradeoffRequest) -> Scene:
+    """The scene as the study samples it.
+
+    ValueError, before anything is run, for a scene, a folder or workers that will not do.
+    """
+    scene = sampled(request.read())
+    _ = request.how
+    study.refuse_unwritable(request.folder)
+    _set_up(scene)
+    return scene
+
+
+def _set_up(scene: Scene) -> Problem:
+    """The problem of a scene on which its reference can be solved. ValueError if it cannot."""
+    problem = stated(**arguments(scene)).problem
+    set_up([model(scene, "fem")], problem)
+    return problem
+
+
 def planned(request: TradeoffRequest) -> list[str]:
     """What the study would run."""
-    scene = sampled(request.read())
+    scene = _ready(request)
     chosen = configurations(scene, request.contenders)
     return [str(plan(study.tasks(scene, chosen), _store(request.folder)))]
 
 
 def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     """Run the study and write its folder; lines for a terminal."""
-    scene, folder = sampled(request.read()), request.folder
+    scene, folder = _ready(request), request.folder
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
     found = study.study(scene, chosen, _store(folder), request.how, repeats, progress)
@@ -80,8 +103,9 @@ def advise(
     """Whether the demand can be met, and lines; writes the scene if it can."""
     wanted, given = demand(rate, error), request.read()
     path = request.out or Path(f"{request.name}-{_suffix(wanted)}.toml")
-    if not path.parent.is_dir():
-        raise ValueError(f"--out {path}: there is no folder {path.parent}; make it first")
+    refuse_unwritable_file(path, "--out")
+    problem = _set_up(recommend.judged_by(sampled(given)))
+    model(given, "tissue").varied().prepare(problem)  # a lattice of its spacing
     store = _store(Path("results") / f"{request.name}-tradeoff")
     found = recommend.recommend(sampled(given), wanted, store, request.how, progress)
     lines = [*recommend.lines(found), *_busy()]

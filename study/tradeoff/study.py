@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from study import folders
 from study.folders import replacing
 from study.models.model import Stepper
 from study.progress import Progress
@@ -159,6 +160,11 @@ def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
         content = json.dumps(record, indent=1, allow_nan=False)
         (partial / RECORD).write_text(content + "\n", encoding="utf-8")
         (partial / "scene.toml").write_text(text, encoding="utf-8")
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """FolderError if `write` would refuse the folder; nothing is left behind."""
+    folders.refuse_unwritable(folder, _foreign, "trade-off study")
 
 
 def _foreign(names: Iterable[str]) -> str | None:

@@ -26,6 +26,7 @@ from study.models.model import Prepared
 from study.models.table import kind, model
 from study.problem.problem import Problem
 from study.results.provenance import mesh_sha256
+from study.run.ready import set_up
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
@@ -47,8 +48,7 @@ HERE = "study.known.stability.cases.own_scene"
 
 def cases(scene: Scene) -> Iterator[Case]:
     """Cases of a scene with a body. ValueError for a single control point, which has no lattice."""
-    if scene.is_point:
-        raise ValueError("organ.shape: a single point has no lattice; give a scene with a body")
+    _refuse_point(scene)
     for name in tried(scene):
         given = {"name": name, "scene": resolved(scene), "mesh": mesh_sha256(scene.organ.mesh)}
         if isinstance(model(scene, name), LatticeModel):
@@ -58,6 +58,23 @@ def cases(scene: Scene) -> Iterator[Case]:
         for times in LOADS:
             title = f"{name}, motion under {times:g} times its load"
             yield _case(title, "moves", given | {"times": times}, FINER)
+
+
+def refuse(scene: Scene) -> None:
+    """ValueError for a scene of which a model cannot be set up, found before any case is run."""
+    _refuse_point(scene)
+    free = _free(scene)
+    set_up((model(free, name) for name in tried(free)), problem_of(free))
+
+
+def _refuse_point(scene: Scene) -> None:
+    if scene.is_point:
+        raise ValueError("organ.shape: a single point has no lattice; give a scene with a body")
+
+
+def _free(scene: Scene) -> Scene:
+    """The scene with steps that follow the limit."""
+    return replace(scene, lattice=replace(scene.lattice, time_step=None, step_rate=None))
 
 
 def tried(scene: Scene) -> list[str]:
@@ -156,9 +173,6 @@ def _prepared(
     scene = validate(table, "scene")
     if mesh_sha256(scene.organ.mesh) != mesh:
         raise ValueError(f"organ.mesh: {scene.organ.mesh} has changed since the cases were listed")
-    lattice = replace(scene.lattice, time_step=None, step_rate=None)
-    scene = replace(
-        scene, lattice=lattice, tool=replace(scene.tool, force=times * scene.tool.force)
-    )
+    scene = replace(_free(scene), tool=replace(scene.tool, force=times * scene.tool.force))
     problem = problem_of(scene)
     return model(scene, name).prepare(problem), problem

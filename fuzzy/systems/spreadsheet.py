@@ -1,0 +1,116 @@
+"""The cells of CSV files as spreadsheets write them, in any locale.
+
+Columns are parted by commas, semicolons or tabs, whichever parts the header into most, or as a
+first line `sep=;` says. Lines without any cell filled and columns at the end without a name are
+what is left of a larger sheet, and dropped.
+"""
+
+import csv
+import io
+import re
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+DELIMITERS = ",;\t"
+_ANNOUNCED = re.compile(r"sep=([,;\t])\r?\n")
+
+
+class TableError(ValueError):
+    """A table that cannot be read or written; the message names file, line and remedy."""
+
+
+class Table(NamedTuple):
+    """Cells of a CSV file, and the lines on which the header and each row begin."""
+
+    file: str
+    header_line: int
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    delimiter: str = ","
+
+    def fault(self, line: int, what: str) -> TableError:
+        """The TableError that blames a line of the file."""
+        return TableError(f"{self.file}:{line}: {what}")
+
+
+def read_table(path: Path) -> Table:
+    """The cells of a CSV file with a header; TableError naming file, line and remedy."""
+    text = _text(path)
+    announced = _ANNOUNCED.match(text)
+    if announced:
+        delimiter, text = announced[1], "\n" + text[announced.end() :]
+    else:
+        delimiter = max(DELIMITERS, key=lambda one: _header_width(text, one))
+    found = list(_filled(path, text, delimiter))
+    if len(found) < 2:
+        raise TableError(f"{path}: holds no readings; give a header and at least one row")
+    lines, rows = [line for line, _ in found], [cells for _, cells in found]
+    width = max(i for i, name in enumerate(rows[0], start=1) if name.strip())
+    rows = [_without_blanks(cells, width) for cells in rows]
+    table = Table(str(path), lines[0], rows[0], rows[1:], lines[1:], delimiter)
+    _check_widths(table)
+    return table
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            return file.read()
+    except OSError as error:
+        raise TableError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise TableError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
+
+
+def _header_width(text: str, delimiter: str) -> int:
+    """Into how many cells a delimiter parts the first line that holds any."""
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+        return next((len(cells) for cells in reader if any(cells)), 0)
+    except csv.Error:  # reported when the table is read
+        return 0
+
+
+def _filled(path: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """The rows with a cell that is not blank, and the lines on which they begin."""
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    after = 0
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                yield after + 1, cells
+            after = reader.line_num
+    except csv.Error as error:
+        raise TableError(f"{path}:{reader.line_num}: {error}; export the table again") from None
+
+
+def _without_blanks(cells: list[str], width: int) -> list[str]:
+    """The cells up to a width; all of them if a later one is filled."""
+    return cells if any(cell.strip() for cell in cells[width:]) else cells[:width]
+
+
+def _check_widths(table: Table) -> None:
+    for cells, line in zip(table.rows, table.lines, strict=True):
+        if len(cells) != len(table.header):
+            raise table.fault(
+                line, f"{len(cells)} cells under {len(table.header)} columns; correct the row"
+            )
+
+
+def write_table(
+    path: Path, header: Sequence[str], rows: Iterable[Sequence[str]], delimiter: str
+) -> None:
+    """Write the file aside and move it into place. TableError if it cannot be written."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as aside:
+            partial = Path(aside) / path.name
+            with partial.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
+                writer.writerow(header)
+                writer.writerows(rows)
+            partial.replace(path)
+    except OSError as error:
+        raise TableError(f"{path}: cannot be written ({error.strerror})") from None

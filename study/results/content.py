@@ -1,0 +1,306 @@
+"""Whether the parts of a results folder are those of one scene: models, probes, samples, arrays.
+
+Checksums tell that a file is not that of the run; this tells which row, and holds where somebody
+made the checksums again. Messages name file and line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.results.arrays import Shapes, check_names, check_numbers, check_shapes
+from study.results.records import DiscretisationError, ModelRecord, StudyRecord
+from study.results.tables import QUANTITIES, BandSample, CurveSample, pairs
+from study.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from study.results.folder import Results
+
+Floats = NDArray[np.float64]
+
+FIRST_LINE = 2
+"""Of a table's rows, below the names of its columns."""
+SAME_TIME = 1e-9
+"""Share of the simulated time within which two times are the same; tables have twelve digits."""
+SURFACE: Shapes = {"points": "n3", "triangles": "m3", "tool": "23", "probes": "p3"}
+SETS: Shapes = {"sets": "s", "x": "x", "principal": "sx", "lower": "sx", "upper": "sx"}
+VIEW: Shapes = {
+    **{"unit": "", "inputs": "d", "readings": "d", "answer": "", "interval?": "2"},
+    **{"switches?": "22", "rules.number": "r", "rules.lower": "r", "rules.upper": "r"},
+    **{"rules.share?": "r", "rules.consequent": "r", "rules.sets_height": "r"},
+    **{"rules.text": "r", "x": "dp", "terms.rule": "t", "terms.input": "t", "terms.set": "t"},
+    **{"terms.negated": "t", "terms.lower": "tp", "terms.upper": "tp"},
+    **{"terms.degree_lower": "t", "terms.degree_upper": "t", "y": "m", "lower?": "m"},
+    **{"upper?": "m", "outputs": "k", "outputs.height_lower": "k", "outputs.height_upper": "k"},
+    **{"outputs.constant?": "k", "outputs.share?": "k", "outputs.lower?": "km"},
+    "outputs.upper?": "km",
+}
+TEXTS = (".sets", ".unit", ".inputs", ".text", ".terms.set", ".outputs")
+
+
+class Wanted(NamedTuple):
+    """Samples of a model at a control point, the fewest and the most that there may be."""
+
+    model: str
+    probe: str
+    fewest: int
+    most: int
+
+
+def check(results: Results) -> None:
+    """Raise ValueError naming file and row of what does not belong to the scene."""
+    scene, record = results.scene, results.record
+    _check_record(scene, record)
+    _check_models(scene, record)
+    times = np.linspace(0.0, scene.time.duration, scene.time.samples)
+    _check_motions("curves.csv", results.curves, _curves(record, times), times)
+    _check_motions("bands.csv", results.bands, _bands(record, times), times)
+    _check_keys("similarity.csv", [row[:-1] for row in results.scores], _scored(record))
+    for line, row in enumerate(results.scores, FIRST_LINE):
+        if not 0.0 <= row.score <= 1.0:
+            raise ValueError(f"similarity.csv, line {line}: score {row.score:g} is not in [0, 1]")
+    differences = [row[:-1] for row in results.field_differences]
+    _check_keys("errors.csv", differences, [] if scene.is_point else _different(record))
+    _check_sensitivity(results)
+    _check_fields(results)
+    _check_fuzzy(results)
+
+
+# --- results.json --------------------------------------------------------------------------------
+
+
+def _check_record(scene: Scene, record: StudyRecord) -> None:
+    _agree("title", record.title, scene.title)
+    probes = ("control-point",) if scene.is_point else tuple(scene.control_points) or ("tool",)
+    _agree("probes", record.probes, probes)
+    systems = tuple(record.fuzzy.systems)
+    if systems:
+        _agree("fuzzy.systems", systems, tuple(scene.fuzzy.systems))
+    names = [model.name for model in record.models]
+    if len(set(names)) < len(names) or not names:
+        raise ValueError("results.json: models: are none, or two of one name")
+    for reference in record.references:
+        if reference not in names:
+            raise ValueError(f"results.json: references: {reference} is none of its models")
+
+
+def _agree(key: str, found: object, scenes: object) -> None:
+    if found != scenes:
+        raise ValueError(f"results.json: {key} is {found!r}, and {scenes!r} in scene.toml")
+
+
+def _check_models(scene: Scene, record: StudyRecord) -> None:
+    """Each model stands for a kind in the scene; a kind may name its models as it likes."""
+    kinds = [_kind(model.name, scene.models) for model in record.models]
+    for model, kind in zip(record.models, kinds, strict=True):
+        if kind is None and set(scene.models) <= set(kinds):
+            raise ValueError(f"results.json: models: {model.name} is none of the scene's")
+        _check_model(model, record)
+    for kind in scene.models:
+        if kind not in kinds and None not in kinds:
+            raise ValueError(f"results.json: models: {kind} of the scene is missing")
+    for kind in set(kinds):
+        _check_systems(kind, record, [k == kind for k in kinds])
+
+
+def _kind(name: str, kinds: Sequence[str]) -> str | None:
+    fitting = [kind for kind in kinds if name == kind or name.startswith(f"{kind}-")]
+    return max(fitting, key=len, default=None)
+
+
+def _check_systems(kind: str | None, record: StudyRecord, members: Sequence[bool]) -> None:
+    """A kind with one model for each fuzzy system has them all, in order."""
+    systems = [model.system for model, is_one in zip(record.models, members, strict=True) if is_one]
+    if kind is not None and any(systems) and systems != list(record.fuzzy.systems):
+        raise ValueError(
+            f"results.json: models: those of {kind} have the systems {systems}, not "
+            f"{list(record.fuzzy.systems)}"
+        )
+
+
+def _check_model(model: ModelRecord, record: StudyRecord) -> None:
+    where = f"results.json: models: {model.name}"
+    if model.status not in {"finished", "diverged"}:
+        raise ValueError(f"{where}: status {model.status!r} is neither finished nor diverged")
+    if (model.status == "diverged") != (model.diverged_at_s is not None):
+        raise ValueError(f"{where}: diverged_at_s does not go with its status")
+    if model.system is not None and model.system not in record.fuzzy.systems:
+        raise ValueError(f"{where}: {model.system} is none of the fuzzy systems")
+    tables: list[Mapping[str, object]] = [model.time_step_errors] if model.time_step_errors else []
+    error = model.mesh_error
+    if error is not None:
+        tables += _by_probe(error)
+    for table in tables:
+        if set(table) != set(record.probes):
+            raise ValueError(f"{where}: errors at {sorted(table)}, not at {list(record.probes)}")
+
+
+def _by_probe(error: DiscretisationError) -> list[Mapping[str, object]]:
+    return [error.by_probe, error.order_by_probe]
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+def _curves(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
+    for model in record.models:
+        count = _finite_samples(model, times)
+        for probe in record.probes:
+            yield Wanted(model.name, probe, count, count)
+
+
+def _finite_samples(model: ModelRecord, times: Floats) -> int:
+    """A model that diverges has samples up to then."""
+    if model.diverged_at_s is None:
+        return len(times)
+    return int((times < model.diverged_at_s - SAME_TIME * times[-1]).sum())
+
+
+def _bands(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
+    """Of models with an interval; a band ends where the run at a bound diverged, as a note says."""
+    for model in record.models:
+        system = record.fuzzy.systems.get(model.system or "")
+        if system is None or system.interval_pa is None:
+            continue
+        lost = any(note.startswith(f"The run of {model.name} at the ") for note in record.notes)
+        for probe in record.probes:
+            yield Wanted(model.name, probe, 0 if lost else len(times), len(times))
+
+
+def _check_motions(
+    file: str,
+    rows: Sequence[CurveSample | BandSample],
+    wanted: Iterator[Wanted],
+    times: Floats,
+) -> None:
+    """Rows go by model, control point and time, from the first sample on."""
+    at = 0
+    for model, probe, fewest, most in wanted:
+        for sample in range(most):
+            found = rows[at] if at < len(rows) else None
+            if found is None or (found.model, found.probe) != (model, probe):
+                if sample < fewest:
+                    told = f"sample {sample + 1} of {fewest} of {model} at {probe} is missing"
+                    raise ValueError(f"{file}, line {at + FIRST_LINE}: {told}")
+                break
+            if not abs(found.time_s - times[sample]) <= SAME_TIME * times[-1]:
+                told = f"time {found.time_s:g} s, not {times[sample]:g} s of sample {sample + 1}"
+                raise ValueError(f"{file}, line {at + FIRST_LINE}: {told} of {model} at {probe}")
+            at += 1
+    if at < len(rows):
+        raise ValueError(
+            f"{file}, line {at + FIRST_LINE}: {rows[at].model} at {rows[at].probe}, "
+            f"{rows[at].time_s:g} s: is no sample of the scene's models"
+        )
+
+
+def _check_keys(
+    file: str, found: Sequence[tuple[str, ...]], wanted: Sequence[tuple[str, ...]]
+) -> None:
+    """Rows are those wanted, in order."""
+    for line, (row, key) in enumerate(zip(found, wanted, strict=False), FIRST_LINE):
+        if row != key:
+            raise ValueError(f"{file}, line {line}: {_words(row)}, where {_words(key)} is to stand")
+    line = min(len(found), len(wanted)) + FIRST_LINE
+    if len(found) < len(wanted):
+        raise ValueError(f"{file}, line {line}: {_words(wanted[len(found)])} is missing")
+    if len(found) > len(wanted):
+        raise ValueError(f"{file}, line {line}: {_words(found[len(wanted)])} is a row too many")
+
+
+def _words(key: tuple[str, ...]) -> str:
+    return " ".join(key)
+
+
+def _scored(record: StudyRecord) -> list[tuple[str, ...]]:
+    """Model, reference, probe, curve and measure of each score; notes say what has none."""
+    from study.similarity.score import MEASURES
+
+    names = [model.name for model in record.models if not model.inverted_cells]
+    return [
+        (model, reference, probe, curve, measure.name)
+        for model, reference in pairs(names, record.references)
+        for probe in record.probes
+        if not any(
+            note.startswith(f"No score of {model} against {reference} at {probe}: ")
+            for note in record.notes
+        )
+        for curve, measures in MEASURES.items()
+        for measure in measures
+    ]
+
+
+def _different(record: StudyRecord) -> list[tuple[str, ...]]:
+    """Model, reference and quantity of each difference of the field, of models that finished."""
+    sound = [model for model in record.models if not model.inverted_cells]
+    names = [model.name for model in sound]
+    lost = {model.name for model in sound if model.status == "diverged"}
+    return [
+        (*pair, quantity)
+        for pair in pairs(names, record.references)
+        if not lost & set(pair)
+        for quantity in QUANTITIES
+    ]
+
+
+def _check_sensitivity(results: Results) -> None:
+    systems = results.record.fuzzy.systems
+    varied = bool(systems) and results.scene.fuzzy.sensitivity_readings > 0
+    rows = results.sensitivity
+    if varied != bool(rows):
+        raise ValueError(
+            f"sensitivity.csv: {len(rows)} rows, where fuzzy.sensitivity_readings is "
+            f"{results.scene.fuzzy.sensitivity_readings} and {len(systems)} systems estimate"
+        )
+    keys = [row[:4] for row in rows]
+    for line, (key, row) in enumerate(zip(keys, rows, strict=True), FIRST_LINE):
+        if key in keys[: line - FIRST_LINE]:
+            raise ValueError(f"sensitivity.csv, line {line}: {_words(key)} stands there twice")
+        if not 0.0 <= row.rms_change_pa <= row.largest_change_pa * (1.0 + SAME_TIME):
+            raise ValueError(
+                f"sensitivity.csv, line {line}: rms_change_pa {row.rms_change_pa:g} is not between "
+                f"0 and largest_change_pa {row.largest_change_pa:g}"
+            )
+
+
+# --- arrays --------------------------------------------------------------------------------------
+
+
+def _check_fields(results: Results) -> None:
+    """Surface, tool and control points, and each model's displacement at the peak and the end."""
+    file, fields, record = "fields.npz", results.fields, results.record
+    if results.scene.is_point:
+        return check_names(file, fields, [])
+    names = [model.name for model in record.models]
+    check_names(file, fields, [*SURFACE, *names])
+    shapes = {**SURFACE, **dict.fromkeys(names, "2n3")}
+    check_shapes(file, fields, shapes, {"p": len(record.probes)})
+    lost = {model.name for model in record.models if model.status == "diverged"}
+    check_numbers(file, {name: array for name, array in fields.items() if name not in lost})
+    triangles = fields["triangles"]
+    if (
+        triangles.dtype.kind not in "iu"
+        or not np.isin(triangles, range(len(fields["points"]))).all()
+    ):
+        raise ValueError(f"{file}: array triangles names points that are not there")
+    return None
+
+
+def _check_fuzzy(results: Results) -> None:
+    """Sets of each variable, and output surface and view of the rules of each system."""
+    file, arrays, systems = "fuzzy.npz", results.fuzzy, list(results.record.fuzzy.systems)
+    variables = [name.removesuffix(".sets") for name in arrays if name.endswith(".sets")]
+    if systems and "stiffness" not in variables:
+        raise ValueError(f"{file}: array stiffness.sets is missing")
+    shapes = [{f"{one}.{part}": dims for part, dims in SETS.items()} for one in variables]
+    shapes += [{f"view.{system}.{part}": dims for part, dims in VIEW.items()} for system in systems]
+    surfaces = {f"surface.{name}": "yx" for name in systems}
+    shapes += [{"surface.x": "x", "surface.y": "y", **surfaces}] if systems else []
+    check_names(file, arrays, [name.removesuffix("?") for group in shapes for name in group])
+    for group in shapes:
+        check_shapes(file, arrays, group, {})
+    check_numbers(file, arrays, TEXTS)

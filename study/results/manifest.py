@@ -1,0 +1,110 @@
+"""SHA256SUMS: checksums of a results folder, which `sha256sum -c SHA256SUMS` verifies too.
+
+The report is not among them, for it can be made again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from study.results.errors import ResultsError
+
+NAME = "SHA256SUMS"
+REPORT = "report.pdf"
+FIELDS = ".vtkhdf"
+DATA = frozenset(
+    {
+        *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
+        *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
+    }
+)
+ALWAYS = DATA - {"fields.npz", "fuzzy.npz"}
+"""What every run writes; a single point has no fields, and a scene may have no fuzzy systems."""
+LINE = re.compile(r"(?P<digest>[0-9a-f]{64}) [ *](?P<name>[^/\0]+)")
+REMEDY = "restore the folder as the run left it, or run the scene again"
+HDF5 = b"\x89HDF\r\n\x1a\n"
+HDF5_END = {0: 40, 1: 44, 2: 28, 3: 28}
+"""Where a superblock of each version says how long the file is."""
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, which is not held in memory."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of each data file that a folder holds, by name."""
+    return {name: digest(folder / name) for name in _present(folder)}
+
+
+def write(folder: Path, sums: Mapping[str, str]) -> None:
+    """Write the checksums of a folder's files."""
+    lines = [f"{found}  {name}\n" for name, found in sorted(sums.items())]
+    (folder / NAME).write_text("".join(lines), encoding="utf-8")
+
+
+def read(folder: Path) -> dict[str, str]:
+    """Checksums by name. ResultsError naming the line that is none, or what is left out."""
+    path = folder / NAME
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        raise ResultsError(f"{path}: is missing; {REMEDY}") from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{path}: cannot be read ({error}); {REMEDY}") from None
+    sums: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        found = LINE.fullmatch(line)
+        if found is None or found["name"] in sums:
+            raise ResultsError(f"{path}, line {number}: no checksum of another file; {REMEDY}")
+        sums[found["name"]] = found["digest"]
+    for name in sorted(ALWAYS - sums.keys()):
+        raise ResultsError(f"{path}: has no checksum of {name}; {REMEDY}")
+    return sums
+
+
+def altered(folder: Path) -> tuple[str, ...]:
+    """Names of files that are not those of the run, by their checksums.
+
+    Fields of all nodes, which may be large and which nothing here reads, are only looked at for
+    being as long as they say. ResultsError for a file that is missing, cut or not of the run.
+    """
+    sums = read(folder)
+    for name in sorted(sums):
+        if not (folder / name).is_file():
+            raise ResultsError(f"{folder / name}: is missing; {REMEDY}")
+    for name in _present(folder):
+        if name not in sums:
+            raise ResultsError(
+                f"{folder / name}: is not of this run ({NAME} does not name it); remove it, or run "
+                "the scene again"
+            )
+    large = [name for name in sums if name.endswith(FIELDS)]
+    for name in large:
+        _check_length(folder / name)
+    small = sorted(sums.keys() - set(large))
+    return tuple(name for name in small if digest(folder / name) != sums[name])
+
+
+def _present(folder: Path) -> list[str]:
+    """Data files in a folder; a hidden one is being written."""
+    names = (path.name for path in folder.iterdir())
+    return sorted(
+        name for name in names if name in DATA or (name.endswith(FIELDS) and name[0] != ".")
+    )
+
+
+def _check_length(path: Path) -> None:
+    """An HDF5 file says in its head where it ends. ResultsError if it ends before that."""
+    with path.open("rb") as file:
+        head = file.read(64)
+    at = HDF5_END.get(head[8]) if len(head) == 64 and head.startswith(HDF5) else None
+    if at is None:
+        raise ResultsError(f"{path}: is no HDF5 file; {REMEDY}")
+    size, end = path.stat().st_size, int.from_bytes(head[at : at + 8], "little")
+    if size < end:
+        raise ResultsError(f"{path}: is cut, {size} bytes of {end}; {REMEDY}")

@@ -1,0 +1,88 @@
+"""A scene made ready to run: whatever can be refused of it is refused here, by `run` and `check`.
+
+What a run refuses must be known before anything heavy is computed: an organ, its meshes and
+lattices are built here, and nothing is solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from study.models.estimates import estimates
+from study.models.model import Estimates, Model, PointModel, Prepared
+from study.models.table import is_tuned, models_of, point_models_of
+from study.problem.problem import PointProblem, Problem
+from study.progress import Progress, Silent
+from study.scene import Scene
+from study.scene.problem import point_problem_of, problem_of
+
+QUIET = Silent()
+"""Nobody is told what is set up."""
+
+
+@runtime_checkable
+class Refusing(Protocol):
+    """A prepared model that refuses more than `prepare` does, such as too many steps."""
+
+    def refuse(self) -> None:
+        """ValueError for what its run would refuse, found without the work of one."""
+
+
+@runtime_checkable
+class RefusingPoint(Protocol):
+    """A model of a single point that refuses some of them."""
+
+    def refuse(self, problem: PointProblem) -> None:
+        """ValueError for what its run would refuse, found without the work of one."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The problem of a scene with an organ, and its models by name, set up and not refused."""
+
+    problem: Problem
+    models: dict[str, Prepared]
+
+
+@dataclass(frozen=True)
+class ReadyPoint:
+    """The problem of a scene that is a single point, and its models."""
+
+    problem: PointProblem
+    models: tuple[PointModel, ...]
+
+
+def ready(scene: Scene, progress: Progress = QUIET) -> Ready | ReadyPoint:
+    """Everything that a scene names, set up. ValueError for whatever a run of it would refuse."""
+    found = estimates(scene) if is_tuned(scene) else {}
+    return _point(scene, found) if scene.is_point else _organ(scene, found, progress)
+
+
+def _organ(scene: Scene, found: Estimates, progress: Progress) -> Ready:
+    with progress.stage("organ"):
+        problem = problem_of(scene)
+    return Ready(problem, set_up(models_of(scene, found), problem, progress))
+
+
+def set_up(
+    models: Iterable[Model], problem: Problem, progress: Progress = QUIET
+) -> dict[str, Prepared]:
+    """Models by name on a problem, all before any runs. ValueError for one that would not run."""
+    found: dict[str, Prepared] = {}
+    for model in models:
+        with progress.stage(f"{model.name}: set up"):
+            found[model.name] = prepared = model.prepare(problem)
+            if isinstance(prepared, Refusing):
+                prepared.refuse()
+    return found
+
+
+def _point(scene: Scene, found: Estimates) -> ReadyPoint:
+    problem = point_problem_of(scene)
+    models = tuple(point_models_of(scene, found))
+    for model in models:
+        if isinstance(model, RefusingPoint):
+            model.refuse(problem)
+    return ReadyPoint(problem, models)

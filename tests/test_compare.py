@@ -1,0 +1,133 @@
+"""Two results folders are compared number by number; an error planted in one of them is found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.commands.compare import compare as command
+from study.compare import differences, other_words
+from study.results.folder import write
+from study.similarity.time_history import relative_l2_distance
+from tests.report_samples import results_of, whole, with_model, with_record
+
+
+def quantities(first, second):
+    return {one.quantity: one for one in differences(first, second)}
+
+
+def scaled(results, factor):
+    """Displacements of the benchmark's curve at the tool by a factor."""
+    rows = (
+        row._replace(displacement_m=factor * row.displacement_m)
+        if row[:2] == ("basafa", "tool")
+        else row
+        for row in results.curves
+    )
+    return replace(results, curves=tuple(rows))
+
+
+def test_results_differ_in_nothing_from_themselves():
+    assert differences(results_of(), results_of()) == []
+    assert other_words(results_of(), results_of()) == []
+
+
+def test_wall_times_do_not_count():
+    other = with_record(with_model(results_of(), "fem", wall_s=99.0), study_wall_s=1.0)
+    assert differences(results_of(), other) == []
+
+
+def test_a_difference_of_a_curve_is_relative_to_the_largest_value_of_that_curve():
+    """Which the benchmark has, and not the stiffer models."""
+    one = quantities(whole(), scaled(whole(), 1.01))
+    assert list(one) == ["curves.csv displacement_m"]
+    found = one["curves.csv displacement_m"]
+    curve = whole().curve("basafa", "tool").displacement
+    assert found.largest == pytest.approx(0.01 * curve.max())
+    assert found.relative == pytest.approx(0.01 / 1.01)
+    assert relative_l2_distance(1.01 * curve, curve) == pytest.approx(0.01)
+    assert found.where == f"basafa tool, sample {1 + int(curve.argmax())}"
+    assert found.count == np.count_nonzero(curve)
+    assert found.total == len(whole().curves)
+
+
+def test_rows_and_arrays_that_only_one_has_are_no_small_difference():
+    less = replace(whole(), curves=whole().curves[:-1], scores=whole().scores[1:])
+    found = quantities(whole(), less)
+    assert {q.split()[0] for q in found} == {"curves.csv", "similarity.csv"}
+    assert all(math.isinf(one.relative) for one in found.values())
+    assert "only in the first" in found["curves.csv velocity_m_per_s"].where
+    found = quantities(results_of(["fem"]), results_of(["fem", "basafa"]))
+    assert found["fields.npz basafa"].where == "only in the second"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda a: a + 1e-3, "index"),
+        (lambda a: a[:1], "shapes (2, 6, 3) and (1, 6, 3)"),
+        (lambda a: np.where(a > a.mean(), np.nan, a), "NaN in one of them"),
+    ],
+)
+def test_arrays_are_compared_too(change, said):
+    other = whole()
+    other = replace(other, fields=other.fields | {"fem": change(other.fields["fem"])})
+    found = quantities(whole(), other)
+    assert list(found) == ["fields.npz fem"]
+    assert said in found["fields.npz fem"].where
+    assert differences(other, other) == []
+
+
+def test_every_number_and_text_of_the_record_counts():
+    other = with_model(results_of(), "fem", nodes=1010, status="diverged")
+    found = quantities(results_of(), other)
+    assert found["results.json models.fem.nodes"].relative == pytest.approx(10 / 1010)
+    assert found["results.json models.fem.status"].where == "finished and diverged"
+
+
+def test_what_differs_in_the_scene_is_told_and_does_not_count():
+    scene = whole().scene
+    other = replace(whole(), scene=replace(scene, tool=replace(scene.tool, force=0.7)))
+    assert differences(whole(), other) == []
+    assert other_words(whole(), other) == ["scene: tool.force: 0.5 N -> 0.7 N"]
+
+
+@pytest.fixture
+def folders(tmp_path):
+    for name, results in (("a", whole()), ("b", scaled(whole(), 1.01))):
+        (tmp_path / name).mkdir()
+        write(results, tmp_path / name)
+    return tmp_path / "a", tmp_path / "b"
+
+
+def test_the_command_ends_with_1_where_numbers_differ_by_more_than_the_tolerance(folders, capsys):
+    command(folders[0], folders[0])
+    assert capsys.readouterr().out == "all numbers are the same\n"
+    with pytest.raises(SystemExit) as ended:
+        command(*folders)
+    assert ended.value.code == 1
+    line, last = capsys.readouterr().out.splitlines()
+    assert line.startswith(
+        "curves.csv displacement_m: differs by up to 1.99e-05, relative 0.0099 (ba"
+    )
+    assert last == "1 quantities differ by more than 0"
+    command(*folders, tolerance=0.01)
+    said = capsys.readouterr().out
+    assert said == "all numbers agree within 0.01: the largest difference is 0.0099\n"
+    with pytest.raises(SystemExit):
+        command(*folders, tolerance=0.0098)
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, math.nan, math.inf])
+def test_a_tolerance_that_is_none_is_refused(tolerance, folders):
+    with pytest.raises(ValueError, match="--tolerance"):
+        command(*folders, tolerance=tolerance)
+
+
+def test_a_folder_that_is_not_whole_is_not_compared(folders):
+    (folders[1] / "curves.csv").write_text("")
+    with pytest.raises(ValueError, match=r"curves\.csv, line 1"):
+        command(*folders)
