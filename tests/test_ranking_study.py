@@ -19,6 +19,7 @@ from study.robustness.unknowns import UNKNOWNS, Draw, Placed, Sampled, draws
 from study.run.study import run_study
 from study.scene.file import read_scene
 from study.similarity import batch
+from study.similarity.iso18571 import rate
 from study.similarity.score import scores
 from study.sweep.tally import Tally
 
@@ -73,6 +74,22 @@ def test_compiled_measures_are_those_of_the_study(seed):
     known = scores(one, other)
     assert tuple((score.curve, score.measure) for score in known) == batch.COLUMNS
     assert batch.scores(*own, *truth) == pytest.approx([score.value for score in known], abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_compiled_measures_are_those_of_the_study_on_rough_curves_too(seed):
+    """Noise, also in steps, of few samples: warpings with ties, loops as long as their noise."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(8, 120))
+    values = rng.normal(size=(4, n))
+    u, v, true_u, true_v = np.round(values) if seed % 2 else np.cumsum(values, axis=1)
+    t = np.arange(n) / 10.0
+    known = [score.value for score in scores(Motion(t, u, v), Motion(t, true_u, true_v))]
+    assert batch.scores(u, v, true_u, true_v) == pytest.approx(known, abs=1e-12)
+    parts = rate(u, true_u)
+    assert batch.iso_18571_parts(u, true_u) == pytest.approx(
+        [parts.corridor, parts.phase, parts.magnitude, parts.slope], abs=1e-12
+    )
 
 
 def test_the_design_changes_one_unknown_at_a_time():

@@ -47,15 +47,30 @@ def scores(
     found[1] = iso_18571(displacement, true_displacement)
     found[2] = relative_l2(velocity, true_velocity)
     found[3] = iso_18571(velocity, true_velocity)
-    x_reach, y_reach = np.abs(true_displacement).max(), np.abs(true_velocity).max()
-    own, own_length = resampled(displacement / x_reach, velocity / y_reach)
-    other, other_length = resampled(true_displacement / x_reach, true_velocity / y_reach)
-    found[4] = 1.0 / (1.0 + frechet(own, other))
-    found[5] = 1.0 / (1.0 + area(own, other))
-    if own_length <= other_length:
-        found[6] = 1.0 / (1.0 + partial_mapping(own, other))
+    x, y = np.abs(true_displacement).max(), np.abs(true_velocity).max()
+    found[4:] = plane_scores(displacement, velocity, true_displacement, true_velocity, x, y)
+    return found
+
+
+@njit(cache=True)
+def plane_scores(
+    displacement: Floats,
+    velocity: Floats,
+    true_displacement: Floats,
+    true_velocity: Floats,
+    x: float,
+    y: float,
+) -> Floats:
+    """Scores (3,) of the phase plane, its axes divided by x [m] and y [m/s]."""
+    found = np.empty(3)
+    own = resampled(displacement / x, velocity / y)
+    other = resampled(true_displacement / x, true_velocity / y)
+    found[0] = 1.0 / (1.0 + frechet(own, other))
+    found[1] = 1.0 / (1.0 + area(own, other))
+    if _arc_length(own)[-1] <= _arc_length(other)[-1]:
+        found[2] = 1.0 / (1.0 + partial_mapping(own, other))
     else:
-        found[6] = 1.0 / (1.0 + partial_mapping(other, own))
+        found[2] = 1.0 / (1.0 + partial_mapping(other, own))
     return found
 
 
@@ -72,16 +87,19 @@ def relative_l2(c: Floats, r: Floats) -> float:
 @njit(cache=True)
 def iso_18571(c: Floats, r: Floats) -> float:
     """Overall rating, see `study.similarity.iso18571`."""
+    corridor, phase, magnitude, slope = iso_18571_parts(c, r)
+    return 0.4 * corridor + 0.2 * (phase + magnitude + slope)
+
+
+@njit(cache=True)
+def iso_18571_parts(c: Floats, r: Floats) -> tuple[float, float, float, float]:
+    """Corridor, phase, magnitude and slope of the rating, each in [0, 1]."""
     n, shift = len(r), _best_shift(c, r)
     count, late, early = n - abs(shift), max(shift, 0), max(-shift, 0)
     cs, rs = c[late : late + count], r[early : early + count]
     apart, size = _slope_sums(cs, rs)
-    parts = (
-        _part(float(abs(shift)), float(n), SHIFT_LIMIT)
-        + _magnitude(cs, rs)
-        + _part(apart, size, SLOPE_LIMIT)
-    )
-    return 0.4 * _corridor(c, r) + 0.2 * parts
+    phase = _part(float(abs(shift)), float(n), SHIFT_LIMIT)
+    return _corridor(c, r), phase, _magnitude(cs, rs), _part(apart, size, SLOPE_LIMIT)
 
 
 @njit(cache=True)
@@ -129,27 +147,36 @@ def _best_shift(c: Floats, r: Floats) -> int:
 
 @njit(cache=True)
 def _magnitude(c: Floats, r: Floats) -> float:
-    """Part of the magnitude after warping within a band of the length."""
+    """Part of the magnitude after warping within a band of the length, whose steps are kept."""
     n = len(r)
     w = math.ceil(WARPING_WINDOW * n) - 1
-    total = np.full((n + 1, n + 1), np.inf)
-    total[0, 0] = 0.0
-    for i in range(1, n + 1):
-        for j in range(max(1, i - w), min(n, i + w) + 1):
-            least = min(total[i, j - 1], total[i - 1, j], total[i - 1, j - 1])
-            total[i, j] = (c[i - 1] - r[j - 1]) ** 2 + least
-    i, j = n, n
-    apart, size = abs(c[-1] - r[-1]), abs(r[-1])
-    while i > 1 or j > 1:
-        up, left, corner = total[i - 1, j], total[i, j - 1], total[i - 1, j - 1]
-        if up <= left and up <= corner:
-            i -= 1
-        elif left <= corner:
-            j -= 1
-        else:
-            i, j = i - 1, j - 1
-        apart += abs(c[i - 1] - r[j - 1])
-        size += abs(r[j - 1])
+    steps = np.empty((n, 2 * w + 1), np.uint8)  # of cell (i, j) at column j - i + w
+    before, row = np.full(n + 1, np.inf), np.full(n + 1, np.inf)
+    before[0] = 0.0
+    for i in range(n):
+        low, high = max(0, i - w), min(n - 1, i + w)
+        row[low] = np.inf  # what an older row left beside the band
+        for j in range(low, high + 1):
+            up, left, corner = before[j + 1], row[j], before[j]
+            step = 0 if up <= left and up <= corner else (1 if left <= corner else 2)
+            row[j + 1] = (c[i] - r[j]) ** 2 + min(up, left, corner)
+            steps[i, j - i + w] = step
+        if high + 2 <= n:
+            row[high + 2] = np.inf
+        before, row = row, before
+    return _warped(c, r, steps, w)
+
+
+@njit(cache=True)
+def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> float:
+    """The part along the path of these steps, traced back from the ends."""
+    i = j = len(r) - 1
+    apart, size = abs(c[i] - r[j]), abs(r[j])
+    while i > 0 or j > 0:
+        step = steps[i, j - i + w]
+        i, j = i - (step != 1), j - (step != 0)
+        apart += abs(c[i] - r[j])
+        size += abs(r[j])
     return _part(apart, size, MAGNITUDE_LIMIT)
 
 
@@ -179,8 +206,8 @@ def _slope_sums(c: Floats, r: Floats) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def resampled(x: Floats, y: Floats) -> tuple[Floats, float]:
-    """Points (200, 2) at equal steps of arc length, and that length."""
+def resampled(x: Floats, y: Floats) -> Floats:
+    """Points (200, 2) at equal steps of arc length."""
     n = len(x)
     length = np.zeros(n)
     for i in range(1, n):
@@ -188,7 +215,7 @@ def resampled(x: Floats, y: Floats) -> tuple[Floats, float]:
     at = np.linspace(0.0, length[-1], POINT_COUNT)
     points = np.empty((POINT_COUNT, 2))
     points[:, 0], points[:, 1] = np.interp(at, length, x), np.interp(at, length, y)
-    return points, length[-1]
+    return points
 
 
 @njit(cache=True)
