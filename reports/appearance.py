@@ -53,7 +53,7 @@ LOOKS = {
     "reading": Look("#B8860B", (0, (1, 1)), 1.4, 3.05),
     **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},
 }
-OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#777777")
+OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#777777", "#0072B2")
 OTHER_DASHES: tuple[Dashes, ...] = ((0, (1, 1)), (0, (9, 2, 1, 2)), "-", (0, (4, 1, 4, 3)))
 
 
