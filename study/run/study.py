@@ -24,9 +24,9 @@ from study.results.records import (
     StudyRecord,
 )
 from study.run.assumptions import assumptions
-from study.run.budget import error_budgets
 from study.run.dimensionless import dimensionless
 from study.run.ready import Ready, ReadyPoint, ready
+from study.run.score_errors import error_rows, rating_rows
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
@@ -78,6 +78,8 @@ def _on_point(given: ReadyPoint, watch: Watch) -> Compared:
 
 
 def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compared:
+    from study.run.budget import error_budgets  # imports finite elements, which a point has none of
+
     problem, notes = given.problem, list(given.problem.geometry.notes)
     runs: dict[str, ModelRun] = {}
     limits = None
@@ -120,6 +122,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
     # One that diverged leaves a note in place of its scores.
     sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}
     scores, unscored = similarity_rows(response, sound, compared_with)
+    errors, apart = error_rows(response, sound, models, scores)
     record = StudyRecord(
         title=scene.title,
         probes=response.probes,
@@ -155,6 +158,9 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             for row in band_rows(response, name, run.bounds)
         ),
         scores,
+        tuple(rating_rows(response, sound, scores)),
+        errors,
+        apart,
         tuple(difference_rows(response, sound, compared_with)) if has_field else (),
         fuzzy.sensitivity,
         found.fields,
