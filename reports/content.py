@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports import budget, fuzzy_tables, summary, tables
+from reports import budget, fuzzy_tables, score_tables, summary, tables
 from reports.benchmarks import benchmarks
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
@@ -47,6 +47,9 @@ def document(results: Results) -> dict[str, object]:
         "measure_count": len(columns(results)),
         "tool_probe": words(tool_probe(results)),
         "leads": tables.lead_rows(results),
+        "ranks": score_tables.rank_rows(results),
+        "ratings": score_tables.rating_rows(results),
+        "score_errors": score_tables.score_error_rows(results),
         "paper": tables.paper_rows(results),
         "paper_spread": fixed(TABLE_III_SPREAD, 4),
         "formulas": tables.formula_rows(),

@@ -22,7 +22,16 @@ from reports.digits import (
 )
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
-from reports.ranking import Lead, leads, references, score_table, tool_probe
+from reports.ranking import (
+    Lead,
+    columns,
+    leads,
+    rank_table,
+    references,
+    score_table,
+    times_first,
+    tool_probe,
+)
 from study.results.folder import Results
 from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
@@ -195,7 +204,22 @@ def _rankings(results: Results) -> Iterator[str]:
                 f"Similarity to {reference_name(results, reference)} at control point "
                 f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
             )
+            yield from _first_ranks(results, reference, probe)
             yield from _baseline(results, reference, probe)
+
+
+def _first_ranks(results: Results, reference: str, probe: str) -> Iterator[str]:
+    """How often each model is first alone, or shares that with those it is not told apart from."""
+    named, parts = labels(results), list[str]()
+    for model, ranks in rank_table(results, reference, probe).items():
+        alone, shared = times_first(ranks)
+        if alone or shared:
+            parts.append(f"{named[model]} alone on {alone}, shared on {shared}")
+    yield (
+        f"First rank against {reference_name(results, reference)} at {words(probe)}, of "
+        f"{len(columns(results))} measures and all models, ties within the error of the "
+        f"difference: {'; '.join(parts)}."
+    )
 
 
 def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
@@ -249,9 +273,9 @@ def _elsewhere(results: Results, reference: str, probe: str) -> str:
 
 def _resolution(found: list[Lead]) -> str:
     counts = {
-        "{} above the numerical error of the curves": True,
+        "{} above the errors of the difference": True,
         "{} not resolved": False,
-        "{} beside an error that is not known": None,
+        "{} beside a numerical error that is not known": None,
     }
     parts = [
         text.format(n)
