@@ -13,10 +13,10 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.codegen import get_host_cpu_features
 from numba.core.datamodel import PrimitiveModel
 from numba.extending import (
     intrinsic,
@@ -44,15 +44,10 @@ def lanes_of(width: int) -> Lanes:
 
 
 def widest() -> int:
-    """Lanes that the processor adds at once, of those that numba compiles for."""
-    given = numba.config.CPU_FEATURES
-    found = dict.fromkeys(_named(given), True) if given else llvm.get_host_cpu_features()
-    known = {"avx512f": 8, "avx": 4, "sse2": 2, "neon": 2}
-    return max((width for name, width in known.items() if found.get(name)), default=1)
-
-
-def _named(features: str) -> list[str]:
-    return [name[1:] for name in features.split(",") if name.startswith("+")]
+    """Lanes that the processor computes at once, of those that numba compiles for."""
+    features = numba.config.CPU_FEATURES or get_host_cpu_features()
+    known = {"+avx512f": 8, "+avx": 4, "+sse2": 2, "+neon": 2}
+    return max((known.get(name, 1) for name in features.split(",")), default=1)
 
 
 class LanesType(types.Type):
