@@ -31,6 +31,8 @@ FAMILIES = {
     "body diagonals": (0.0, 0.4),
     "both": (1.0, 0.9),
 }
+SLOW = pytest.mark.slow
+"""Of what would be compiled for one test alone."""
 EXPLICIT = [name for name, method in INTEGRATORS.items() if method.on_grid is not None]
 
 
@@ -104,13 +106,22 @@ def test_every_mix_of_families_moves_alike(bodies, width, body, families):
     assert compare(assembly, material(assembly), width) < SAME
 
 
-@pytest.mark.parametrize("linear", [False, True])
-@pytest.mark.parametrize("kind", ["hooke", "basafa", "piecewise"])
+@pytest.mark.parametrize(
+    ("kind", "linear"),
+    [
+        ("hooke", False),
+        ("hooke", True),
+        ("basafa", False),
+        ("piecewise", False),
+        pytest.param("basafa", True, marks=SLOW),
+        pytest.param("piecewise", True, marks=SLOW),
+    ],
+)
 def test_every_law_moves_alike(bodies, kind, linear):
     check_law(bodies, widest(), kind, linear=linear)
 
 
-@pytest.mark.slow  # each is compiled by itself
+@SLOW
 @pytest.mark.parametrize("linear", [False, True])
 @pytest.mark.parametrize("kind", ["hooke", "basafa", "piecewise"])
 @pytest.mark.parametrize("width", sorted({*WIDTHS} - {widest()}))
@@ -128,10 +139,10 @@ def check_law(bodies, width, kind, *, linear):
     ("kind", "linear"),
     [
         ("hooke", False),
-        ("basafa", True),
-        pytest.param("hooke", True, marks=pytest.mark.slow),
-        pytest.param("basafa", False, marks=pytest.mark.slow),
-        pytest.param("piecewise", False, marks=pytest.mark.slow),
+        pytest.param("hooke", True, marks=SLOW),
+        pytest.param("basafa", False, marks=SLOW),
+        pytest.param("basafa", True, marks=SLOW),
+        pytest.param("piecewise", False, marks=SLOW),
     ],
 )
 def test_rayleigh_damping_moves_alike(bodies, kind, linear):
