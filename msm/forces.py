@@ -68,10 +68,16 @@ def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -
 
 
 @kernel(inline="always")
+def corner_shares(x: Any, y: Any, z: Any) -> Any:
+    """What corners 0 to 3 of a cell lose to a stress with row (x, y, z); 7 to 4 gain as much."""
+    plus, minus = x + y, x - y
+    return plus + z, plus - z, minus + z, minus - z
+
+
+@kernel(inline="always")
 def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> None:
     """Subtract the nodal forces along d of a stress with row (x, y, z), weights included."""
-    plus, minus = x + y, x - y
-    c0, c1, c2, c3 = plus + z, plus - z, minus + z, minus - z  # of corners 0 to 3
+    c0, c1, c2, c3 = corner_shares(x, y, z)
     force[cell[0], d] += c0
     force[cell[1], d] += c1
     force[cell[2], d] += c2
@@ -88,6 +94,12 @@ def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
     a, b, e = gradient_of(cell, u, 0, to_gradient)
     f, g, h = gradient_of(cell, u, 1, to_gradient)
     i, j, k = gradient_of(cell, u, 2, to_gradient)
+    return cofactors(a, b, e, f, g, h, i, j, k)
+
+
+@kernel(inline="always")
+def cofactors(a: Any, b: Any, e: Any, f: Any, g: Any, h: Any, i: Any, j: Any, k: Any) -> Any:
+    """J - 1 and the rows of the cofactor matrix of F, from the rows of F - 1."""
     # J - 1 as a difference of numbers near 1 would round to more than a small load where kappa
     # is large; hence the first cofactor without its 1.
     around = g + k + g * k - h * j

@@ -17,6 +17,14 @@ def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float
     """Mean gradient over a cell of component d of u; corners as in msm.lattice.CORNERS."""
     u0, u1, u2, u3 = u[cell[0], d], u[cell[1], d], u[cell[2], d], u[cell[3], d]
     u4, u5, u6, u7 = u[cell[4], d], u[cell[5], d], u[cell[6], d], u[cell[7], d]
+    return slopes(u0, u1, u2, u3, u4, u5, u6, u7, to_gradient)  # type: ignore[no-any-return] # numpy scalars
+
+
+@kernel(inline="always")
+def slopes(
+    u0: Any, u1: Any, u2: Any, u3: Any, u4: Any, u5: Any, u6: Any, u7: Any, to_gradient: float
+) -> Any:
+    """Mean gradient over a cell of what has these values at its corners."""
     u01, u23, u45, u67 = u0 + u1, u2 + u3, u4 + u5, u6 + u7
     x = u45 + u67 - u01 - u23
     y = u23 + u67 - u01 - u45

@@ -131,7 +131,8 @@ def _identity(
     seen = tuple(getattr(observation, field.name) for field in fields(observation))
     body = assembly.lattice.nodes, stepper.law, stepper.net
     runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
-    return identity(runs, body, integrator, step, seen, history)
+    lanes = () if stepper.grid is None else stepper.grid.lanes  # which round differently
+    return identity(runs, lanes, body, integrator, step, seen, history)
 
 
 def _parts(

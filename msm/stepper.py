@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays
+from msm.grid import grid_of
 from msm.integrators import INTEGRATORS
 from msm.laws import force_law_of
 from msm.linearised import farthest
@@ -38,6 +39,7 @@ class LatticeStepper:
         self.method = INTEGRATORS[integrator]
         self.law, self.factor = material.law, factor
         self.net = arrays(assembly, material, linear=linear)
+        self.grid = grid_of(assembly.lattice, self.net) if self.method.on_grid else None
         self.follower = Follower(self.law, self.net, self.method)
         self.u, self.v = np.zeros_like(self.net.load), np.zeros_like(self.net.load)
         self.t, self.unseen = 0.0, 0
@@ -48,7 +50,10 @@ class LatticeStepper:
         """Take so many steps of dt [s] and nothing else."""
         starts = np.asarray(self.t + dt * np.arange(count), dtype=np.float64)
         factors = np.stack([self.factor(starts + at * dt) for at in self.method.at], axis=1)
-        self.method.advance(self.law, self.net, factors, dt, self.u, self.v)
+        if self.method.on_grid is not None and self.grid is not None:
+            self.method.on_grid(self.law, self.grid, factors, dt, self.u, self.v)
+        else:
+            self.method.advance(self.law, self.net, factors, dt, self.u, self.v)
         self.t += count * dt
         self.unseen += count
 

@@ -50,9 +50,10 @@ SYSTEM_LOOKS = {
 LOOKS = {
     "fem": Look("#000000", "-", 1.3, 3.0),
     "basafa": Look("#D55E00", (0, (7, 1.6)), 1.3, 3.1),
+    "reading": Look("#B8860B", (0, (1, 1)), 1.4, 3.05),
     **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},
 }
-OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#B8860B", "#777777")
+OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#777777", "#0072B2")
 OTHER_DASHES: tuple[Dashes, ...] = ((0, (1, 1)), (0, (9, 2, 1, 2)), "-", (0, (4, 1, 4, 3)))
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from reports import fuzzy_tables, summary, tables
+from reports import budget, fuzzy_tables, score_tables, summary, tables
 from reports.benchmarks import benchmarks
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
+from reports.ranking_study import is_ranked, ranking_study
 from reports.reference import is_built_in_liver, reference
 from reports.robustness import robustness
 from reports.rule_view import view_names
@@ -46,11 +47,15 @@ def document(results: Results) -> dict[str, object]:
         "measure_count": len(columns(results)),
         "tool_probe": words(tool_probe(results)),
         "leads": tables.lead_rows(results),
+        "ranks": score_tables.rank_rows(results),
+        "ratings": score_tables.rating_rows(results),
+        "score_errors": score_tables.score_error_rows(results),
         "paper": tables.paper_rows(results),
         "paper_spread": fixed(TABLE_III_SPREAD, 4),
         "formulas": tables.formula_rows(),
         "errors": tables.error_rows(results),
         "limits": _limits(results),
+        "budgets": budget.budgets(results),
         "models": tables.model_rows(results),
         "numerics": tables.numerics_rows(results),
         "reference": reference(results),
@@ -61,6 +66,7 @@ def document(results: Results) -> dict[str, object]:
         "benchmarks": benchmarks(results),
         "verification": verification(results),
         "robustness": robustness(results),
+        "ranking_study": ranking_study() if is_ranked(results) else None,
     }
 
 

@@ -35,6 +35,8 @@ COLUMNS = 3
 AT_REST = 0.01
 ROOM = 1.1
 OUTPUT = "stiffness"
+MANY, MANY_COLOUR = 12, "#888888"
+"""Sets of a variable from which on they are all drawn alike, and not named."""
 
 
 def variables(arrays: Arrays) -> list[str]:
@@ -72,18 +74,23 @@ def draw_sets(arrays: Arrays, estimates: Mapping[str, float]) -> bytes:
             axes.set_axis_off()
         for axes in grid[::COLUMNS]:
             axes.set_ylabel("membership")
-        figure.legend(handles=_legend(grid), loc="outside upper center", ncols=6)
+        figure.legend(handles=_legend(grid), loc="outside upper center", ncols=4)
         return canvas.svg(figure)
 
 
 def _draw_sets(axes: Axes, arrays: Arrays, variable: str) -> None:
     x = KILO * arrays[f"{variable}.x"]
-    for i, name in enumerate(arrays[f"{variable}.sets"]):
+    names = arrays[f"{variable}.sets"]
+    for i, name in enumerate(names):
         colour, dashes = SET_LOOKS[SET_NAMES.get(str(name), i) % len(SET_LOOKS)]
+        width, label = 1.1, str(name)
+        if len(names) >= MANY:
+            colour, dashes, width = MANY_COLOUR, "-", 0.4
+            label = f"{len(names)} sets of {variable}" if i == 0 else "_"
         lower, upper = arrays[f"{variable}.lower"][i], arrays[f"{variable}.upper"][i]
         axes.fill_between(x, lower, upper, color=colour, alpha=0.25, linewidth=0)
-        line: Style = {"color": colour, "linestyle": dashes, "linewidth": 1.1}
-        axes.plot(x, arrays[f"{variable}.principal"][i], label=str(name), **line)
+        line: Style = {"color": colour, "linestyle": dashes, "linewidth": width}
+        axes.plot(x, arrays[f"{variable}.principal"][i], label=label, **line)
     bounds = np.concatenate([arrays[f"{variable}.lower"], arrays[f"{variable}.upper"]])
     axes.set(xlim=(x[0], _last_change(x, bounds)), ylim=(0.0, 1.05))
 

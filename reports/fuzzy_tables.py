@@ -16,6 +16,7 @@ SYSTEM = "system"
 SOURCED_MARKS = {"yes": "", "partly": " †", "weak": " ‡", "no": " §"}
 """After the name of a set; the template's caption says what each mark means."""
 CHOICE_NAMES = {
+    "knowledge": "knowledge base",
     "reading": "reading of Table I",
     "consequent": "consequent of mixed stages",
     "placement": "centres of the sets",
@@ -138,9 +139,13 @@ def _lesser(choices: set[str]) -> Iterator[str]:
 def set_rows(results: Results) -> Table:
     """Stiffness sets: variable, centre, placement, spread and its kind, footprint, n and source.
 
-    The set's name bears a mark unless centre and spread are published for it.
+    The set's name bears a mark unless centre and spread are published for it. Variables whose sets
+    are the same share their rows.
     """
-    return [_set_row(one) for one in results.record.fuzzy.stiffness_sets]
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for name, *rest in map(_set_row, results.record.fuzzy.stiffness_sets):
+        alike.setdefault(tuple(rest), []).append(name)
+    return [[", ".join(dict.fromkeys(names)), *rest] for rest, names in alike.items()]
 
 
 def _set_row(one: StiffnessSet) -> list[str]:

@@ -8,17 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.results.folder import Results
-from study.results.records import CurveErrors, ModelRecord
+from study.results.numerical import numerical_errors
+from study.results.tables import ScoreDifference
 
 Column = tuple[str, str]
+
+
+Ranks = dict[str, dict[Column, tuple[int, int]]]
+"""First and last rank of each model by column."""
 
 
 @dataclass(frozen=True)
 class Lead:
     """Lead of the best fuzzy-tuned model over the next, for one reference, probe and measure.
 
-    `margin`: difference of their scores. `error` is the sum of the relative numerical errors of
-    the three curves compared, at the probe; `is_whole` says whether all of them are known.
+    `margin`: difference of their scores; `low` and `high`: its 95 % block interval, the same blocks
+    left out of both; `resampled`: its change with every second sample. `error` is the sum of the
+    relative numerical errors of the three curves compared, at the probe; `is_whole` says whether
+    all of them are known.
     """
 
     reference: str
@@ -26,12 +33,17 @@ class Lead:
     best: str
     runner_up: str
     margin: float
+    low: float
+    high: float
+    resampled: float
     error: float | None
     is_whole: bool
 
     @property
     def is_resolved(self) -> bool | None:
-        """Whether the margin exceeds the numerical error; None if that is not fully known."""
+        """Whether the margin exceeds each error; None if the numerical one is not fully known."""
+        if self.low <= 0.0 or self.margin <= self.resampled:
+            return False
         if self.error is not None and self.margin <= self.error:
             return False
         return True if self.is_whole and self.error is not None else None
@@ -56,6 +68,22 @@ def score_table(results: Results, reference: str, probe: str) -> dict[str, dict[
     return table
 
 
+def rank_table(results: Results, reference: str, probe: str) -> Ranks:
+    """Ranks against a reference at a probe, of all models scored there."""
+    table: Ranks = {}
+    for row in results.score_errors:
+        if row.reference == reference and row.probe == probe:
+            both = (int(row.first_rank), int(row.last_rank))
+            table.setdefault(row.model, {})[row.curve, row.measure] = both
+    return table
+
+
+def times_first(ranks: dict[Column, tuple[int, int]]) -> tuple[int, int]:
+    """By how many columns a model is alone at the first rank, and by how many it shares that."""
+    alone = sum(both == (1, 1) for both in ranks.values())
+    return alone, sum(first == 1 for first, _ in ranks.values()) - alone
+
+
 def tool_probe(results: Results) -> str:
     """Control point nearest to where the tool touches, or the first one."""
     probes, fields = results.record.probes, results.fields
@@ -70,42 +98,39 @@ def leads(results: Results, reference: str, probe: str) -> Iterator[Lead]:
     table = score_table(results, reference, probe)
     records = {model.name: model for model in results.record.models}
     tuned = {name: row for name, row in table.items() if records[name].system is not None}
+    apart = _differences(results, reference, probe)
     for column in columns(results):
         scored = [(row[column], model) for model, row in tuned.items() if column in row]
         if len(scored) < 2:
             continue
         (score, best), (second, runner_up) = sorted(scored, reverse=True)[:2]
-        compared = [records[model] for model in (reference, best, runner_up)]
-        parts = _numerical_errors(compared, probe, column[0])
+        compared = [records[model] for model in (best, runner_up)]
+        parts = numerical_errors(records[reference], compared, probe, column[0])
         known = [part for part in parts if part is not None]
+        paired = apart[best, runner_up, column]
         yield Lead(
             reference=reference,
             column=column,
             best=best,
             runner_up=runner_up,
             margin=score - second,
+            low=paired.low,
+            high=paired.high,
+            resampled=paired.resampled,
             error=sum(known) if known else None,
             is_whole=len(known) == len(parts),
         )
 
 
-def _numerical_errors(compared: list[ModelRecord], probe: str, curve: str) -> list[float | None]:
-    """Relative L2 errors by the time steps, and by mesh and subspace of the first, the reference.
-
-    A spring lattice is a model at its spacing and has none by its mesh.
-    """
-    steps = [_of_curve(curve, model.time_step_errors.get(probe)) for model in compared]
-    elements = compared[0].elements
-    if elements is None:
-        return steps
-    mesh = elements.mesh_error
-    by_mesh = None if mesh is None else _of_curve(curve, mesh.by_probe.get(probe))
-    return [*steps, by_mesh, elements.truncation_error or 0.0]
-
-
-def _of_curve(curve: str, errors: CurveErrors | None) -> float | None:
-    """A loop of the phase plane has the larger of its two."""
-    if errors is None:
-        return None
-    found = {"displacement": errors.displacement, "velocity": errors.velocity}
-    return found.get(curve, max(found.values()))
+def _differences(
+    results: Results, reference: str, probe: str
+) -> dict[tuple[str, str, Column], ScoreDifference]:
+    """Differences by model, other and column, each both ways."""
+    found: dict[tuple[str, str, Column], ScoreDifference] = {}
+    for row in results.score_differences:
+        if (row.reference, row.probe) == (reference, probe):
+            column = (row.curve, row.measure)
+            found[row.model, row.other, column] = row
+            turned = row._replace(difference=-row.difference, low=-row.high, high=-row.low)
+            found[row.other, row.model, column] = turned
+    return found

@@ -11,11 +11,14 @@ from importlib import resources
 from pathlib import Path
 from threading import Event
 
+from reports.budget_figure import budget_figure
 from reports.content import document
 from reports.difference_figure import difference_figure
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
+from reports.ranking_study import is_ranked
+from reports.ranking_study_figure import ranking_figures
 from reports.renders import Pictures, render
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
@@ -82,8 +85,11 @@ def _plots(results: Results) -> Figures:
     single = {
         "sensitivity": sensitivity_figure(results.sensitivity),
         "differences": difference_figure(results),
+        "budget": budget_figure(results),
         **robustness_figures(results),
     }
+    if is_ranked(results):
+        single |= ranking_figures()
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 

@@ -23,6 +23,8 @@ OUTPUT_HEIGHT = 0.78
 FRAME_HEIGHT = 0.72
 FRAME = {"left": 0.075, "right": 0.985, "wspace": 0.12}
 OUTPUT_COLUMN = 1.3
+LEAST_SHARE = 0.01
+"""Of the weight, below which a constant is drawn and not named."""
 CELL_TEXT = 6.0
 TOP = 1.5
 """Upper end of a small panel's axis; above 1 there is room for the name of the set."""
@@ -234,6 +236,8 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
     rows = zip(view["outputs"], view["outputs.constant"], view["outputs.share"], strict=True)
     for name, constant, share in rows:
         _draw_stem(axes, constant, share)
+        if share < LEAST_SHARE:
+            continue
         place: Style = {
             "textcoords": "offset points",
             "va": "center",

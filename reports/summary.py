@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from reports import budget
 from reports.appearance import labels, reference_name, system_name
 from reports.differences import field_errors, finite_elements, own_error, resolved
 from reports.digits import (
@@ -21,7 +22,16 @@ from reports.digits import (
 )
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
-from reports.ranking import Lead, leads, references, tool_probe
+from reports.ranking import (
+    Lead,
+    columns,
+    leads,
+    rank_table,
+    references,
+    score_table,
+    times_first,
+    tool_probe,
+)
 from study.results.folder import Results
 from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
@@ -120,6 +130,7 @@ def sentences(results: Results) -> list[str]:
         *_estimates(results),
         *sensitivity_sentences(results),
         *_fields(results),
+        *budget.sentences(results),
         *_limits(results),
         *_rankings(results),
         *_reference(results),
@@ -193,6 +204,39 @@ def _rankings(results: Results) -> Iterator[str]:
                 f"Similarity to {reference_name(results, reference)} at control point "
                 f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
             )
+            yield from _first_ranks(results, reference, probe)
+            yield from _baseline(results, reference, probe)
+
+
+def _first_ranks(results: Results, reference: str, probe: str) -> Iterator[str]:
+    """How often each model is first alone, or shares that with those it is not told apart from."""
+    named, parts = labels(results), list[str]()
+    for model, ranks in rank_table(results, reference, probe).items():
+        alone, shared = times_first(ranks)
+        if alone or shared:
+            parts.append(f"{named[model]} alone on {alone}, shared on {shared}")
+    yield (
+        f"First rank against {reference_name(results, reference)} at {words(probe)}, of "
+        f"{len(columns(results))} measures and all models, ties within the error of the "
+        f"difference: {'; '.join(parts)}."
+    )
+
+
+def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
+    """How often the reading without any fuzzy system is nearer than all of them."""
+    scores = score_table(results, reference, probe)
+    own = scores.get("reading")
+    tuned = [scores[m.name] for m in results.record.models if m.system and m.name in scores]
+    if own is None or not tuned:
+        return
+    shared = [column for column in own if all(column in row for row in tuned)]
+    ahead = sum(own[column] > max(row[column] for row in tuned) for column in shared)
+    verb = "scores" if ahead else "never scores"
+    of = f" by {ahead} of {len(shared)} measures" if ahead else ""
+    yield (
+        f"The reading as it is, without any fuzzy system, {verb} higher than every fuzzy system "
+        f"against {reference_name(results, reference)} at {words(probe)}{of}."
+    )
 
 
 def _winners(found: list[Lead], named: dict[str, str]) -> str:
@@ -229,9 +273,9 @@ def _elsewhere(results: Results, reference: str, probe: str) -> str:
 
 def _resolution(found: list[Lead]) -> str:
     counts = {
-        "{} above the numerical error of the curves": True,
+        "{} above the errors of the difference": True,
         "{} not resolved": False,
-        "{} beside an error that is not known": None,
+        "{} beside a numerical error that is not known": None,
     }
     parts = [
         text.format(n)

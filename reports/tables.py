@@ -198,7 +198,7 @@ def _score(value: float | None, *, is_best: bool) -> str:
 
 
 def lead_rows(results: Results) -> Table:
-    """Leads at the tool: reference, measure, best, next, margin, error, whether resolved."""
+    """Leads at the tool: reference, measure, best, next, margin, its errors, whether resolved."""
     probe, named = tool_probe(results), labels(results)
     return [
         _lead_row(lead, named)
@@ -209,7 +209,7 @@ def lead_rows(results: Results) -> Table:
 
 def _lead_row(lead: Lead, named: dict[str, str]) -> list[str]:
     curve, measure = lead.column
-    error = DASH if lead.error is None else _tiny_too(lead.error)
+    error = DASH if lead.error is None else tiny_too(lead.error)
     return [
         named[lead.reference],
         CURVE_NAMES.get(curve, curve),
@@ -217,12 +217,15 @@ def _lead_row(lead: Lead, named: dict[str, str]) -> list[str]:
         named[lead.best],
         named[lead.runner_up],
         fixed(lead.margin, 4),
+        f"± {tiny_too(max(lead.high - lead.margin, lead.margin - lead.low))}",
+        tiny_too(lead.resampled),
         error if lead.is_whole or lead.error is None else f"≥ {error}",
         RESOLVED[lead.is_resolved],
     ]
 
 
-def _tiny_too(value: float) -> str:
+def tiny_too(value: float) -> str:
+    """A number to four decimals, or to one digit where those are nought."""
     return fixed(value, 4) if value >= 0.5e-4 else significant(value, 1)
 
 

@@ -18,13 +18,25 @@ from study.results.tables import (
     BandSample,
     CurveSample,
     FieldDifference,
+    Iso18571Rating,
+    ScoreDifference,
+    ScoreError,
     SensitivityEntry,
     SimilarityScore,
 )
 from study.scene.file import resolved
 
 Floats = NDArray[np.float64]
-Row = CurveSample | BandSample | SimilarityScore | FieldDifference | SensitivityEntry
+Row = (
+    CurveSample
+    | BandSample
+    | SimilarityScore
+    | Iso18571Rating
+    | ScoreError
+    | ScoreDifference
+    | FieldDifference
+    | SensitivityEntry
+)
 Flat = dict[str, object]
 Series = dict[str, dict[str, float]]
 """Numbers by the name of their series, and in it by their place."""
@@ -61,6 +73,9 @@ def differences(first: Results, second: Results) -> list[Difference]:
         *_tables("curves.csv", first.curves, second.curves, 2),
         *_tables("bands.csv", first.bands, second.bands, 2),
         *_tables("similarity.csv", first.scores, second.scores, 5),
+        *_tables("iso_18571.csv", first.ratings, second.ratings, 4),
+        *_tables("score_errors.csv", first.score_errors, second.score_errors, 5),
+        *_tables("score_differences.csv", first.score_differences, second.score_differences, 6),
         *_tables("errors.csv", first.field_differences, second.field_differences, 3),
         *_tables("sensitivity.csv", first.sensitivity, second.sensitivity, 4),
         *_arrays("fields.npz", first.fields, second.fields),
@@ -96,7 +111,8 @@ def _columns(rows: Sequence[Row], keys: int) -> dict[str, Series]:
         series = " ".join(map(str, row[:keys]))
         for name, value in zip(row._fields[keys:], row[keys:], strict=True):
             place = columns.setdefault(name, {}).setdefault(series, {})
-            place[f"sample {len(place) + 1}"] = float(value)
+            if value is not None:
+                place[f"sample {len(place) + 1}"] = float(value)
     return columns
 
 

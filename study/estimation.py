@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import ABSENT, LiverSettings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import (
     NORMAL_LIVER,
     PA_PER_KPA,
@@ -237,7 +237,7 @@ def _blanks(request: EstimationRequest) -> Blanks | None:
     return Blanks(
         value=normal,
         system=lambda names: patient_system(dict.fromkeys(names, normal), settings),
-        note=ABSENT[settings.absent].note.format(normal=normal),
+        note=settings.missing.note.format(normal=normal),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -32,7 +33,16 @@ from study.results.records import (
     StudyRecord,
     SystemEstimate,
 )
-from study.results.tables import BandSample, CurveSample, FieldDifference, SimilarityScore
+from study.results.tables import (
+    BandSample,
+    CurveSample,
+    FieldDifference,
+    Iso18571Rating,
+    ScoreDifference,
+    ScoreError,
+    SimilarityScore,
+    paired,
+)
 from study.scene.file import write_scene
 from study.scene.schema import Fuzzy, Place, Scene, Time, Tissue
 from study.similarity.score import MEASURES
@@ -80,6 +90,7 @@ def results_of(
         curves=tuple(row for m in models for p in probes for row in _curve(m, p)),
         bands=tuple(row for p in probes if FUZZY[2] in models for row in _band(p)),
         scores=tuple(row for pair in _pairs(models) for p in probes for row in _scores(pair, p)),
+        **known(tuple(row for pair in _pairs(models) for p in probes for row in _scores(pair, p))),
         field_differences=tuple(row for pair in _pairs(models) for row in _differences(pair)),
         fields=_fields(models, len(probes)),
         fuzzy=_fuzzy_arrays(),
@@ -124,7 +135,7 @@ def bare(results: Results | None = None) -> dict[str, Any]:
     """Content of a report without figures."""
     results = without_arrays(results)
     results = with_record(results, lattice_limits=None)  # the text on them refers to a figure
-    return document(results) | {"drawing": None}
+    return document(results) | {"drawing": None, "ranking_study": None}
 
 
 def printed(content: dict[str, Any]) -> list[str]:
@@ -296,6 +307,45 @@ def _scores(pair: tuple[str, str], probe: str) -> list[SimilarityScore]:
         for curve, measures in MEASURES.items()
         for measure in measures
     ]
+
+
+def known(scores: tuple[SimilarityScore, ...]) -> dict[str, Any]:
+    """Tables on how well scores are known: a thousandth each way, and every rank open."""
+    places = Counter(row[1:5] for row in scores)
+    of = {row[:5]: row.score for row in scores}
+    return {
+        "ratings": tuple(
+            Iso18571Rating(*row[:4], *[row.score] * 4)
+            for row in scores
+            if row.measure == "iso-18571"
+        ),
+        "score_errors": tuple(
+            ScoreError(
+                *row[:5],
+                low=max(row.score - 1e-3, 0.0),
+                high=min(row.score + 1e-3, 1.0),
+                resampled=1e-4,
+                window=0.02,
+                normalised=0.03 if row.curve == "phase-plane" else 0.0,
+                numerical=0.01,
+                first_rank=1,
+                last_rank=places[row[1:5]],
+            )
+            for row in scores
+        ),
+        "score_differences": tuple(
+            _apart(one[0], row.model, row[1:5], of[one[0], *row[1:5]] - row.score)
+            for one, other in paired(list(dict.fromkeys(row[:3] for row in scores)))
+            for row in scores
+            if row[:3] == other
+        ),
+    }
+
+
+def _apart(model: str, other: str, place: Any, apart: float) -> ScoreDifference:
+    return ScoreDifference(
+        model, other, *place, apart, apart - 1e-3, apart + 1e-3, 1e-4, 0.02, 0.0, 0.01
+    )
 
 
 def _differences(pair: tuple[str, str]) -> list[FieldDifference]:

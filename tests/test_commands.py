@@ -23,6 +23,9 @@ TABLES = {
     "curves": tables.CurveSample,
     "bands": tables.BandSample,
     "similarity": tables.SimilarityScore,
+    "iso_18571": tables.Iso18571Rating,
+    "score_errors": tables.ScoreError,
+    "score_differences": tables.ScoreDifference,
     "errors": tables.FieldDifference,
     "sensitivity": tables.SensitivityEntry,
 }

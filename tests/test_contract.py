@@ -13,7 +13,7 @@ from study.results.folder import write as write_files
 from study.run.study import run_study
 from study.similarity.fields import best_factor, relative_l2
 
-MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2"]
+MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2", "reading"]
 
 
 def write(results: Results, folder):
@@ -57,7 +57,7 @@ def test_velocity_is_the_rate_of_displacement(curve, small_scene):
 def test_results_name_every_model_and_number(small_results):
     found = small_results.record
     assert [model.name for model in found.models] == MODELS
-    assert found.fuzzy.rule_count == 247
+    assert found.fuzzy.rule_count == 11158
     for model in found.models:
         for key in ("nodes", "time_step_s", "steps", "wall_s"):
             assert getattr(model, key) > 0
@@ -153,7 +153,7 @@ def test_small_displacements_are_nearly_those_of_the_linear_path(small_scene, sm
 
 
 def test_runs_repeat_exactly(small_scene, small_results):
-    again = run_study(dataclasses.replace(small_scene, models=("basafa", "msm")))
+    again = run_study(dataclasses.replace(small_scene, models=("basafa", "msm", "reading")))
     first = tuple(row for row in small_results.curves if row.model != "fem")
     assert again.curves == first
 

@@ -155,7 +155,7 @@ def test_a_flag_of_the_liver_is_refused_beside_a_rule_base(folder):
 
 
 def test_explain_names_rules_sets_and_switch_points(tmp_path):
-    done = study("estimate", "--hcv", "9.5", "--explain", cwd=tmp_path)
+    done = study("estimate", "--hcv", "9.5", "--explain", "--knowledge", "severity", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "if hcv is F4 then severe" in done.stdout
     assert "bounds switch at" in done.stdout
@@ -171,14 +171,16 @@ def test_a_row_of_a_table_is_explained(folder):
 
 
 def test_rules_are_audited(tmp_path):
-    done = study("rules", cwd=tmp_path)
+    done = study("rules", "--knowledge", "severity", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "12 of 247 rules repeat an earlier rule" in done.stdout
     assert "236 of 247 rules change no answer" in done.stdout
 
 
 def test_the_liver_is_written_as_sugeno_too(tmp_path):
-    done = study("rules", "--out", "liver.fis", "--sugeno", cwd=tmp_path)
+    done = study(
+        *("rules", "--knowledge", "severity", "--out", "liver.fis", "--sugeno"), cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     assert "without footprints" in done.stdout
     assert read_rule_base(tmp_path / "liver.fis").is_sugeno
@@ -204,9 +206,12 @@ def test_a_missing_column_is_not_looked_for_under_another_disease(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["fis", "json"])
 def test_the_liver_is_written_and_read_back(tmp_path, suffix):
-    done = study("rules", "--out", f"liver.{suffix}", cwd=tmp_path)
+    done = study("rules", "--knowledge", "severity", "--out", f"liver.{suffix}", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    liver, back = liver_system(LiverSettings()), read_rule_base(tmp_path / f"liver.{suffix}")
+    liver, back = (
+        liver_system(LiverSettings(knowledge="severity")),
+        read_rule_base(tmp_path / f"liver.{suffix}"),
+    )
     if suffix == "json":
         assert back == liver
     else:

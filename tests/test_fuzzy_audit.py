@@ -181,7 +181,7 @@ def test_no_dominated_rule_is_missed_under_min_and_max():
 
 
 def test_eleven_of_the_livers_247_rules_decide_mamdani_and_type_2():
-    liver = liver_system(LiverSettings())
+    liver = liver_system(LiverSettings(knowledge="severity"))
     dead = {pair.rule for pair in dominated(liver)}
     alive = tuple(rule for i, rule in enumerate(liver.rules) if i not in dead)
     assert len(dead) == 236
@@ -196,7 +196,7 @@ def test_eleven_of_the_livers_247_rules_decide_mamdani_and_type_2():
 
 
 def test_sugenos_sum_needs_the_dominated_rules():
-    liver = liver_system(LiverSettings())
+    liver = liver_system(LiverSettings(knowledge="severity"))
     dead = {pair.rule for pair in dominated(liver)}
     few = replace(liver, rules=tuple(r for i, r in enumerate(liver.rules) if i not in dead))
     X = spread_readings(liver, 64)
@@ -205,7 +205,7 @@ def test_sugenos_sum_needs_the_dominated_rules():
 
 
 def test_each_of_the_eleven_rules_matters():
-    liver = liver_system(LiverSettings())
+    liver = liver_system(LiverSettings(knowledge="severity"))
     dead = {pair.rule for pair in dominated(liver)}
     alive = tuple(rule for i, rule in enumerate(liver.rules) if i not in dead)
     scale = np.arange(2.0, 76.0)
@@ -224,7 +224,7 @@ def test_each_of_the_eleven_rules_matters():
 
 
 def test_the_liver_has_twelve_duplicates_and_no_gap():
-    found = audit(liver_system(LiverSettings()))
+    found = audit(liver_system(LiverSettings(knowledge="severity")))
     assert len(found.duplicates) == 12
     assert not found.contradictions
     assert not found.gaps
@@ -317,7 +317,7 @@ def test_share_of_uncovered_readings_is_that_of_their_area():
 
 
 def test_spread_readings_fill_the_universe_more_evenly_than_random_ones():
-    liver = liver_system(LiverSettings())
+    liver = liver_system(LiverSettings(knowledge="severity"))
     low, high = 2.0, 75.0
 
     def unevenness(X):
@@ -359,7 +359,7 @@ def test_a_rule_in_words(rule, text):
 
 
 def test_the_audit_of_the_liver_in_words():
-    liver = liver_system(LiverSettings())
+    liver = liver_system(LiverSettings(knowledge="severity"))
     lines = audit_lines(audit(liver), liver, examples=1)
     assert lines[0].startswith("liver-R1: 247 rules on the sets 2 of hcv, 3 of hbv")
     text = "\n".join(lines)

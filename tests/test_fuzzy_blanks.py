@@ -93,7 +93,7 @@ def test_a_row_that_no_rule_can_answer_is_refused_with_its_line(table):
                 inputs=path,
                 out=path.parent / "out.csv",
                 systems=("sugeno",),
-                settings={"absent": "silent", "reading": "R4-drop"},
+                settings={"knowledge": "severity", "absent": "silent", "reading": "R4-drop"},
             )
         )
 
@@ -128,7 +128,7 @@ def test_a_rule_base_of_ones_own_knows_no_blanks(table, tmp_path):
 def test_a_row_without_any_reading_is_a_normal_liver(table):
     path = table([{"hcv": 9.5}, {}])
     asked(path, "mamdani", "normal")
-    normal = estimate({}, "mamdani", LiverSettings()).estimate / PA_PER_KPA
+    normal = estimate({}, "mamdani", LiverSettings(absent="normal")).estimate / PA_PER_KPA
     assert estimates(path.parent / "out.csv")[1] == pytest.approx(normal, rel=1e-12)
 
 
@@ -138,5 +138,6 @@ def test_blanks_and_decimal_commas_go_together(tmp_path):
     asked(path, "mamdani", "normal")
     header, row = (tmp_path / "out.csv").read_text().splitlines()
     assert header == "hcv;hbv;ald;cld;nafld;estimate"
-    alone = estimate({"hcv": 9500.0, "hbv": 7000.0}, "mamdani").estimate / PA_PER_KPA
+    settings = LiverSettings(absent="normal")
+    alone = estimate({"hcv": 9500.0, "hbv": 7000.0}, "mamdani", settings).estimate / PA_PER_KPA
     assert float(row.split(";")[-1].replace(",", ".")) == pytest.approx(alone, rel=1e-12)

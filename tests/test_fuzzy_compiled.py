@@ -18,7 +18,7 @@ from fuzzy.systems.redundancy import dominated
 from fuzzy.systems.sets import FORMS, TYPE_1, Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
-LIVER = liver_system(LiverSettings())
+LIVER = liver_system(LiverSettings(knowledge="severity"))
 EXACT = InferenceOptions(sampling="exact")
 INSIDE = np.random.default_rng(20240917).uniform(2.0, 75.0, (300, 5))
 

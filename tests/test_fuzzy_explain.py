@@ -53,7 +53,7 @@ POINTS = np.array([[3.0, 5.0], [8.0, 1.0], [5.0, 9.0], [0.0, 0.0]])
 
 def liver(**readings: float) -> tuple[FuzzySystem, np.ndarray]:
     pascal = {name: 1e3 * value for name, value in readings.items()}
-    return patient_system(pascal, LiverSettings()), liver_row(pascal)[0]
+    return patient_system(pascal, LiverSettings(knowledge="severity")), liver_row(pascal)[0]
 
 
 @pytest.fixture(scope="module")

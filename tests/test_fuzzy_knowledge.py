@@ -206,7 +206,8 @@ def test_every_value_names_a_known_source_and_every_source_is_used():
     known = {row["id"] for row in rows("sources.csv")}
     table = rows("elastography.csv")
     named = {row[key] for row in table for key in row if key.endswith("_source")}
-    named |= {row["source"] for row in rows("parameters.csv")}
+    for file in ("parameters.csv", "stages.csv", "groups.csv", "exam_noise.csv"):
+        named |= {row["source"] for row in rows(file)}
     notes = " ".join(row["note"] for row in table)
     assert named <= known
     assert {source for source in known - named if source not in notes} == set()
@@ -249,7 +250,7 @@ def test_sets_beyond_the_data_are_refused(name, count, placement, message):
 
 @pytest.mark.parametrize("reading", READINGS)
 def test_sets_of_a_variable_rise_from_mild_to_severe(reading):
-    system = liver_system(LiverSettings(reading=reading))
+    system = liver_system(LiverSettings(knowledge="severity", reading=reading))
     for variable in system.inputs:
         # A right shoulder's second parameter is its centre, a left one's is the last.
         first, *others = variable.sets
@@ -259,7 +260,7 @@ def test_sets_of_a_variable_rise_from_mild_to_severe(reading):
 
 @pytest.mark.parametrize("placement", ["stage-mean", "cut-off"])
 def test_records_in_use_are_those_behind_the_sets(placement):
-    settings = LiverSettings(placement=placement)
+    settings = LiverSettings(knowledge="severity", placement=placement)
     system = liver_system(settings)
     variables = (*system.inputs, system.output)
     placed = [(v.name, one) for v in variables for one in v.sets]
@@ -270,7 +271,7 @@ def test_records_in_use_are_those_behind_the_sets(placement):
 
 
 def test_values_without_a_full_source_are_listed():
-    records = records_in_use(LiverSettings(reading="R4-drop"))
+    records = records_in_use(LiverSettings(knowledge="severity", reading="R4-drop"))
     found = [(r.aetiology, r.stage, r.sourced) for r in records if r.sourced != "yes"]
     assert ("nafld", "F3", "no") in found
     assert ("nafld", "F2", "weak") in found
@@ -281,7 +282,7 @@ def test_values_without_a_full_source_are_listed():
 
 # --- footprints ------------------------------------------------------------------------------
 
-F2 = records_in_use(LiverSettings())[0]
+F2 = records_in_use(LiverSettings(knowledge="severity"))[0]
 SHARE = float(np.hypot(F2.between_study, F2.between_operator))
 
 
@@ -295,13 +296,13 @@ SHARE = float(np.hypot(F2.between_study, F2.between_operator))
     ],
 )
 def test_footprint_is_the_published_spread_times_the_factor(kind, made, factor):
-    settings = LiverSettings(footprint=kind, footprint_factor=factor)
+    settings = LiverSettings(knowledge="severity", footprint=kind, footprint_factor=factor)
     assert liver_system(settings).inputs[0].sets[0].footprint == made(factor * SHARE)
 
 
 @pytest.mark.parametrize("kind", ["uncertain-mean", "uncertain-spread", "scaled"])
 def test_without_footprint_every_set_is_type_1(kind):
-    system = liver_system(LiverSettings(footprint=kind, footprint_factor=0.0))
+    system = liver_system(LiverSettings(knowledge="severity", footprint=kind, footprint_factor=0.0))
     assert all(one.footprint == TYPE_1 for v in (*system.inputs, system.output) for one in v.sets)
 
 
@@ -315,18 +316,22 @@ def bounds_at_the_ends(system):
 
 @pytest.mark.parametrize("kind", ["uncertain-mean", "uncertain-spread"])
 def test_outer_sets_stay_full_at_the_ends_of_the_universe(kind):
-    system = liver_system(LiverSettings(footprint=kind, footprint_factor=LARGEST_FACTOR))
+    system = liver_system(
+        LiverSettings(knowledge="severity", footprint=kind, footprint_factor=LARGEST_FACTOR)
+    )
     assert set(bounds_at_the_ends(system)) == {1.0}
 
 
 def test_a_flat_side_that_ends_at_zero_would_not_stay_full():
-    variable = liver_system(LiverSettings(footprint_factor=LARGEST_FACTOR)).inputs[0]
+    variable = liver_system(
+        LiverSettings(knowledge="severity", footprint_factor=LARGEST_FACTOR)
+    ).inputs[0]
     sd, _, *right = variable.sets[0].parameters
     short = replace(variable.sets[0], parameters=(sd, 0.0, *right))
     assert lower_membership(short, np.array([variable.low]))[0] < 0.9
 
 
 def test_universes_are_those_of_the_parameters():
-    system, p = liver_system(LiverSettings()), parameters()
+    system, p = liver_system(LiverSettings(knowledge="severity")), parameters()
     assert {(v.low, v.high) for v in system.inputs} == {(p["input_low"], p["input_high"])}
     assert (system.output.low, system.output.high) == (p["output_low"], p["output_high"])

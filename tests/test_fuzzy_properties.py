@@ -35,8 +35,8 @@ from fuzzy.systems.system import (
 READING = st.floats(2, 75)
 ROW = st.lists(READING, min_size=5, max_size=5).map(lambda row: np.array([row]))
 quick = settings(max_examples=50, deadline=None, derandomize=True)
-LIVER = liver_system(LiverSettings())
-TYPE_1 = liver_system(LiverSettings(footprint_factor=0.0))
+LIVER = liver_system(LiverSettings(knowledge="severity"))
+TYPE_1 = liver_system(LiverSettings(knowledge="severity", footprint_factor=0.0))
 
 
 def interval(system, row):
@@ -47,7 +47,7 @@ def interval(system, row):
 @given(ROW, st.integers(0, 20), st.integers(1, 20))
 def test_interval_grows_with_the_footprint(row, tenths, more):
     narrow, wide = (
-        interval(liver_system(LiverSettings(footprint_factor=n / 20)), row)
+        interval(liver_system(LiverSettings(knowledge="severity", footprint_factor=n / 20)), row)
         for n in (tenths, tenths + more)
     )
     assert wide[0] <= narrow[0] + 1e-10
@@ -79,7 +79,7 @@ def test_rule_order_changes_nothing(row, order):
 @quick
 @given(ROW)
 def test_repeated_rules_change_the_sugeno_sum_only(row):
-    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(knowledge="severity", reading="R1-no-duplicates"))
     kept, once = every_answer(LIVER, row), every_answer(dropped, row)
     at_sum = list(SYSTEMS).index("sugeno")
     assert kept[:at_sum] == once[:at_sum]
@@ -88,7 +88,7 @@ def test_repeated_rules_change_the_sugeno_sum_only(row):
 
 def test_a_repeated_rule_does_change_the_sugeno_sum():
     row = np.array([[9.5, 4.1, 4.1, 4.1, 4.1]])
-    dropped = liver_system(LiverSettings(reading="R1-no-duplicates"))
+    dropped = liver_system(LiverSettings(knowledge="severity", reading="R1-no-duplicates"))
     kept, once = (infer(system, row, "sugeno").value[0] for system in (LIVER, dropped))
     assert abs(kept - once) > 1e-3
 

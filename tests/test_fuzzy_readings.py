@@ -51,12 +51,14 @@ def test_one_triple_stands_twice_and_one_is_missing():
 @pytest.mark.parametrize("name", READINGS)
 def test_reading_gives_247_rules(name):
     expected = 235 if name == "R1-no-duplicates" else 247
-    assert len(liver_system(LiverSettings(reading=name)).rules) == expected
+    assert len(liver_system(LiverSettings(knowledge="severity", reading=name)).rules) == expected
     assert rule_count(READINGS[name]) == expected
 
 
 def test_r1_by_number_of_terms():
-    sizes = [len(rule.antecedents) for rule in liver_system(LiverSettings()).rules]
+    sizes = [
+        len(rule.antecedents) for rule in liver_system(LiverSettings(knowledge="severity")).rules
+    ]
     assert [sizes.count(size) for size in (1, 2, 3, 4)] == [11, 48, 116, 72]
 
 
@@ -126,7 +128,7 @@ def test_unsupported_reading_is_refused_with_its_reason(name):
 
 
 def terms_of_nafld(reading):
-    rules = liver_system(LiverSettings(reading=reading)).rules
+    rules = liver_system(LiverSettings(knowledge="severity", reading=reading)).rules
     nafld = AETIOLOGIES.index("nafld")
     return [sum(term.input == nafld for term in rule.antecedents) for rule in rules]
 
@@ -137,21 +139,26 @@ def test_literal_cell_asks_for_two_nafld_terms():
 
 
 def test_squared_diagonal_has_no_single_terms():
-    sizes = [len(rule.antecedents) for rule in liver_system(LiverSettings(reading="R2")).rules]
+    sizes = [
+        len(rule.antecedents)
+        for rule in liver_system(LiverSettings(knowledge="severity", reading="R2")).rules
+    ]
     assert 1 not in sizes
-    assert 1 in [len(rule.antecedents) for rule in liver_system(LiverSettings()).rules]
+    assert 1 in [
+        len(rule.antecedents) for rule in liver_system(LiverSettings(knowledge="severity")).rules
+    ]
 
 
 def test_dropping_duplicates_drops_one_copy_of_the_repeated_rules():
-    once = liver_system(LiverSettings(reading="R1-no-duplicates")).rules
-    twice = liver_system(LiverSettings()).rules
+    once = liver_system(LiverSettings(knowledge="severity", reading="R1-no-duplicates")).rules
+    twice = liver_system(LiverSettings(knowledge="severity")).rules
     assert len(set(once)) == len(once) == 235
     assert set(once) == set(twice)
 
 
 @pytest.mark.parametrize("reading", ["R1", "R2", "R5-hcv4"])
 def test_severest_term_governs_every_rule(reading):
-    system = liver_system(LiverSettings(reading=reading))
+    system = liver_system(LiverSettings(knowledge="severity", reading=reading))
     severity = {"F1": 0, "F2": 0, "F3": 1, "F4": 2}
     for rule in system.rules:
         stages = [system.inputs[i].sets[s].name for i, s, _ in rule.antecedents]
@@ -172,8 +179,8 @@ def test_governing_severity(severities, severest, mean):
 
 
 def test_rules_that_name_an_absent_aetiology_are_left_out():
-    full = liver_system(LiverSettings())
-    part = liver_system(LiverSettings(), ("hcv", "ald"))
+    full = liver_system(LiverSettings(knowledge="severity"))
+    part = liver_system(LiverSettings(knowledge="severity"), ("hcv", "ald"))
     present = {AETIOLOGIES.index("hcv"), AETIOLOGIES.index("ald")}
     kept = [r for r in full.rules if {term.input for term in r.antecedents} <= present]
     assert list(part.rules) == kept
@@ -191,7 +198,7 @@ def test_rules_that_name_an_absent_aetiology_are_left_out():
 )
 def test_nothing_left_or_unknown_is_refused(reading, present, message):
     with pytest.raises(ValueError, match=message):
-        liver_system(LiverSettings(reading=reading), present)
+        liver_system(LiverSettings(knowledge="severity", reading=reading), present)
 
 
 # --- settings --------------------------------------------------------------------------------
@@ -206,25 +213,25 @@ def test_nothing_left_or_unknown_is_refused(reading, present, message):
         ("footprint", "none", "footprint = 'none': use one of uncertain-mean, "),
         ("footprint_factor", -0.1, "footprint_factor = -0.1: give a number from 0 to 3"),
         ("footprint_factor", float("nan"), "footprint_factor = nan"),
-        ("absent", "zero", "absent = 'zero': use one of normal, silent"),
+        ("absent", "zero", "absent = 'zero': use one of auto, normal, silent"),
     ],
 )
 def test_settings_name_key_value_and_remedy(key, value, message):
     with pytest.raises(ValueError, match=message):
-        LiverSettings(**{key: value})
+        LiverSettings(knowledge="severity", **{key: value})
 
 
 @pytest.mark.parametrize("name", ["R5-hbv4", "R5-hcv4", "R5-pair"])
 def test_four_sets_need_stage_means(name):
     with pytest.raises(ValueError, match=rf"reading = '{name}': h.v with 4 sets: no cut-off"):
-        LiverSettings(reading=name, placement="cut-off")
+        LiverSettings(knowledge="severity", reading=name, placement="cut-off")
 
 
 # --- what is said of them --------------------------------------------------------------------
 
 
 def said(**settings):
-    return " ".join(assumptions(LiverSettings(**settings)))
+    return " ".join(assumptions(LiverSettings(knowledge="severity", **settings)))
 
 
 @pytest.mark.parametrize(
@@ -262,7 +269,7 @@ def test_assumptions_of_the_default_settings():
 
 @pytest.mark.parametrize("reading", READINGS)
 def test_every_assumption_is_a_sentence(reading):
-    for sentence in assumptions(LiverSettings(reading=reading)):
+    for sentence in assumptions(LiverSettings(knowledge="severity", reading=reading)):
         assert sentence[0].isupper()
         assert sentence.endswith(".")
         assert "  " not in sentence

@@ -19,7 +19,7 @@ from fuzzy.systems.scikit_fuzzy import from_skfuzzy, to_skfuzzy
 from fuzzy.systems.sets import FuzzySet, membership
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
 
-LIVER = liver_system(LiverSettings())
+LIVER = liver_system(LiverSettings(knowledge="severity"))
 EXACT = InferenceOptions(sampling="exact")
 INSIDE = np.random.default_rng(20240917).uniform(2.0, 75.0, (300, 5))
 

@@ -33,7 +33,7 @@ INDEPENDENT_SD = 5.3
 @pytest.fixture(scope="module")
 def timed() -> tuple[Screening, float]:
     start = time.process_time()
-    return sensitivity(READINGS, LiverSettings()), time.process_time() - start
+    return sensitivity(READINGS, LiverSettings(knowledge="severity")), time.process_time() - start
 
 
 @pytest.fixture(scope="module")
@@ -65,21 +65,28 @@ def test_it_takes_less_than_six_seconds(timed):
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_change_at_the_readings_is_that_of_two_estimates(found, system):
     for choice, other in (
-        ("reading", LiverSettings(reading="R4-pair")),
-        ("consequent", LiverSettings(consequent="mean")),
-        ("absent", LiverSettings(absent="silent")),
-        ("samples", LiverSettings(options=InferenceOptions(samples=1001))),
+        ("reading", LiverSettings(knowledge="severity", reading="R4-pair")),
+        ("consequent", LiverSettings(knowledge="severity", consequent="mean")),
+        ("absent", LiverSettings(knowledge="severity", absent="silent")),
+        ("samples", LiverSettings(knowledge="severity", options=InferenceOptions(samples=1001))),
     ):
         value = getattr(other, choice, other.options.samples)
         row = pick(found, choice, str(value), system)
-        before, after = (estimate(READINGS, system, s).estimate for s in (LiverSettings(), other))
+        before, after = (
+            estimate(READINGS, system, s).estimate
+            for s in (LiverSettings(knowledge="severity"), other)
+        )
         assert row.at_readings == pytest.approx(after - before, abs=1e-7)  # of 1e4 Pa
 
 
 def test_rms_and_largest_are_taken_over_the_spread_readings(found):
     X = spread_readings(256)
     before, after = (
-        evaluate(X, "sugeno", s)[0] for s in (LiverSettings(), LiverSettings(consequent="mean"))
+        evaluate(X, "sugeno", s)[0]
+        for s in (
+            LiverSettings(knowledge="severity"),
+            LiverSettings(knowledge="severity", consequent="mean"),
+        )
     )
     row = pick(found, "consequent", "mean", "sugeno")
     assert row.rows == 256
@@ -118,14 +125,21 @@ def test_a_larger_footprint_widens_the_interval(found):
 def test_what_happens_to_absent_aetiologies_is_tried_on_such_patients(found):
     X = spread_readings(256, READINGS)
     assert (X[:, AETIOLOGIES.index("hbv")] == NORMAL_LIVER).all()
-    silent = evaluate(X, "mamdani", LiverSettings(absent="silent"), tuple(READINGS))[0]
+    silent = evaluate(
+        X, "mamdani", LiverSettings(knowledge="severity", absent="silent"), tuple(READINGS)
+    )[0]
     row = pick(found, "absent", "silent", "mamdani")
-    assert row.largest == np.abs(silent - evaluate(X, "mamdani")[0]).max()
+    assert (
+        row.largest
+        == np.abs(silent - evaluate(X, "mamdani", LiverSettings(knowledge="severity"))[0]).max()
+    )
 
 
 @pytest.mark.parametrize("readings", [{}, dict.fromkeys(AETIOLOGIES, 9e3)])
 def test_alternatives_that_cannot_be_had_are_left_out_with_a_reason(readings):
-    screening = sensitivity(readings, LiverSettings(placement="cut-off"), rows=8)
+    screening = sensitivity(
+        readings, LiverSettings(knowledge="severity", placement="cut-off"), rows=8
+    )
     kept = {row.alternative for row in screening.rows}
     assert "R5-hbv4" not in kept
     reason = next(text for text in screening.left_out if "R5-hbv4" in text)
@@ -134,7 +148,7 @@ def test_alternatives_that_cannot_be_had_are_left_out_with_a_reason(readings):
 
 
 def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
-    base = LiverSettings(options=InferenceOptions(sampling="exact"))
+    base = LiverSettings(knowledge="severity", options=InferenceOptions(sampling="exact"))
     found = sensitivity(READINGS, base, rows=32)
     assert "samples" not in {row.choice for row in found.rows}
     assert {row.rows for row in found.rows if row.choice == "sampling"} == {EXACT_ROWS}
@@ -144,7 +158,7 @@ def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
         before, after = (estimate(READINGS, system, s).estimate for s in (base, other))
         assert row.rows == 32
         assert row.at_readings == pytest.approx(after - before, abs=0.4)  # the stand-in, twice
-        coarse = estimate(READINGS, system, LiverSettings()).estimate
+        coarse = estimate(READINGS, system, LiverSettings(knowledge="severity")).estimate
         assert abs(coarse - before) > 4.0  # as 101 points would not be
 
 
@@ -153,7 +167,7 @@ def test_a_base_of_exact_sampling_is_screened_by_a_stand_in_as_good():
 )
 def test_faulty_readings_are_refused_and_not_taken_for_faulty_alternatives(readings, message):
     with pytest.raises(ValueError, match=message):
-        sensitivity(readings, LiverSettings(), rows=8)
+        sensitivity(readings, LiverSettings(knowledge="severity"), rows=8)
 
 
 def test_spread_readings_are_log_uniform_and_even():
@@ -177,7 +191,10 @@ def test_random_numbers_would_not_be_found_even(rng):
 
 
 def test_more_readings_give_nearly_the_same_rms():
-    base, other = LiverSettings(), LiverSettings(consequent="mean")
+    base, other = (
+        LiverSettings(knowledge="severity"),
+        LiverSettings(knowledge="severity", consequent="mean"),
+    )
     rms = []
     for X in (spread_readings(256), spread_readings(500)[256:]):
         change = evaluate(X, "sugeno", other)[0] - evaluate(X, "sugeno", base)[0]

@@ -23,7 +23,7 @@ from study.problem.history import HISTORIES
 from study.run import study as running
 from study.run.study import run_study
 from study.scene import Patient, Scene
-from study.scene.file import SceneError, read_scene, resolved
+from study.scene.file import SceneError, read_scene, resolved, validate
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import How
@@ -210,7 +210,7 @@ def test_the_tissue_lattice_runs_without_patient_and_without_estimates(small_sce
     assert modulus == scene.tissue.youngs_modulus
     assert {(row.model, row.reference) for row in found.scores} == {("tissue", "fem")}
     with pytest.raises(AssertionError, match="nothing asks"):
-        run_study(dataclasses.replace(scene, models=("msm",)))
+        run_study(dataclasses.replace(small_scene, models=("msm",)))
 
 
 def test_all_models_are_set_up_before_any_of_them_runs(small_scene, monkeypatch):
@@ -448,3 +448,16 @@ def test_two_models_of_one_name_are_refused():
     scene = read_scene("block", ["models=['tissue', 'mine']"])
     with pytest.raises(ValueError, match="second model named tissue"):
         list(models_of(scene, {}))
+
+
+def test_the_reading_as_it_is_needs_no_fuzzy_system():
+    scene = read_scene("paper", ("models=['basafa','reading']", "patient.hbv='4 kPa'"))
+    found = run_study(scene)
+    assert not found.record.fuzzy.systems
+    assert found.model("reading").small_strain_modulus_pa == pytest.approx((9.5e3 * 4e3) ** 0.5)
+    assert {row.model for row in found.scores} == {"reading"}
+
+
+def test_the_reading_as_it_is_needs_a_reading():
+    with pytest.raises(ValueError, match="models: reading needs a reading"):
+        validate({"organ": {"shape": "point"}, "models": ["basafa", "reading"]}, "own.toml")

@@ -29,6 +29,7 @@ from tests.report_samples import (
     LABELS,
     MODELS,
     TITLE,
+    known,
     results_of,
     whole,
     with_elements,
@@ -170,6 +171,7 @@ def diverged(late: bool) -> Results:
     found = with_record(found, warnings=(f"{name} diverged at 0.31 s",))
     field = found.fields[name].copy()
     field[1 if late else 0 :] = np.nan
+    scores = tuple(row for row in found.scores if row.model != name)
     return replace(
         found,
         curves=tuple(
@@ -177,7 +179,8 @@ def diverged(late: bool) -> Results:
             for row in found.curves
             if row.model != name or row.time_s < 0.31
         ),
-        scores=tuple(row for row in found.scores if row.model != name),
+        scores=scores,
+        **known(scores),
         field_differences=tuple(row for row in found.field_differences if row.model != name),
         fields=found.fields | {name: field},
         fuzzy={},
@@ -245,7 +248,7 @@ def with_toy(results: Results, **changes) -> Results:
     }
     fields = results.fields | {TOY: results.fields[sugeno.name]}
     results = with_record(results, models=(*results.record.models, toy))
-    return replace(results, fields=fields, fuzzy={}, **like)
+    return replace(results, fields=fields, fuzzy={}, **like, **known(like["scores"]))
 
 
 def test_a_model_that_the_report_does_not_know_is_legible_everywhere():

@@ -73,7 +73,10 @@ SET = StiffnessSet(
 @pytest.fixture(scope="module")
 def view_arrays() -> dict[str, np.ndarray]:
     readings = {"hcv": 9.5e3, "nafld": 12e3}
-    system, row = patient_system(readings, LiverSettings()), liver_row(readings)[0]
+    system, row = (
+        patient_system(readings, LiverSettings(knowledge="severity")),
+        liver_row(readings)[0],
+    )
     found = [drawing_arrays(explain(system, row, kind), "kPa") for kind in SYSTEMS]
     return found[0] | found[1] | found[2]
 

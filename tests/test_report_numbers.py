@@ -252,13 +252,13 @@ def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own
 
 def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
     said = " ".join(sentences(results_of(["fem", *FUZZY])))
-    assert said.count("Of these leads 7 above the numerical error of the curves.") == 2
+    assert said.count("Of these leads 7 above the errors of the difference.") == 2
     results = results_of(["fem", *FUZZY])
     by_probe = results.model("fem").mesh_error.by_probe
     by_probe = by_probe | {"far": CurveErrors(displacement=0.2, velocity=0.2)}
     results = with_mesh_error(results, by_probe=by_probe)
     said = " ".join(sentences(results))
-    assert said.count("Of these leads 7 above the numerical error of the curves.") == 1
+    assert said.count("Of these leads 7 above the errors of the difference.") == 1
     assert said.count("Of these leads 7 not resolved.") == 1
 
 

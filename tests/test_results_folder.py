@@ -22,9 +22,12 @@ from study.results.tables import QUANTITIES
 from study.run.study import run_study
 from study.scene.file import read_scene
 from tests.conftest import SMALL
-from tests.report_samples import whole, with_model, with_record
+from tests.report_samples import known, whole, with_model, with_record
 
-TABLES = ("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv")
+TABLES = (
+    *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
+    *("iso_18571.csv", "score_errors.csv", "score_differences.csv"),
+)
 FILES = ("results.json", "scene.toml", *TABLES, "fields.npz", "fuzzy.npz", "SHA256SUMS")
 DRAWS = 25
 """Damages of each kind of folder."""
@@ -87,6 +90,13 @@ def edit(path, change):
     """Rewrite a table by a function of its lines, the first of which names the columns."""
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(change(lines)))
+
+
+def altered(lines, row, column, cell):
+    """The same with one cell changed."""
+    cells = lines[row].rstrip("\n").split(",")
+    cells[column] = cell
+    return [*lines[:row], ",".join(cells) + "\n", *lines[row + 1 :]]
 
 
 # --- checksums ----------------------------------------------------------------------------------
@@ -165,12 +175,13 @@ def test_fields_of_all_nodes_that_are_cut_are_refused(damaged_organ):
 def test_checksums_made_again_do_not_mix_two_runs(damaged_organ, tmp_path):
     """A table of the same rows with other numbers."""
     other = whole()
-    other = replace(other, scores=tuple(row._replace(score=0.5) for row in other.scores))
+    rows = tuple(row._replace(value=0.5) for row in other.field_differences)
+    other = replace(other, field_differences=rows)
     (tmp_path / "other").mkdir()
     write(other, tmp_path / "other")
-    shutil.copy(tmp_path / "other" / "similarity.csv", damaged_organ)
+    shutil.copy(tmp_path / "other" / "errors.csv", damaged_organ)
     sign(damaged_organ, both=False)
-    assert "similarity.csv: is of another run than results.json" in refusal(damaged_organ)
+    assert "errors.csv: is of another run than results.json" in refusal(damaged_organ)
 
 
 # --- rows ---------------------------------------------------------------------------------------
@@ -233,6 +244,29 @@ def test_checksums_made_again_do_not_mix_two_runs(damaged_organ, tmp_path):
             "errors.csv, line 2: basafa fem field-relative-l2-pe",
         ),
         ("errors.csv", lambda lines: [*lines, lines[1]], "errors.csv, line 7: "),
+        ("iso_18571.csv", lambda lines: lines[:-1], "iso_18571.csv, line 5: basafa fem far velo"),
+        ("iso_18571.csv", lambda lines: altered(lines, 2, 4, "0.9"), "iso_18571.csv, line 3: par"),
+        ("iso_18571.csv", lambda lines: altered(lines, 2, 4, "1.1"), "a part is not in [0"),
+        ("score_errors.csv", lambda lines: [lines[0], *lines[2:]], "errors.csv, line 2: ba"),
+        ("score_errors.csv", lambda lines: altered(lines, 1, 5, "0.5"), "line 2: low 0.5 is not"),
+        ("score_errors.csv", lambda lines: altered(lines, 1, 6, "-1"), "line 2: high -1 is not"),
+        ("score_errors.csv", lambda lines: altered(lines, 1, 7, "-1"), "line 2: resampled -1 is"),
+        (
+            "score_errors.csv",
+            lambda lines: altered(lines, 1, 10, "x"),
+            "numerical is 'x', no",
+        ),
+        ("score_errors.csv", lambda lines: altered(lines, 1, 9, ""), "normalised is '', no"),
+        (
+            "score_errors.csv",
+            lambda lines: altered(lines, 3, 11, "2"),
+            "line 4: 2 to 1 are no",
+        ),
+        (
+            "score_differences.csv",
+            lambda lines: [*lines, "a,b,c,d,e,f,0,0,0,0,0,0,\n"],
+            "line 2: a b",
+        ),
         ("sensitivity.csv", lambda lines: [*lines, "a,b,c,d,0,0,0,1\n"], "sensitivity.csv: 1 rows"),
     ],
 )
@@ -252,6 +286,22 @@ def test_a_row_that_does_not_belong_is_named_by_its_line(name, change, said, sig
         ("sensitivity.csv", lambda lines: lines[:1], "sensitivity.csv: 0 rows"),
         ("sensitivity.csv", lambda lines: [*lines, lines[-1]], "stands there twice"),
         ("errors.csv", lambda lines: [*lines, "msm-sugeno,basafa,a,1\n"], "errors.csv, line 2"),
+        ("score_differences.csv", lambda lines: lines[:-1], "line 43: msm-interval-type-2"),
+        (
+            "score_differences.csv",
+            lambda lines: altered(lines, 5, 6, "0.5"),
+            "line 6: differ",
+        ),
+        (
+            "score_differences.csv",
+            lambda lines: altered(lines, 5, 7, "0.5"),
+            "line 6: low and",
+        ),
+        (
+            "score_differences.csv",
+            lambda lines: altered(lines, 5, 10, "-1"),
+            "line 6: window -1 is",
+        ),
         ("scene.toml", lambda lines: [*lines[:-1], "[tissue]\n"], "scene.toml"),
         (
             "scene.toml",
@@ -328,7 +378,7 @@ def test_a_model_that_diverged_has_rows_up_to_then_and_no_others():
     notes = tuple(f"No score of basafa against fem at {probe}: lost." for probe in ("tool", "far"))
     found = with_record(found, notes=notes)
     rows = tuple(row for row in found.curves if row.model == "fem" or row.time_s < 0.5)
-    found = replace(found, curves=rows, scores=(), field_differences=())
+    found = replace(found, curves=rows, scores=(), **known(()), field_differences=())
     check(found)
     field = found.fields["basafa"].copy()
     field[1] = np.nan

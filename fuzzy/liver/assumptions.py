@@ -11,9 +11,10 @@ from fuzzy.liver.knowledge import (
     output_records,
     parameters,
 )
+from fuzzy.liver.partition import footprint_half_width, placement, reading_noise
 from fuzzy.liver.readings import READINGS, TableReading, disease_sets, reading_named, rule_count
 from fuzzy.liver.rules import CONSEQUENTS
-from fuzzy.liver.settings import ABSENT, FOOTPRINTS, LiverSettings
+from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
 from fuzzy.liver.system import liver_system, records_in_use, relative_half_width
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
@@ -34,6 +35,14 @@ ODD_CELL = {
     "pair": "is read as the pair HCV, NAFLD, which then enters twice",
     "drop": "is left out",
 }
+CHOLESTATIC = (
+    "CLD is read as cholestatic liver disease, because chronic liver disease would contain the "
+    "other four."
+)
+SCALE = (
+    "Stiffness is the small-strain Young's modulus on the transient-elastography scale, not the "
+    "shear modulus of MRE."
+)
 OUT_OF_RANGE = {
     "clamp": "are taken at its nearer end, with a note",
     "raise": "are refused",
@@ -45,6 +54,8 @@ OUT_OF_RANGE = {
 def assumptions(settings: LiverSettings | None = None) -> tuple[str, ...]:
     """Every reading and modelling choice in force, one sentence each."""
     settings = settings or LiverSettings()
+    if settings.base.follows:
+        return (*_following_rules(settings), *_following_data(settings), *_inference(settings))
     return (*_rules(settings), *_data(settings), *_footprints(settings), *_inference(settings))
 
 
@@ -58,8 +69,7 @@ def _rules(settings: LiverSettings) -> tuple[str, ...]:
         f"Consequents are not in the paper: {CONSEQUENTS[settings.consequent].words} "
         "(mild < moderate < severe), a modelling choice without clinical evidence.",
         _dominance(settings),
-        "CLD is read as cholestatic liver disease, because chronic liver disease would contain the "
-        "other four.",
+        CHOLESTATIC,
     )
 
 
@@ -100,13 +110,60 @@ def _dominance(settings: LiverSettings) -> str:
     )
 
 
+def _following_rules(settings: LiverSettings) -> tuple[str, ...]:
+    placed = placement(settings.knowledge)
+    counts = ", ".join(str(len(placed.sets[name])) for name in AETIOLOGIES)
+    reading = reading_named(settings.base.reading)
+    number = len(liver_system(settings).rules)
+    return (
+        f"Knowledge base {settings.knowledge}: {settings.base.words}.",
+        f"Rules: the {len(disease_sets(reading))} cells of reading {settings.base.reading} of "
+        f"Table I expand to the full grid of their sets, {counts} for "
+        f"{', '.join(map(str.upper, AETIOLOGIES))}: {number} rules where the paper counts "
+        f"{PAPER_RULES}.",
+        "Consequents are not in the paper: each is the stiffness expected of readings at the "
+        "centres of the rule's sets, near their geometric mean, as readings of several aetiologies "
+        "are of one liver.",
+        "Rules on most diseases outweigh those on fewer, which speak for patients with fewer "
+        f"readings: a rule on one disease less weighs {parameters()['outweighed']:g} of it.",
+        CHOLESTATIC,
+    )
+
+
+def _following_data(settings: LiverSettings) -> tuple[str, ...]:
+    p = parameters()
+    return (
+        SCALE,
+        "That a reading is the modulus, without a bias, is an assumption: no reading paired with a "
+        "mechanical test of the same liver was found.",
+        "Neighbouring input sets cross at one half; each is a Gaussian with a width for either "
+        "flank. They stand for levels of stiffness, not for stages of fibrosis.",
+        f"Output sets are Gaussians of {p['output_sd']:g} kPa, alike at every level, each "
+        f"{100 * (p['output_ratio'] - 1):.0f} % above the one before.",
+        _missing(settings),
+        _band(settings),
+    )
+
+
+def _band(settings: LiverSettings) -> str:
+    if settings.footprint_factor == 0:
+        return "The footprint is switched off, so interval type-2 repeats Mamdani."
+    one, noise = footprint_half_width(settings, 1), reading_noise()
+    words = FOOTPRINTS[settings.footprint].words.replace(", input and output,", "")
+    return (
+        f"Interval type-2: {words} {100 * one:.0f} % for one reading and by less for several, over "
+        f"the root of their number: {one / noise:.2g} times the noise of one "
+        f"reading, {100 * noise:.0f} %, which joins that of the exam (nhanes2017) and "
+        "that between operators (fraquelli2007, liv12551). Input sets alone have it."
+    )
+
+
 def _data(settings: LiverSettings) -> tuple[str, ...]:
     used = records_in_use(settings)
     inputs = [record for record in used if record.aetiology != OUTPUT]
     normal = parameters()["normal_liver"]
     return (
-        "Stiffness is the small-strain Young's modulus on the transient-elastography scale, not "
-        "the shear modulus of MRE.",
+        SCALE,
         "Two sets of an aetiology stand for stages F2 and F4, three for F2, F3 and F4, four for F1 "
         "to F4; F1 and F2 count as mild, F3 as moderate, F4 as severe.",
         "The set counts of HCV and HBV come from counting rules: at equal stage the data do not "
@@ -118,8 +175,13 @@ def _data(settings: LiverSettings) -> tuple[str, ...]:
         f"No set describes a healthy liver: {normal:g} kPa counts as mild, whose output centre is "
         f"{output_records()[0].centre:.1f} kPa, and wide severe sets still fire there, so the "
         "estimate for a healthy liver is far too stiff.",
-        f"An aetiology without a reading {ABSENT[settings.absent].words.format(normal=normal)}.",
+        _missing(settings),
     )
+
+
+def _missing(settings: LiverSettings) -> str:
+    normal = parameters()["normal_liver"]
+    return f"An aetiology without a reading {settings.missing.words.format(normal=normal)}."
 
 
 def _centres(settings: LiverSettings, inputs: list[SetRecord]) -> tuple[str, ...]:

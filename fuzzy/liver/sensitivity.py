@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fuzzy.liver.bases import KNOWLEDGE, STAGES_ONLY
 from fuzzy.liver.knowledge import parameters
 from fuzzy.liver.readings import READINGS
 from fuzzy.liver.settings import CHOICES, LiverSettings
@@ -45,10 +46,11 @@ class Axis(NamedTuple):
 
 
 AXES = (
+    Axis("knowledge", tuple(KNOWLEDGE)),
     Axis("reading", tuple(READINGS)),
     Axis("consequent", tuple(CHOICES["consequent"])),
     Axis("placement", tuple(CHOICES["placement"])),
-    Axis("absent", tuple(CHOICES["absent"])),
+    Axis("absent", ("normal", "silent")),
     Axis("footprint", tuple(CHOICES["footprint"]), TYPE_2),
     Axis("footprint_factor", (0.0, 0.5, 1.0, 2.0), TYPE_2),
     Axis("reducer", tuple(OPTIONS["reducer"]), TYPE_2),
@@ -98,7 +100,8 @@ class _Case(NamedTuple):
 def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 256) -> Screening:
     """Every alternative of every choice against `base`, at the readings [Pa] and over `rows` more.
 
-    Those are spread log-uniformly over each aetiology, see `spread_readings`; exact sampling is
+    Those are spread log-uniformly over each aetiology, for a base that follows the reading over
+    those given, see `spread_readings`; exact sampling is
     tried on the first EXACT_ROWS of them, and elsewhere replaced by its STAND_IN. What happens to
     an aetiology without a reading is tried on patients with the given ones alone. Raises
     ValueError as `estimate` does.
@@ -119,15 +122,26 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
 
 
 def _value(settings: LiverSettings, key: str) -> Any:
+    if key == "absent":
+        return settings.absence
     return getattr(settings if hasattr(settings, key) else settings.options, key)
 
 
 def _is_idle(key: str, base: LiverSettings) -> bool:
-    """Whether a choice has no part in the answer: exact sampling takes no samples."""
+    """Whether a choice has no part in the answer.
+
+    Exact sampling takes no samples, and a base that follows the reading has cells of its own.
+    """
+    if key in STAGES_ONLY:
+        return base.base.follows
     return key == "samples" and is_exact(base.options.sampling)
 
 
 def _changed(base: LiverSettings, key: str, value: Any) -> LiverSettings:
+    if key == "knowledge":  # what shapes a base of stages alone stays behind
+        usual = LiverSettings()
+        kept = {name: getattr(usual, name) for name in STAGES_ONLY}
+        return replace(base, knowledge=value, **kept)
     if hasattr(base, key):
         return replace(base, **{key: value})
     return replace(base, options=replace(base.options, **{key: value}))
@@ -140,7 +154,7 @@ def _changes(
     if axis.key != "sampling":
         base = _sampled(base)
     other = _changed(base, axis.key, value)
-    present: Collection[str] = AETIOLOGIES
+    present = _spread_over(readings, base)
     if axis.key == "absent":
         present = tuple(readings)
         _require_absent(present)
@@ -154,6 +168,11 @@ def _changes(
         )
         for system in axis.systems
     ]
+
+
+def _spread_over(readings: Mapping[str, float], base: LiverSettings) -> Collection[str]:
+    """Aetiologies whose readings are spread: all, or those given where the others are silent."""
+    return tuple(readings) if base.base.follows and readings else AETIOLOGIES
 
 
 def _label(value: Any) -> str:
@@ -182,10 +201,12 @@ def _rows(base: LiverSettings, other: LiverSettings, rows: int) -> int:
 def _between_systems(
     readings: Mapping[str, float], base: LiverSettings, rows: int
 ) -> Iterator[Sensitivity]:
-    X, base = spread_readings(rows), _sampled(base)
+    present = _spread_over(readings, base)
+    X, base = spread_readings(rows, present), _sampled(base)
     for one, other in combinations(SYSTEMS, 2):
         labels = (SYSTEM, one, other)
-        yield _difference(labels, readings, _Case(X, one, base), _Case(X, other, base))
+        before, after = (_Case(X, system, base, present) for system in (one, other))
+        yield _difference(labels, readings, before, after)
 
 
 def _difference(

@@ -1,9 +1,10 @@
 """Settings of the stiffness estimate: every open reading of the paper that is a parameter."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
+from fuzzy.liver.bases import KNOWLEDGE, STAGES_ONLY, KnowledgeBase
 from fuzzy.liver.knowledge import PLACEMENTS, input_records
 from fuzzy.liver.readings import reading_named
 from fuzzy.liver.rules import CONSEQUENTS
@@ -48,7 +49,10 @@ FOOTPRINTS: dict[str, FootprintKind] = {
     ),
 }
 
-ABSENT: dict[str, Absent] = {
+AS_KNOWLEDGE = "auto"
+
+ABSENT: dict[str, Absent | None] = {
+    AS_KNOWLEDGE: None,
     "normal": Absent(
         False,
         "the normal liver's {normal:g} kPa taken",
@@ -60,8 +64,10 @@ ABSENT: dict[str, Absent] = {
         "takes every rule that names it out of the rule base",
     ),
 }
+"""What a missing reading does; `auto` is what the knowledge base has for it."""
 
 CHOICES: dict[str, Mapping[str, object]] = {
+    "knowledge": KNOWLEDGE,
     "consequent": CONSEQUENTS,
     "placement": PLACEMENTS,
     "footprint": FOOTPRINTS,
@@ -77,19 +83,21 @@ LARGEST_FACTOR = 3.0
 class LiverSettings:
     """How the rule base is read, placed on the data and evaluated.
 
-    `reading` is a name of READINGS. `placement` puts the centres of HCV's and HBV's sets on the
-    mean of a stage or on the cut-off that diagnoses it. `footprint` is what is uncertain about
-    every set, by `footprint_factor` times the published spread; 0 turns type-2 into type-1.
-    `absent`: an aetiology without a reading has a normal liver's, or (`silent`) the rules that
-    name it are left out.
+    `knowledge` is a name of KNOWLEDGE. Of a base of stages, `reading` is a name of READINGS,
+    `consequent` says what a combination concludes, and `placement` puts the centres of HCV's and
+    HBV's sets on the mean of a stage or on the cut-off that diagnoses it. `footprint` is what is
+    uncertain about every set, by `footprint_factor` times the published spread; 0 turns type-2
+    into type-1. `absent`: an aetiology without a reading has a normal liver's, or (`silent`) the
+    rules that name it are left out; `auto` is as the knowledge base has it.
     """
 
+    knowledge: str = "freed"
     reading: str = "R1"
     consequent: str = "max"
     placement: str = "stage-mean"
     footprint: str = "uncertain-mean"
     footprint_factor: float = 1.0
-    absent: str = "normal"
+    absent: str = AS_KNOWLEDGE
     options: InferenceOptions = field(default_factory=InferenceOptions)
 
     def __post_init__(self) -> None:
@@ -100,8 +108,40 @@ class LiverSettings:
                 f"{LARGEST_FACTOR:g}; 1 is the published spread"
             )
         counts = reading_named(self.reading).counts
+        if self.base.follows:
+            _require_untouched(self)
+            return
         for aetiology, count in zip(AETIOLOGIES, counts, strict=True):
             try:
                 input_records(aetiology, count, self.placement)
             except ValueError as error:
                 raise ValueError(f"reading = {self.reading!r}: {error}") from error
+
+    @property
+    def base(self) -> KnowledgeBase:
+        """The knowledge base in force."""
+        return KNOWLEDGE[self.knowledge]
+
+    @property
+    def absence(self) -> str:
+        """The key of ABSENT in force: `normal` or `silent`."""
+        return self.base.absent if self.absent == AS_KNOWLEDGE else self.absent
+
+    @property
+    def missing(self) -> Absent:
+        """What an aetiology without a reading does."""
+        found = ABSENT[self.absence]
+        if found is None:
+            raise ValueError(f"absent = {self.absence!r}: stands for no use of a missing reading")
+        return found
+
+
+def _require_untouched(settings: LiverSettings) -> None:
+    """ValueError if a setting is given that the knowledge base has no use for."""
+    usual = {one.name: one.default for one in fields(LiverSettings)}
+    for key in STAGES_ONLY:
+        if getattr(settings, key) != usual[key]:
+            raise ValueError(
+                f"{key} = {getattr(settings, key)!r}: shapes the knowledge base severity only; "
+                f"leave it out with knowledge {settings.knowledge}"
+            )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fuzzy.liver.knowledge import parameters
-from fuzzy.liver.settings import ABSENT, LiverSettings
+from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems import exact
@@ -63,7 +63,8 @@ def estimate(
     its unit must be wrong, or refused by `out_of_range`.
     """
     settings = settings or LiverSettings()
-    liver, row = patient_system(readings, settings), liver_row(readings)
+    row = liver_row(readings)  # first, as it refuses unknown names
+    liver = patient_system(readings, settings)
     found = infer(liver, row, system, settings.options, UNIT)
     return StiffnessEstimate(
         system=system,
@@ -83,8 +84,8 @@ def evaluate(
 ) -> tuple[Array, Array | None]:
     """Stiffness [Pa] (N,), and the interval (N, 2) of interval type-2, for readings X (N, 5) [Pa].
 
-    Columns follow AETIOLOGIES; with absent="silent" only those `present` take part. Readings are
-    checked as in `estimate`.
+    Columns follow AETIOLOGIES; where the absent are silent only those `present` take part.
+    Readings are checked as in `estimate`.
     """
     settings = settings or LiverSettings()
     found = infer(
@@ -99,7 +100,7 @@ def evaluate(
 
 
 def rule_count(settings: LiverSettings | None = None) -> int:
-    """Number of rules; 247 with the default reading of Table I and all aetiologies present."""
+    """Number of rules with all aetiologies present; 247 with the default reading of Table I."""
     return len(liver_system(settings or LiverSettings()).rules)
 
 
@@ -109,7 +110,7 @@ def patient_system(readings: Mapping[str, float], settings: LiverSettings) -> Fu
 
 
 def _present(names: Collection[str], settings: LiverSettings) -> tuple[str, ...]:
-    if not ABSENT[settings.absent].silences:
+    if not settings.missing.silences:
         return AETIOLOGIES
     return tuple(name for name in AETIOLOGIES if name in names)
 
@@ -214,5 +215,5 @@ def _refusal(name: str, reading: float) -> str:
 
 
 def _missing_notes(readings: Mapping[str, float], settings: LiverSettings) -> list[str]:
-    done = ABSENT[settings.absent].note.format(normal=NORMAL_LIVER / PA_PER_KPA)
+    done = settings.missing.note.format(normal=NORMAL_LIVER / PA_PER_KPA)
     return [f"{name}: no reading; {done}" for name in AETIOLOGIES if name not in readings]

@@ -1,6 +1,6 @@
 """The liver's fuzzy system: five aetiologies in, one stiffness out, everything in kPa."""
 
-from functools import cache
+from functools import lru_cache
 from math import hypot
 
 from fuzzy.liver.knowledge import (
@@ -11,6 +11,7 @@ from fuzzy.liver.knowledge import (
     output_records,
     parameters,
 )
+from fuzzy.liver.partition import following_records, following_system, placement
 from fuzzy.liver.readings import disease_sets, reading_named
 from fuzzy.liver.rules import rule_base
 from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
@@ -19,13 +20,16 @@ from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Variable
 
 
-@cache
+@lru_cache(maxsize=64)
 def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES) -> FuzzySystem:
     """The fuzzy system of Table I over the elastography sets, in kPa.
 
     Only antecedents whose diseases are all `present` make rules; the inputs stay all five.
     ValueError for an unknown disease, or if no antecedent is left.
     """
+    _require_known(present)
+    if settings.base.follows:
+        return following_system(placement(settings.knowledge), settings, present)
     records = _input_records(settings)
     severities = {
         name: [SEVERITIES.index(record.severity) for record in found]
@@ -40,7 +44,12 @@ def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES
 
 
 def records_in_use(settings: LiverSettings) -> tuple[SetRecord, ...]:
-    """Record behind every set of the system: inputs in the order of AETIOLOGIES, then output."""
+    """Record behind every set of the system: inputs in the order of AETIOLOGIES, then output.
+
+    A base that follows the reading has many output sets, all alike, and none is listed.
+    """
+    if settings.base.follows:
+        return following_records(placement(settings.knowledge))
     inputs = _input_records(settings).values()
     return (*(record for found in inputs for record in found), *output_records())
 
@@ -53,10 +62,13 @@ def _input_records(settings: LiverSettings) -> dict[str, tuple[SetRecord, ...]]:
     }
 
 
-def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
+def _require_known(present: tuple[str, ...]) -> None:
     unknown = [name for name in present if name not in AETIOLOGIES]
     if unknown:
         raise ValueError(f"aetiology {unknown[0]!r}: use one of {', '.join(AETIOLOGIES)}")
+
+
+def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
     cells = disease_sets(reading_named(settings.reading))
     found = [cell for cell in cells if {*cell} <= {*present}]
     if not found:

@@ -78,9 +78,13 @@ def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
             return j < i
         return _never_stronger(forms[i], forms[j])
 
-    everyone = range(len(forms))
+    alike: dict[int, list[int]] = {}
+    for i, rule in enumerate(system.rules):
+        alike.setdefault(rule.consequent, []).append(i)
     stronger = {
-        i: [j for j in everyone if gives_way(i, j)] for i in everyone if system.rules[i].weight
+        i: [j for j in alike[rule.consequent] if gives_way(i, j)]
+        for i, rule in enumerate(system.rules)
+        if rule.weight
     }
     return tuple(
         Pair(i, min(others, key=lambda j: (len(forms[j].terms), j)))

@@ -19,6 +19,7 @@ from msm.laws.basafa import BASAFA, Basafa
 from msm.laws.force_law import ForceLaw, Law
 from msm.laws.hooke import HOOKE, Hooke
 from msm.laws.piecewise import PIECEWISE, Piecewise, piecewise
+from msm.simd import lanewise
 
 __all__ = [
     "LAWS",
@@ -49,6 +50,11 @@ def force_law_of(law: Law) -> ForceLaw:
     return found
 
 
+def law_of_kind(law: Any) -> ForceLaw | None:
+    """The record in LAWS of what the compiler knows of a law, its type."""
+    return _record(getattr(law, "instance_class", None))
+
+
 def _record(kind: object) -> ForceLaw | None:
     return next((found for found in LAWS.values() if found.type is kind), None)
 
@@ -64,17 +70,21 @@ def stiffness(law: Law, strain: float) -> float:
 
 
 @overload(tension, strict=False)  # whatever a law calls its arguments
-def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001 - typed by law alone
+def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:
     """Choose the tension by the type of the law, when a kernel is compiled."""
-    found = _record(getattr(law, "instance_class", None))
-    return found.tension if found else None
+    found = law_of_kind(law)
+    if found is None:
+        return None
+    return found.tension if found.branchless else lanewise(found.tension, strain)
 
 
 @overload(stiffness, strict=False)
-def _compiled_stiffness(law: Any, strain: Any) -> Callable[..., Any] | None:  # noqa: ARG001 - typed by law alone
+def _compiled_stiffness(law: Any, strain: Any) -> Callable[..., Any] | None:
     """Choose the slope by the type of the law, when a kernel is compiled."""
-    found = _record(getattr(law, "instance_class", None))
-    return found.stiffness if found else None
+    found = law_of_kind(law)
+    if found is None:
+        return None
+    return found.stiffness if found.branchless else lanewise(found.stiffness, strain)
 
 
 def initial_stiffness(law: Law) -> float:

@@ -20,17 +20,15 @@ class Basafa(NamedTuple):
 
 
 def _tension(law: Basafa, strain: float) -> float:
-    size = abs(strain)
-    if size <= law.x_c:
-        return law.k1 * strain + law.k2 * strain**3  # Eq. (6), inner branch
-    a = law.k1 * law.x_c + law.k2 * law.x_c**3  # Eq. (7), taken at x_c: force and slope continuous
+    x = max(min(strain, law.x_c), -law.x_c)
+    inner = law.k1 * x + law.k2 * (x * x * x)  # Eq. (6), inner branch
     b = law.k1 + 3.0 * law.k2 * law.x_c**2
-    return (a + b * (size - law.x_c)) * (1.0 if strain > 0.0 else -1.0)
+    return inner + b * (strain - x)  # Eq. (7), taken at x_c: force and slope continuous
 
 
 def _stiffness(law: Basafa, strain: float) -> float:
     x = min(abs(strain), law.x_c)
-    return law.k1 + 3.0 * law.k2 * x**2
+    return law.k1 + 3.0 * law.k2 * (x * x)
 
 
 def _largest_stiffness(law: Basafa) -> float:
@@ -46,4 +44,4 @@ def in_proportion(k: float, cubic: float, x_c: float) -> Basafa:
     return Basafa(k, cubic * k, x_c)
 
 
-BASAFA = ForceLaw(Basafa, _tension, _stiffness, _largest_stiffness, in_proportion)
+BASAFA = ForceLaw(Basafa, _tension, _stiffness, _largest_stiffness, in_proportion, branchless=True)

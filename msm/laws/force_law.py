@@ -18,7 +18,9 @@ class ForceLaw(NamedTuple):
     strain. `make(k, ...)`: the law in proportion to a linear spring of k [N/m]; its other arguments
     are what a scene gives by their names, each a dimensionless number or a sequence of them, and a
     ValueError says why they make no law. `linear`: whether the tension is proportional to the
-    strain, whatever the constants.
+    strain, whatever the constants. `branchless`: whether tension and stiffness do the same at every
+    strain and use no more than +, -, *, /, abs, min and max, so that the kernels may give them
+    several strains at once; another law is asked strain by strain.
     """
 
     type: type[Law]
@@ -27,3 +29,4 @@ class ForceLaw(NamedTuple):
     largest_stiffness: Callable[[Any], float]
     make: Callable[..., Law]
     linear: bool = False
+    branchless: bool = False

@@ -25,4 +25,6 @@ def _largest_stiffness(law: Hooke) -> float:
     return law.k
 
 
-HOOKE = ForceLaw(Hooke, _tension, _stiffness, _largest_stiffness, Hooke, linear=True)
+HOOKE = ForceLaw(
+    Hooke, _tension, _stiffness, _largest_stiffness, Hooke, linear=True, branchless=True
+)

@@ -13,12 +13,14 @@ from cyclopts import App, CycloptsError
 
 from study import signals
 from study.commands.check import check
+from study.commands.cohort import cohort
 from study.commands.compare import compare
 from study.commands.estimate import estimate
 from study.commands.export import export
 from study.commands.flags import EXIT_BAD_INPUT, EXIT_MACHINE
 from study.commands.recommend import recommend
 from study.commands.report import report
+from study.commands.robustness import robustness
 from study.commands.rules import rules
 from study.commands.run import run
 from study.commands.scenes import scenes
@@ -118,6 +120,6 @@ def _say(message: str) -> None:
 
 for command in (
     *(run, scenes, check, report, compare, export, verify),
-    *(tradeoff, recommend, stability, estimate, rules),
+    *(tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

@@ -33,7 +33,7 @@ def estimate(
     Parameters
     ----------
     hcv
-        Reading in hepatitis C [kPa]; one that is not given is that of a normal liver.
+        Reading in hepatitis C [kPa]; --absent says what becomes of one that is not given.
     hbv
         Reading in hepatitis B [kPa].
     ald

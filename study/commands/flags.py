@@ -45,8 +45,10 @@ class LiverFlags:
 
     Parameters
     ----------
+    knowledge
+        Knowledge base: severity, paper-count or freed.
     reading
-        Reading of Table I, for example R1 or R4-pair.
+        Reading of Table I, of the base severity, for example R1 or R4-pair.
     consequent
         Severity of a combination: max (the severest governs) or mean.
     placement
@@ -56,9 +58,11 @@ class LiverFlags:
     footprint_factor
         Times the published spread; 0 makes type-2 type-1.
     absent
-        Aetiology without a reading: normal (a normal liver's reading) or silent (no rules).
+        Aetiology without a reading: normal (a normal liver's reading), silent (no rules) or auto
+        (as the knowledge base has it).
     """
 
+    knowledge: str | None = None
     reading: str | None = None
     consequent: str | None = None
     placement: str | None = None

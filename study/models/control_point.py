@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from msm import control_point
-from msm.damping import NodalDamping
-from msm.laws import Law, initial_stiffness
+from msm.calibration import reference_stiffness
+from msm.damping import NodalDamping, eq_2
+from msm.laws import Hooke, Law, initial_stiffness
 from study.models.errors import place
 from study.models.model import ModelRun, Watch
 from study.problem.problem import PointProblem
@@ -28,6 +29,12 @@ class SpringDashpot:
 
 
 Make = Callable[[PointProblem], SpringDashpot]
+
+
+def oscillator_of(modulus: float, zeta: float, problem: PointProblem) -> SpringDashpot:
+    """A spring of eq. (1) of Young's modulus [Pa], with the damping of eq. (2)."""
+    k = reference_stiffness(modulus, problem.rest_length)
+    return SpringDashpot(Hooke(k), eq_2(zeta, k, problem.mass), modulus)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,16 +7,12 @@ from functools import partial
 
 from fuzzy.liver.assumptions import assumptions as fuzzy_assumptions
 from fuzzy.liver.stiffness import StiffnessEstimate
-from msm.calibration import reference_stiffness
-from msm.damping import eq_2
-from msm.laws import Hooke
-from study.models.control_point import PointSpring, SpringDashpot
+from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import settings
 from study.models.lattice import LatticeModel
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
-from study.problem.problem import PointProblem
 from study.scene import Scene
 
 LABELS = {"mamdani": "MSM Mamdani", "sugeno": "MSM Sugeno", "interval-type-2": "MSM type-2"}
@@ -40,7 +36,7 @@ def on_point(scene: Scene, estimates: Estimates) -> Iterator[PointSpring]:
     """One oscillator an estimate, by eqs. (1) and (2)."""
     for system, found in estimates.items():
         zeta = scene.damping.ratio
-        central, *ends = (partial(_oscillator, modulus, zeta) for modulus in _moduli(found))
+        central, *ends = (partial(oscillator_of, modulus, zeta) for modulus in _moduli(found))
         yield PointSpring(
             name=f"msm-{system}",
             label=LABELS.get(system, f"MSM {system}"),
@@ -55,11 +51,6 @@ def _moduli(found: StiffnessEstimate) -> tuple[float, ...]:
     return (found.estimate, *(found.interval or ()))
 
 
-def _oscillator(modulus: float, zeta: float, problem: PointProblem) -> SpringDashpot:
-    k = reference_stiffness(modulus, problem.rest_length)
-    return SpringDashpot(Hooke(k), eq_2(zeta, k, problem.mass), modulus)
-
-
 def assumptions(scene: Scene) -> list[str]:
     """On the springs, then on the fuzzy systems."""
     on_organ = [] if scene.is_point else layout(scene)
@@ -67,5 +58,10 @@ def assumptions(scene: Scene) -> list[str]:
 
 
 KIND = ModelKind(
-    models=models, on_point=on_point, assumptions=assumptions, is_tuned=True, follows_law=True
+    models=models,
+    on_point=on_point,
+    assumptions=assumptions,
+    is_tuned=True,
+    of_patient=True,
+    follows_law=True,
 )

@@ -172,16 +172,17 @@ class PreparedLattice:
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its error by halved steps, and the motion at both bounds of its stiffness."""
-        found, errors = self._run(watch), {}
+        found, errors, half = self._run(watch), {}, None
         finished = found.trajectory.status == "finished"
         if finished:
             half = self._halved(found, watch)
             order = INTEGRATORS[self.model.lattice.integrator].order
             errors = time_step_errors(order, self.problem.probes, found.trajectory, half)
+        sound = half if half is not None and half.status == "finished" else None
         record = replace(self._record(found), time_step_errors=errors)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
         bounds = self._bounds(watch)
-        return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds)
+        return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field, linearised."""

@@ -48,7 +48,8 @@ class Simulation:
 class ModelRun:
     """The motion of a model with its record, in which its own numerical errors stand.
 
-    `bounds`: motion at both ends of an interval of stiffness, if the model has one.
+    `bounds`: motion at both ends of an interval of stiffness, if the model has one; `halved`: that
+    by half as long steps, if it finished.
     """
 
     trajectory: Trajectory
@@ -56,6 +57,7 @@ class ModelRun:
     checks: tuple[Check, ...] = ()
     notes: tuple[str, ...] = ()
     bounds: tuple[Trajectory, Trajectory] | None = None
+    halved: Trajectory | None = None
 
 
 @dataclass(frozen=True)
@@ -156,9 +158,10 @@ class ModelKind:
     for a scene that is a single control mass point, None where the kind needs an organ.
     `assumptions`: sentences on what was read into the paper or left out. `is_reference`: whether
     the others are compared with it; `any_load`: whether it follows a load whose place was not known
-    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates; `follows_law`:
-    whether its springs have the law and damping of the scene. A model that is a reference has the
-    name of its kind.
+    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates; `of_patient`:
+    whether their stiffness is a patient's, who has no part in trade-offs and extremes;
+    `follows_law`: whether its springs have the law and damping of the scene. A model that is a
+    reference has the name of its kind.
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
@@ -166,5 +169,6 @@ class ModelKind:
     assumptions: Callable[[Scene], list[str]] = lambda _: []
     is_reference: bool = False
     is_tuned: bool = False
+    of_patient: bool = False
     follows_law: bool = False
     any_load: bool = True

@@ -14,6 +14,7 @@ MODELS = {
     "fem": "study.models.finite_elements:KIND",
     "basafa": "study.models.basafa:KIND",
     "msm": "study.models.fuzzy_tuned:KIND",
+    "reading": "study.models.reading:KIND",
     "tissue": "study.models.tissue:KIND",
     "superposition": "study.models.superposition:KIND",
 }

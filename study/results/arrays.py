@@ -28,11 +28,12 @@ def read(path: Path) -> Arrays:
     if not path.exists():
         return {}
     try:
-        found = np.load(path, allow_pickle=False)
-        if not isinstance(found, np.lib.npyio.NpzFile):
-            raise ValueError("it is no .npz file")  # noqa: TRY004 - the file is at fault
-        with found:
-            return {name: found[name] for name in found.files}
+        with path.open("rb") as file:  # numpy leaves a file open that it takes for no .npz
+            found = np.load(file, allow_pickle=False)
+            if not isinstance(found, np.lib.npyio.NpzFile):
+                raise ValueError("it is no .npz file")  # noqa: TRY004 - the file is at fault
+            with found:
+                return {name: found[name] for name in found.files}
     except DAMAGED as error:
         raise ValueError(f"{path.name}: cannot be read ({error or type(error).__name__})") from None
 

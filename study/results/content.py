@@ -6,6 +6,7 @@ made the checksums again. Messages name file and line.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,15 @@ from numpy.typing import NDArray
 
 from study.results.arrays import Shapes, check_names, check_numbers, check_shapes
 from study.results.records import DiscretisationError, ModelRecord, StudyRecord
-from study.results.tables import QUANTITIES, BandSample, CurveSample, pairs
+from study.results.tables import (
+    QUANTITIES,
+    BandSample,
+    CurveSample,
+    ScoreDifference,
+    ScoreError,
+    paired,
+    pairs,
+)
 from study.scene.schema import Scene
 
 if TYPE_CHECKING:
@@ -26,6 +35,8 @@ FIRST_LINE = 2
 """Of a table's rows, below the names of its columns."""
 SAME_TIME = 1e-9
 """Share of the simulated time within which two times are the same; tables have twelve digits."""
+SAME_SCORE = 1e-9
+"""Within which two scores are the same; tables have twelve digits."""
 SURFACE: Shapes = {"points": "n3", "triangles": "m3", "tool": "23", "probes": "p3"}
 SETS: Shapes = {"sets": "s", "x": "x", "principal": "sx", "lower": "sx", "upper": "sx"}
 VIEW: Shapes = {
@@ -63,6 +74,9 @@ def check(results: Results) -> None:
     for line, row in enumerate(results.scores, FIRST_LINE):
         if not 0.0 <= row.score <= 1.0:
             raise ValueError(f"similarity.csv, line {line}: score {row.score:g} is not in [0, 1]")
+    _check_ratings(results)
+    _check_score_errors(results)
+    _check_score_differences(results)
     differences = [row[:-1] for row in results.field_differences]
     _check_keys("errors.csv", differences, [] if scene.is_point else _different(record))
     _check_sensitivity(results)
@@ -232,6 +246,65 @@ def _scored(record: StudyRecord) -> list[tuple[str, ...]]:
         for curve, measures in MEASURES.items()
         for measure in measures
     ]
+
+
+def _check_ratings(results: Results) -> None:
+    """The parts of each score by ISO/TS 18571 add up to it."""
+    scores = [row for row in results.scores if row.measure == "iso-18571"]
+    _check_keys("iso_18571.csv", [row[:4] for row in results.ratings], [row[:4] for row in scores])
+    for line, (row, score) in enumerate(zip(results.ratings, scores, strict=True), FIRST_LINE):
+        if not all(0.0 <= part <= 1.0 for part in row[4:]):
+            raise ValueError(f"iso_18571.csv, line {line}: a part is not in [0, 1]")
+        if abs(row.overall - score.score) > SAME_SCORE:
+            told = f"parts rate {row.overall:g}, and similarity.csv has {score.score:g}"
+            raise ValueError(f"iso_18571.csv, line {line}: {told}")
+
+
+def _check_score_errors(results: Results) -> None:
+    file, rows, scores = "score_errors.csv", results.score_errors, results.scores
+    _check_keys(file, [row[:5] for row in rows], [row[:5] for row in scores])
+    places = Counter(row[1:5] for row in scores)
+    for line, (row, score) in enumerate(zip(rows, scores, strict=True), FIRST_LINE):
+        where = f"{file}, line {line}"
+        if not 0.0 <= row.low <= score.score + SAME_SCORE:
+            raise ValueError(f"{where}: low {row.low:g} is not between 0 and the score")
+        if not score.score - SAME_SCORE <= row.high <= 1.0:
+            raise ValueError(f"{where}: high {row.high:g} is not between the score and 1")
+        _check_parts(where, row)
+        ranks = (row.first_rank, row.last_rank)
+        if not 1 <= ranks[0] <= ranks[1] <= places[row[1:5]] or any(rank % 1 for rank in ranks):
+            raise ValueError(f"{where}: {ranks[0]:g} to {ranks[1]:g} are no ranks of the models")
+
+
+def _check_score_differences(results: Results) -> None:
+    """Of every two models scored at one place, in the order of the scores."""
+    file, rows = "score_differences.csv", results.score_differences
+    scores = {row[:5]: row.score for row in results.scores}
+    pairs_of_keys = paired(list(dict.fromkeys(row[:3] for row in results.scores)))
+    wanted = [
+        (model, *other, *key[3:])
+        for (model, *_), other in pairs_of_keys
+        for key in scores
+        if key[:3] == other
+    ]
+    _check_keys(file, [row[:6] for row in rows], wanted)
+    for line, row in enumerate(rows, FIRST_LINE):
+        where, place = f"{file}, line {line}", row[2:6]
+        apart = scores[row.model, *place] - scores[row.other, *place]
+        if abs(apart - row.difference) > SAME_SCORE:
+            told = f"difference {row.difference:g}, and {apart:g} in similarity.csv"
+            raise ValueError(f"{where}: {told}")
+        low, high = row.low - SAME_SCORE, row.high + SAME_SCORE
+        if row.low < -1.0 or row.high > 1.0 or not low <= row.difference <= high:
+            raise ValueError(f"{where}: low and high do not hold the difference")
+        _check_parts(where, row)
+
+
+def _check_parts(where: str, row: ScoreError | ScoreDifference) -> None:
+    for name in ("resampled", "window", "normalised", "numerical"):
+        value = getattr(row, name)
+        if value is not None and value < 0.0:
+            raise ValueError(f"{where}: {name} {value:g} is below 0")
 
 
 def _different(record: StudyRecord) -> list[tuple[str, ...]]:

@@ -3,7 +3,8 @@
 scene.toml      the scene in full          curves.csv      motion at the control points
 results.json    numbers, provenance        bands.csv       type-2 interval carried through
 similarity.csv  score of each pair         errors.csv      differences of the whole field
-sensitivity.csv choices of the fuzzy side
+sensitivity.csv choices of the fuzzy side  iso_18571.csv   parts of those scores
+score_errors.csv, score_differences.csv    what scores depend on, and their differences
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
 MODEL.vtkhdf    motion of all nodes, if asked for
 SHA256SUMS      checksums of all these, which `sha256sum -c` verifies too
@@ -37,6 +38,9 @@ from study.results.tables import (
     BandSample,
     CurveSample,
     FieldDifference,
+    Iso18571Rating,
+    ScoreDifference,
+    ScoreError,
     SensitivityEntry,
     SimilarityScore,
     read_table,
@@ -71,6 +75,9 @@ class Results:
     curves: tuple[CurveSample, ...] = ()
     bands: tuple[BandSample, ...] = ()
     scores: tuple[SimilarityScore, ...] = ()
+    ratings: tuple[Iso18571Rating, ...] = ()
+    score_errors: tuple[ScoreError, ...] = ()
+    score_differences: tuple[ScoreDifference, ...] = ()
     field_differences: tuple[FieldDifference, ...] = ()
     sensitivity: tuple[SensitivityEntry, ...] = ()
     fields: Arrays = field(default_factory=dict)
@@ -110,6 +117,9 @@ def write(results: Results, folder: Path) -> None:
     write_table(folder / "curves.csv", CurveSample, results.curves)
     write_table(folder / "bands.csv", BandSample, results.bands)
     write_table(folder / "similarity.csv", SimilarityScore, results.scores)
+    write_table(folder / "iso_18571.csv", Iso18571Rating, results.ratings)
+    write_table(folder / "score_errors.csv", ScoreError, results.score_errors)
+    write_table(folder / "score_differences.csv", ScoreDifference, results.score_differences)
     write_table(folder / "errors.csv", FieldDifference, results.field_differences)
     write_table(folder / "sensitivity.csv", SensitivityEntry, results.sensitivity)
     for stem, arrays in (("fields", results.fields), ("fuzzy", results.fuzzy)):
@@ -165,6 +175,9 @@ def _content(folder: Path, table: Mapping[str, object]) -> Results:
         read_table(folder / "curves.csv", CurveSample),
         read_table(folder / "bands.csv", BandSample),
         read_table(folder / "similarity.csv", SimilarityScore),
+        read_table(folder / "iso_18571.csv", Iso18571Rating),
+        read_table(folder / "score_errors.csv", ScoreError),
+        read_table(folder / "score_differences.csv", ScoreDifference),
         read_table(folder / "errors.csv", FieldDifference),
         read_table(folder / "sensitivity.csv", SensitivityEntry),
         npz.read(folder / "fields.npz"),

@@ -19,6 +19,7 @@ DATA = frozenset(
     {
         *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
         *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
+        *("iso_18571.csv", "score_errors.csv", "score_differences.csv"),
     }
 )
 ALWAYS = DATA - {"fields.npz", "fuzzy.npz"}

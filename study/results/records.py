@@ -257,6 +257,36 @@ class LatticeLimits:
 
 
 @dataclass(frozen=True, kw_only=True)
+class BudgetPart:
+    """One cause in an error budget, all relative to the reference's norm at the peak.
+
+    `size`: L2 norm of this part; `contribution`: its projection on the whole difference, which may
+    be negative; contributions add up to the total. `left`: the difference that is left once this
+    and the causes before are mended. `error` of the part, None where it is not known.
+    """
+
+    cause: str
+    size: float
+    contribution: float
+    left: float
+    error: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorBudget:
+    """What the field difference of a model from a reference at the peak is made of.
+
+    `total`: relative L2; `total_error`: the reference's own error by its mesh, if it is estimated.
+    """
+
+    model: str
+    reference: str
+    total: float
+    total_error: float | None
+    parts: tuple[BudgetPart, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Dimensionless:
     """Size of the organ, and numbers that show a mistaken unit before anything is run."""
 
@@ -311,4 +341,5 @@ class StudyRecord:
     dimensionless: Dimensionless | None = None
     lattice_limits: LatticeLimits | None = None
     control_point: ControlPoint | None = None
+    budgets: tuple[ErrorBudget, ...] = ()
     schema_version: int = SCHEMA_VERSION

@@ -6,8 +6,9 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, get_type_hints
+from typing import NamedTuple, TypeVar, get_type_hints
 
 
 class CurveSample(NamedTuple):
@@ -43,6 +44,81 @@ class SimilarityScore(NamedTuple):
     score: float
 
 
+class Iso18571Rating(NamedTuple):
+    """The parts of a score by ISO/TS 18571, each in [0, 1]: iso_18571.csv."""
+
+    model: str
+    reference: str
+    probe: str
+    curve: str
+    corridor: float
+    phase: float
+    magnitude: float
+    slope: float
+
+    @property
+    def overall(self) -> float:
+        """The score that these are the parts of."""
+        return 0.4 * self.corridor + 0.2 * (self.phase + self.magnitude + self.slope)
+
+
+class ScoreError(NamedTuple):
+    """What a score depends on besides the two models, and the ranks it leaves: score_errors.csv.
+
+    `low` and `high` bound the 95 % block interval; see `study.similarity.uncertainty` for it, for
+    `resampled`, `window` and `normalised`. `numerical`: sum of the relative errors of both curves,
+    None if one is not estimated. `first_rank` to `last_rank` of the models scored beside it.
+    """
+
+    model: str
+    reference: str
+    probe: str
+    curve: str
+    measure: str
+    low: float
+    high: float
+    resampled: float
+    window: float
+    normalised: float
+    numerical: float | None
+    first_rank: float
+    last_rank: float
+
+
+class ScoreDifference(NamedTuple):
+    """A model's score less that of another, each part of its error paired: score_differences.csv.
+
+    The same blocks, samples, windows and axes count for both, so that what moves both alike does
+    not count. `numerical`: sum of the relative errors of the three curves.
+    """
+
+    model: str
+    other: str
+    reference: str
+    probe: str
+    curve: str
+    measure: str
+    difference: float
+    low: float
+    high: float
+    resampled: float
+    window: float
+    normalised: float
+    numerical: float | None
+
+    @property
+    def is_beyond_sampling(self) -> bool:
+        """Whether zero is outside of the interval and every second sample moves it by less."""
+        return (self.low > 0.0 or self.high < 0.0) and abs(self.difference) > self.resampled
+
+    @property
+    def is_resolved(self) -> bool | None:
+        """Whether it exceeds each of its errors; None if the numerical one is not known."""
+        if not self.is_beyond_sampling:
+            return False
+        return None if self.numerical is None else abs(self.difference) > self.numerical
+
+
 class FieldDifference(NamedTuple):
     """Difference of a model's whole field from that of a reference: errors.csv."""
 
@@ -65,6 +141,8 @@ class SensitivityEntry(NamedTuple):
     readings: float
 
 
+Key = tuple[str, str, str]
+"""Of a scored curve: model, reference and control point."""
 QUANTITIES = (
     *("field-relative-l2-peak", "field-relative-l2-final", "field-l2-final-over-peak"),
     *("field-best-factor-peak", "field-relative-l2-peak-at-best-factor"),
@@ -80,9 +158,13 @@ def pairs(models: Sequence[str], references: Sequence[str]) -> Iterator[tuple[st
                 yield model, reference
 
 
-Entry = TypeVar(
-    "Entry", CurveSample, BandSample, SimilarityScore, FieldDifference, SensitivityEntry
-)
+def paired(keys: Sequence[Key]) -> Iterator[tuple[Key, Key]]:
+    """Every two models that are scored against one reference at one control point."""
+    for place in dict.fromkeys(key[1:] for key in keys):
+        yield from combinations([key for key in keys if key[1:] == place], 2)
+
+
+Entry = TypeVar("Entry", bound=NamedTuple)
 
 
 def write_table(path: Path, kind: type[Entry], rows: Iterable[Entry]) -> None:
@@ -129,16 +211,18 @@ def _rows(path: Path, kind: type[Entry], reader: Iterable[list[str]]) -> Iterato
         raise ValueError(f"{path.name}, line {number}: {error}") from None
 
 
-def _values(names: Sequence[str], kinds: Mapping[str, type], cells: list[str]) -> list[object]:
+def _values(names: Sequence[str], kinds: Mapping[str, object], cells: list[str]) -> list[object]:
     if len(cells) != len(names):
         raise ValueError(f"{len(cells)} cells, not {len(names)}")
     return [_value(name, kinds[name], text) for name, text in zip(names, cells, strict=True)]
 
 
-def _value(name: str, kind: type, text: str) -> object:
-    """A name, or a finite number. ValueError naming the column of what is none."""
+def _value(name: str, kind: object, text: str) -> object:
+    """A name, a finite number, or None where it may be. ValueError naming the column of others."""
     if kind is str:
         return text
+    if kind == float | None and not text:
+        return None
     try:
         value = float(text)
     except ValueError:
@@ -148,5 +232,7 @@ def _value(name: str, kind: type, text: str) -> object:
     return value
 
 
-def _cell(value: Any) -> str:
+def _cell(value: str | float | None) -> str:
+    if value is None:
+        return ""
     return value if isinstance(value, str) else f"{value:.12g}"

@@ -18,6 +18,7 @@ from study.results.provenance import provenance
 from study.results.records import (
     ControlPoint,
     Dimensionless,
+    ErrorBudget,
     LatticeLimits,
     Provenance,
     StudyRecord,
@@ -25,6 +26,7 @@ from study.results.records import (
 from study.run.assumptions import assumptions
 from study.run.dimensionless import dimensionless
 from study.run.ready import Ready, ReadyPoint, ready
+from study.run.score_errors import error_rows, rating_rows
 from study.run.suiting import suited
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
@@ -43,6 +45,7 @@ class Compared:
     dimensionless: Dimensionless | None = None
     lattice_limits: LatticeLimits | None = None
     control_point: ControlPoint | None = None
+    budgets: tuple[ErrorBudget, ...] = ()
 
 
 def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
@@ -77,6 +80,8 @@ def _on_point(given: ReadyPoint, watch: Watch) -> Compared:
 
 
 def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compared:
+    from study.run.budget import error_budgets  # imports finite elements, which a point has none of
+
     problem, notes = given.problem, list(given.problem.geometry.notes)
     runs: dict[str, ModelRun] = {}
     limits = None
@@ -89,6 +94,14 @@ def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compa
                 limits = lattice_limits(scene, problem, prepared, watch.progress)
             except ValueError as error:  # of a lattice beside those of the scene
                 notes.append(f"What the lattice cannot do at rest is not known: {error}.")
+    budgets: tuple[ErrorBudget, ...] = ()
+    if any(run.record.lattice is not None for run in runs.values()):
+        from study.run.budget import error_budgets
+
+        try:
+            budgets = error_budgets(scene, problem, given.models, runs, watch.progress)
+        except ValueError as error:  # of a lattice that is mended
+            notes.append(f"There is no error budget: {error}.")
     return Compared(
         problem.response,
         runs,
@@ -96,6 +109,7 @@ def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compa
         _fields(problem, runs),
         dimensionless(scene, problem),
         limits,
+        budgets=budgets,
     )
 
 
@@ -118,6 +132,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
     # One that diverged leaves a note in place of its scores.
     sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}
     scores, unscored = similarity_rows(response, sound, compared_with)
+    errors, apart = error_rows(response, sound, models, scores)
     record = StudyRecord(
         title=scene.title,
         probes=response.probes,
@@ -140,6 +155,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         dimensionless=found.dimensionless,
         lattice_limits=found.lattice_limits,
         control_point=found.control_point,
+        budgets=found.budgets,
     )
     has_field = response.volumes.size > 0
     return Results(
@@ -153,6 +169,9 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             for row in band_rows(response, name, run.bounds)
         ),
         scores,
+        tuple(rating_rows(response, sound, scores)),
+        errors,
+        apart,
         tuple(difference_rows(response, sound, compared_with)) if has_field else (),
         fuzzy.sensitivity,
         found.fields,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
@@ -38,12 +39,7 @@ MESH_ONLY = (
 
 def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     """What is wrong between keys that are each right."""
-    if not scene.models:
-        yield f"models: empty; name at least one of {', '.join(MODELS.names())}"
-    if len(set(scene.models)) < len(scene.models):
-        yield "models: a model is named twice"
-    if "msm" in scene.models and not scene.fuzzy.systems:
-        yield "fuzzy.systems: empty; name a system or leave msm out of models"
+    yield from _model_contradictions(scene)
     if len(set(scene.fuzzy.systems)) < len(scene.fuzzy.systems):
         yield "fuzzy.systems: a system is named twice"
     if len(set(scene.fuzzy.surface)) < len(scene.fuzzy.surface):
@@ -89,6 +85,17 @@ def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
             letters_of(organ.axes)
         except ValueError as error:
             yield str(error)
+
+
+def _model_contradictions(scene: Scene) -> Iterator[str]:
+    if not scene.models:
+        yield f"models: empty; name at least one of {', '.join(MODELS.names())}"
+    if len(set(scene.models)) < len(scene.models):
+        yield "models: a model is named twice"
+    if "msm" in scene.models and not scene.fuzzy.systems:
+        yield "fuzzy.systems: empty; name a system or leave msm out of models"
+    if "reading" in scene.models and not any(asdict(scene.patient).values()):
+        yield "models: reading needs a reading; give one in [patient] or leave it out"
 
 
 def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:

@@ -104,7 +104,7 @@ class Tool:
 
 @dataclass(frozen=True, kw_only=True)
 class Patient:
-    """Elastography reading per aetiology [Pa]; one that is not given is that of a normal liver."""
+    """Elastography reading per aetiology [Pa]; `fuzzy.absent` says what one not given means."""
 
     hcv: Reading | None = None
     hbv: Reading | None = None
@@ -117,19 +117,21 @@ class Patient:
 class Fuzzy:
     """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt.
 
-    `reading` of Table I by name, `consequent` of a combination, `placement` of the sets on
-    elastography data, `footprint` of uncertainty and its factor on the published spread, what an
-    `absent` reading does; then how the systems are evaluated. `surface`: the two readings of the
-    output surfaces. `sensitivity_readings`: readings over which each of these choices is varied.
+    `knowledge`: the base of sets and rules. Of the base severity, `reading` of Table I by name,
+    `consequent` of a combination, `placement` of the sets on elastography data. `footprint` of
+    uncertainty and its factor on the published spread, what an `absent` reading does; then how the
+    systems are evaluated. `surface`: the two readings of the output surfaces.
+    `sensitivity_readings`: readings over which each of these choices is varied.
     """
 
     systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
+    knowledge: Annotated[str, Choice("fuzzy.liver.bases:KNOWLEDGE")] = "freed"
     reading: str = "R1"
     consequent: Annotated[str, Choice("fuzzy.liver.rules:CONSEQUENTS")] = "max"
     placement: Annotated[str, Choice("fuzzy.liver.knowledge:PLACEMENTS")] = "stage-mean"
     footprint: Annotated[str, Choice("fuzzy.liver.settings:FOOTPRINTS")] = "uncertain-mean"
     footprint_factor: Annotated[float, Quantity("", 0.0, 3.0)] = 1.0
-    absent: Annotated[str, Choice("fuzzy.liver.settings:ABSENT")] = "normal"
+    absent: Annotated[str, Choice("fuzzy.liver.settings:ABSENT")] = "auto"
     sampling: Annotated[str, Choice("fuzzy.systems.quadrature:SAMPLINGS")] = "matlab"
     samples: Annotated[int, Quantity("", 11, 100_001)] = 101
     sugeno_aggregation: Annotated[str, Choice("fuzzy.systems.system:MERGES")] = "sum"

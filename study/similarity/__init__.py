@@ -4,3 +4,11 @@
 of it. The phase plane is scored by its shape and the time histories by their timing, so no single
 number stands for likeness: scores of different measures must not be compared with each other.
 """
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study.compiled import drop_outdated
+
+drop_outdated(Path(__file__).parent)  # before a kernel is loaded

@@ -160,7 +160,7 @@ def contender(name: str) -> Contender:
     """
     if name in CONTENDERS:
         return CONTENDERS[name]
-    if name not in MODELS or kind(name).is_tuned:
+    if name not in MODELS or kind(name).of_patient:
         raise ValueError(
             f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}, or a model of "
             "the scene that needs no estimate"
@@ -171,7 +171,7 @@ def contender(name: str) -> Contender:
 def contenders_of(scene: Scene) -> list[str]:
     """All contenders, and the scene's own models that are none of them and need no estimate."""
     entered = {one.model for one in CONTENDERS.values()}
-    own = [name for name in scene.models if name not in entered and not kind(name).is_tuned]
+    own = [name for name in scene.models if name not in entered and not kind(name).of_patient]
     return [*CONTENDERS, *own]
 
 

@@ -53,7 +53,7 @@ def plain(variable):
     return replace(variable, sets=tuple(gaussian(one) for one in variable.sets))
 
 
-LIVER = liver_system(LiverSettings())
+LIVER = liver_system(LiverSettings(knowledge="severity"))
 SYSTEM = replace(
     LIVER, inputs=tuple(plain(variable) for variable in LIVER.inputs), output=plain(LIVER.output)
 )

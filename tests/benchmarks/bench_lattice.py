@@ -1,10 +1,11 @@
-"""Speed of the lattice: against C, against its size, and against real time.
+"""Speed of the lattice: against C, against its size, on grid and list, and against real time.
 
     python -m tests.benchmarks.bench_lattice
 
 prints the figures and writes reports/data/real_time.csv; it takes ten minutes and 4 GB, and a C
 compiler for the first part. Each figure is the least of several repeats, which others on the
-machine disturb least, and their median. What is compared is measured in turns.
+machine disturb least, and their median. What is compared is measured in turns. Steps are those of a
+run, over the grid; springs alone and the orders of nodes are measured over the list of springs.
 
 A step on two threads, each with its half of the nodes, was tried and left out. It starts threads
 three times a step, each 7 us with OpenMP and 50 us with numba's own queue, of 150 us at 2500 nodes;
@@ -36,6 +37,8 @@ from msm.calibration import reference_stiffness
 from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
 from msm.forces import add_spring_forces
+from msm.grid import grid_of
+from msm.grid_explicit import symplectic_euler as symplectic_euler_on_grid
 from msm.lattice import CORNERS, CellLattice, node_volumes
 from msm.laws import Hooke, Law
 from msm.network import Network, network
@@ -54,6 +57,7 @@ HERE = Path(__file__).parent
 TABLE = HERE.parents[1] / "reports" / "data" / "real_time.csv"
 RATIOS = (0.45, 0.49)
 SPACINGS = (0.012, 0.010, 0.008, 0.02 / 3, 0.005)
+GAIN_SPACINGS = (0.010, 0.02 / 3, 0.005)
 FRACTION = 0.8
 """Of the critical step, as the study takes it."""
 MODULUS, DENSITY, SPACING = 9.5e3, 1054.0, 0.01
@@ -99,15 +103,21 @@ class Timing(NamedTuple):
         return Timing(self.least / count, self.median / count)
 
 
-def in_turns(tasks: dict[str, Callable[[], None]], repeats: int = REPEATS) -> dict[str, Timing]:
-    """Times of tasks that take turns, after one round that compiles them."""
+def rounds(tasks: dict[str, Callable[[], None]], repeats: int = REPEATS) -> dict[str, list[float]]:
+    """Times [s] of tasks that take turns, after one round that compiles them."""
     taken: dict[str, list[float]] = {name: [] for name in tasks}
     for _ in range(repeats + 1):
         for name, task in tasks.items():
             started = time.perf_counter()
             task()
             taken[name].append(time.perf_counter() - started)
-    return {name: Timing(min(t[1:]), float(np.median(t[1:]))) for name, t in taken.items()}
+    return {name: found[1:] for name, found in taken.items()}
+
+
+def in_turns(tasks: dict[str, Callable[[], None]], repeats: int = REPEATS) -> dict[str, Timing]:
+    """Least and median times of tasks that take turns."""
+    taken = rounds(tasks, repeats)
+    return {name: Timing(min(t), float(np.median(t))) for name, t in taken.items()}
 
 
 def cube(nodes: int) -> CellLattice:
@@ -205,24 +215,38 @@ def against_c(nodes: int = 10_000) -> dict[str, Timing]:
     return {name: timing / (count * len(net.ends)) for name, timing in found.items()}
 
 
-def stepping(law: Law, net: Network, dt: float, count: int) -> Callable[[], None]:
-    """A task: that many steps of symplectic Euler under the full load, on and on."""
+def stepping(
+    law: Law, net: Network, dt: float, count: int, lattice: CellLattice | None = None
+) -> Callable[[], None]:
+    """A task: that many steps of symplectic Euler under the full load, on and on.
+
+    Over the grid of a lattice if one is given.
+    """
     u, v = np.zeros((2, *net.load.shape))
     factors = np.ones((count, 1))
-    return lambda: symplectic_euler(law, net, factors, dt, u, v)
+    if lattice is None:
+        return lambda: symplectic_euler(law, net, factors, dt, u, v)
+    grid = grid_of(lattice, net)
+    return lambda: symplectic_euler_on_grid(law, grid, factors, dt, u, v)
 
 
-def per_spring(nets: dict[str, Network], repeats: int = REPEATS) -> dict[str, Timing]:
+def per_spring(
+    lattices: dict[str, CellLattice], repeats: int = REPEATS, *, on_grid: bool = True
+) -> dict[str, Timing]:
     """Time [s] of a step over the number of springs."""
+    nets = {name: free(lattice) for name, lattice in lattices.items()}
     counts = {name: max(1, SPRINGS_PER_REPEAT // len(net.ends)) for name, net in nets.items()}
-    tasks = {name: stepping(LAW, net, 1e-4, counts[name]) for name, net in nets.items()}
+    tasks = {
+        name: stepping(LAW, net, 1e-4, counts[name], lattices[name] if on_grid else None)
+        for name, net in nets.items()
+    }
     found = in_turns(tasks, repeats)
     return {name: found[name] / (counts[name] * len(net.ends)) for name, net in nets.items()}
 
 
 def flatness(sizes: tuple[int, ...] = SIZES) -> dict[str, Timing]:
     """Time [s] per spring and step over the number of nodes."""
-    return per_spring({f"{size} nodes": free(cube(size)) for size in sizes}, 5)
+    return per_spring({f"{size} nodes": cube(size) for size in sizes}, 5)
 
 
 def node_orders(size: int) -> dict[str, Timing]:
@@ -230,8 +254,8 @@ def node_orders(size: int) -> dict[str, Timing]:
     built = cube(size)
     shuffled = np.random.default_rng(0).permutation(len(built.nodes))
     orders = {"reverse Cuthill-McKee": cuthill_mckee(built), "random": shuffled}
-    nets = {name: free(numbered(built, order)) for name, order in orders.items()}
-    return per_spring({"as built": free(built), **nets}, 5)
+    others = {name: numbered(built, order) for name, order in orders.items()}
+    return per_spring({"as built": built, **others}, 5, on_grid=False)
 
 
 def peak_memory(nodes: int) -> float:
@@ -277,6 +301,7 @@ def real_time(case: field_error.Case) -> list[Row]:
             arrays(one.assembly, one.material),
             FRACTION * one.critical,
             counts[key],
+            one.assembly.lattice,
         )
         for key, one in livers.items()
     }
@@ -288,12 +313,85 @@ def real_time(case: field_error.Case) -> list[Row]:
     ]
 
 
+class Gain(NamedTuple):
+    """Steps of the built-in liver at nu = 0.45 over the list of springs and over the grid.
+
+    `gain`: median over the rounds of the ratio of their times; `list_us`, `grid_us`: least times of
+    a step, `grid_ns` per spring; `real_time`, `real_time_median`: simulated over wall time.
+    """
+
+    spacing_m: float
+    volume_term: bool
+    nodes: int
+    springs: int
+    gain: float
+    list_us: float
+    grid_us: float
+    grid_ns: float
+    list_real_time: float
+    real_time: float
+    real_time_median: float
+
+
+def gain(case: field_error.Case, assembly: Assembly, *, with_volume: bool) -> Gain:
+    """One lattice, on list and grid by turns."""
+    one = liver(case, assembly, 0.45)
+    net, dt = arrays(one.assembly, one.material), FRACTION * one.critical
+    if not with_volume:
+        net = net._replace(cells=net.cells[:0], bulk=net.bulk[:0])
+    springs = len(net.ends)
+    count = max(1, SPRINGS_PER_REPEAT // springs)
+    law = one.material.law
+    tasks = {
+        "list": stepping(law, net, dt, count),
+        "grid": stepping(law, net, dt, count, assembly.lattice),
+    }
+    taken = rounds(tasks, 2 * REPEATS)
+    ratios = np.divide(taken["list"], taken["grid"])
+    least = {name: min(found) / count for name, found in taken.items()}
+    return Gain(
+        assembly.lattice.spacing,
+        with_volume,
+        len(net.mass),
+        springs,
+        float(np.median(ratios)),
+        1e6 * least["list"],
+        1e6 * least["grid"],
+        1e9 * least["grid"] / springs,
+        dt / least["list"],
+        dt / least["grid"],
+        dt * count / float(np.median(taken["grid"])),
+    )
+
+
+def gains(case: field_error.Case) -> list[Gain]:
+    """The spacings that a study takes, with and without volume term."""
+    lattices = [field_error.lattice(case, spacing) for spacing in GAIN_SPACINGS]
+    return [gain(case, one, with_volume=term) for one in lattices for term in (True, False)]
+
+
+def report_gains(found: list[Gain]) -> None:
+    """Print the gains, a line each."""
+    for one in found:
+        sys.stdout.write(
+            f"{1e3 * one.spacing_m:.1f} mm, {'with' if one.volume_term else 'without'} volume "
+            f"term: grid {one.gain:.2f} times the list's speed, {one.list_us:.0f} and "
+            f"{one.grid_us:.0f} us a step ({one.grid_ns:.2f} ns per spring), "
+            f"{one.list_real_time:.2f} and {one.real_time:.2f} times real time "
+            f"(median {one.real_time_median:.2f})\n"
+        )
+    sys.stdout.flush()
+
+
 def latency(case: field_error.Case) -> dict[str, Timing]:
     """Time [s] of one step of the liver: in calls of as many as a run takes, and by itself."""
     one = liver(case, field_error.lattice(case, LATENCY_SPACING), 0.45)
     net, dt = arrays(one.assembly, one.material), FRACTION * one.critical
     counts = {"in a run": LOOK, "by itself": 1}
-    tasks = {name: stepping(one.material.law, net, dt, count) for name, count in counts.items()}
+    tasks = {
+        name: stepping(one.material.law, net, dt, count, one.assembly.lattice)
+        for name, count in counts.items()
+    }
     found = in_turns(tasks, 100)
     return {name: found[name] / count for name, count in counts.items()}
 
@@ -371,6 +469,7 @@ def main() -> None:
         report(f"Node orders, {size} nodes", node_orders(size))
     sys.stdout.write(f"Memory of 1e6 nodes: {peak_memory(1_000_000) / 2**30:.2f} GiB\n")
     case = field_error.liver()
+    report_gains(gains(case))
     for name, step in latency(case).items():
         sys.stdout.write(f"One step of 2400 nodes, {name}: {1e6 * step.least:.0f} us\n")
     write(real_time(case))

@@ -208,7 +208,7 @@ def off_scale(kind: str, reading: float) -> Finding:
 
 def alone(kind: str) -> Finding:
     """With the others silent, a reading goes by the rules on its own disease."""
-    settings = LiverSettings(absent="silent")
+    settings = LiverSettings(knowledge="severity", absent="silent")
     liver = liver_system(settings)
     one = AETIOLOGIES.index("hcv")
     rules = tuple(
@@ -224,7 +224,7 @@ def alone(kind: str) -> Finding:
 
 def without_footprint(footprint: str) -> Finding:
     """Interval type-2 without a footprint is Mamdani's, and its interval a point."""
-    settings = LiverSettings(footprint=footprint, footprint_factor=0.0)
+    settings = LiverSettings(knowledge="severity", footprint=footprint, footprint_factor=0.0)
     found = estimate(READINGS, "interval-type-2", settings)
     one = estimate(READINGS, "mamdani", settings).estimate
     return beside(np.full(3, one), np.array([found.estimate, *(found.interval or ())]))
@@ -232,7 +232,7 @@ def without_footprint(footprint: str) -> Finding:
 
 def with_largest(footprint: str) -> Finding:
     """The liver's interval at the largest footprint, by a search."""
-    settings = LiverSettings(footprint=footprint, footprint_factor=3.0)
+    settings = LiverSettings(knowledge="severity", footprint=footprint, footprint_factor=3.0)
     row = np.array([[READINGS[name] / KPA for name in AETIOLOGIES]])
     return _searched(liver_system(settings), row)
 
@@ -260,7 +260,7 @@ def member(sd: float, off: float) -> Finding:
 
 def factor(factor: float) -> Finding:
     """Settings with a footprint of so many times the published one."""
-    return value(0.0, LiverSettings(footprint_factor=factor).footprint_factor)
+    return value(0.0, LiverSettings(knowledge="severity", footprint_factor=factor).footprint_factor)
 
 
 def few(samples: int) -> Finding:

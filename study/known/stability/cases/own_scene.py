@@ -79,7 +79,7 @@ def _free(scene: Scene) -> Scene:
 
 def tried(scene: Scene) -> list[str]:
     """Kinds of models that are tried on a scene."""
-    others = (n for n in scene.models if n != "fem" and not kind(n).is_tuned)
+    others = (n for n in scene.models if n != "fem" and not kind(n).of_patient)
     return list(dict.fromkeys(("tissue", *others)))
 
 

@@ -1,0 +1,280 @@
+"""Where the knowledge bases that follow the reading come from: run it, and it writes their tables.
+
+    python -m fuzzy.liver.derivation
+
+writes `partition.csv` and `combination.csv` into `fuzzy/liver/data`, the same on every run. Both
+bases are judged by the relative error of the estimate, alike over Mamdani, Sugeno and type-2.
+
+*freed*: as many sets as readings can tell apart. Their centres divide the instrument's scale
+evenly in ln kPa, neighbours LEAST_DISTANCE of the noise of reading apart or more, so that hardly a
+reading at one centre falls to the next set. Consequents are what the least squares of the errors
+choose over virtual patients of all aetiologies and livers even in ln kPa, half each, all with the
+noise of reading: the stiffness expected of a reading.
+
+*paper-count*: the sets of reading R1 of Table I, two an aetiology and three for HBV. Centres,
+crossings and consequents are what the least squares choose, started from several places, over
+readings of virtual patients of that aetiology and readings even in ln kPa, half each.
+
+Both: with the sets in place, shift and power of the combinations of two to four diseases are
+fitted, on readings that agree.
+"""
+
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares, minimize
+
+from fuzzy.liver.knowledge import parameters
+from fuzzy.liver.partition import (
+    Combination,
+    PlacedSet,
+    Placement,
+    following_system,
+    reading_noise,
+)
+from fuzzy.liver.population import PA_PER_KPA, cohort, noisy_readings
+from fuzzy.liver.readings import READINGS
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.inference import infer
+from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.sets import Array
+
+SEED = 12
+LEAST_DISTANCE = 5.0
+"""Of neighbouring centres of *freed*, in standard deviations of one reading."""
+OUTERMOST = (2.6, 70.0)
+"""Centres [kPa] of the lowest and the highest set of *freed*, a little inside the scale."""
+NAMES = {
+    2: ("low", "high"),
+    3: ("low", "medium", "high"),
+    7: ("lowest", "very-low", "low", "medium", "high", "very-high", "highest"),
+}
+PARTITION = ("knowledge", "aetiology", "set", "centre_kpa", "crossing_kpa", "consequent_kpa")
+COMBINATION = ("knowledge", "diseases", "shift", "power")
+JUDGED = np.geomspace(4.0, 40.0, 60)
+"""Readings [kPa] over which a base is to follow, and two sets can."""
+TAUGHT = 600
+"""Virtual patients, and as many livers even in ln kPa, that *freed* is fitted to."""
+STARTS = 6
+POLISHED = 800
+"""Steps of the simplex that ends the search of *paper-count*."""
+UNCOMBINED = {size: Combination(0.0, 1.0) for size in (1, 2, 3, 4)}
+CELLS = {2: AETIOLOGIES[:2], 3: AETIOLOGIES[:3], 4: AETIOLOGIES[:4]}
+"""Cells on which combinations are fitted."""
+
+
+class Judged(NamedTuple):
+    """Readings [kPa] (N,), and the stiffness [kPa] (N,) to be estimated from each."""
+
+    readings: Array
+    expected: Array
+
+
+def residuals(placed: Placement, present: Sequence[str], judged: Judged, knowledge: str) -> Array:
+    """Relative error of every estimate, all systems one after another."""
+    settings = LiverSettings(knowledge=knowledge)
+    system = following_system(placed, settings, tuple(present))
+    X = np.full((judged.readings.size, len(AETIOLOGIES)), parameters()["normal_liver"])
+    X[:, [AETIOLOGIES.index(name) for name in present]] = judged.readings[:, None]
+    found = [infer(system, X, kind, settings.options).value for kind in SYSTEMS]
+    return np.concatenate([value / judged.expected - 1.0 for value in found])
+
+
+def freed_sets() -> Placement:
+    """The sets of *freed*, the same for every aetiology, with the consequents of each alone."""
+    low, high = np.log(OUTERMOST)
+    gaps = int((high - low) / (LEAST_DISTANCE * reading_noise()))
+    centres = np.geomspace(*OUTERMOST, gaps + 1)
+    crossings = np.sqrt(centres[:-1] * centres[1:])
+    judged = everyone_judged()
+
+    def placed(consequents: Array) -> Placement:
+        found = _placed_sets(centres, crossings, np.exp(consequents))
+        return Placement(dict.fromkeys(AETIOLOGIES, found), UNCOMBINED)
+
+    start = np.log(centres)
+    return placed(
+        _fitted(
+            lambda x: residuals(placed(x), AETIOLOGIES[:1], judged, "freed"),
+            start,
+            (start - 0.4, start + 0.2),
+        )
+    )
+
+
+def everyone_judged() -> Judged:
+    """Virtual patients of all aetiologies, and livers even in ln kPa, each with one exam."""
+    rng = np.random.default_rng(SEED)
+    patients = cohort(TAUGHT, SEED).stiffness / PA_PER_KPA
+    livers = np.concatenate([patients, np.geomspace(*OUTERMOST, TAUGHT)])
+    return Judged(noisy_readings(livers, 1, rng)[:, 0], livers)
+
+
+def paper_count_sets() -> Placement:
+    """The sets of *paper-count*, by aetiology."""
+    counts = READINGS["R1"].counts
+    return Placement(
+        {name: _optimised(name, count) for name, count in zip(AETIOLOGIES, counts, strict=True)},
+        UNCOMBINED,
+    )
+
+
+def population_judged(name: str) -> Judged:
+    """Readings of virtual patients by their quantiles, and readings even in ln kPa, half each."""
+    drawn = cohort(20_000, SEED)
+    chosen = drawn.main == AETIOLOGIES.index(name)
+    levels = np.quantile(drawn.readings[chosen, AETIOLOGIES.index(name)], QUANTILES) / PA_PER_KPA
+    readings = np.concatenate([levels, JUDGED])
+    return Judged(readings, readings)
+
+
+QUANTILES = (np.arange(JUDGED.size) + 0.5) / JUDGED.size
+
+
+def _optimised(name: str, count: int) -> tuple[PlacedSet, ...]:
+    judged = population_judged(name)
+    rng = np.random.default_rng(SEED)
+    found = [_searched(name, judged, start) for start in _starts(count, rng)]
+
+    def loss_at(x: Array) -> float:
+        return loss(name, unfolded(x, count), judged)
+
+    best = min(found, key=loss_at)
+    # Consequents are rounded, and a simplex steps over the stairs that this makes.
+    polished = minimize(
+        loss_at,
+        best,
+        method="Nelder-Mead",
+        bounds=np.transpose(_bounds(count)),
+        options={"maxfev": POLISHED},
+    )
+    return unfolded(np.asarray(polished.x), count)
+
+
+def loss(name: str, sets: tuple[PlacedSet, ...], judged: Judged) -> float:
+    """Mean square of the residuals of one aetiology's sets."""
+    placed = Placement(dict.fromkeys(AETIOLOGIES, sets), UNCOMBINED)
+    return float(np.mean(residuals(placed, (name,), judged, "paper-count") ** 2))
+
+
+def _starts(count: int, rng: np.random.Generator) -> Iterable[Array]:
+    """Unknowns to start from: ln of the first centre, of the gaps, ln consequents."""
+    for _ in range(STARTS):
+        centres = np.sort(rng.uniform(np.log(3.0), np.log(50.0), count))
+        gaps = np.maximum(np.diff(centres), 0.3)
+        yield np.concatenate([centres[:1], np.log(gaps), np.zeros(count - 1), centres])
+
+
+def _searched(name: str, judged: Judged, start: Array) -> Array:
+    """Unknowns of least squares near a start."""
+    count = (start.size + 1) // 3
+
+    def misfit(x: Array) -> Array:
+        placed = Placement(dict.fromkeys(AETIOLOGIES, unfolded(x, count)), UNCOMBINED)
+        return residuals(placed, (name,), judged, "paper-count")
+
+    low, high = _bounds(count)
+    return _fitted(misfit, np.clip(start, low + 1e-6, high - 1e-6), (low, high))
+
+
+def _bounds(count: int) -> tuple[Array, Array]:
+    """Of the unknowns: first centre, gaps, logits of crossings, consequents."""
+    p = parameters()
+    ends = np.log([[p["input_low"], 20.0], [p["concluded_low"], p["concluded_high"]]])
+    parts = [ends[:1], *[[(-2.0, 1.2)]] * (count - 1), *[[(-2.5, 2.5)]] * (count - 1)]
+    low, high = np.concatenate([*parts, np.repeat(ends[1:], count, axis=0)]).T
+    return low, high
+
+
+def unfolded(x: Array, count: int) -> tuple[PlacedSet, ...]:
+    """The sets that unknowns stand for; a crossing divides its gap by a logistic share."""
+    gaps = np.exp(x[1:count])
+    centres = x[0] + np.concatenate([[0.0], np.cumsum(gaps)])
+    shares = 1.0 / (1.0 + np.exp(-x[count : 2 * count - 1]))
+    consequents = np.sort(np.exp(x[2 * count - 1 :]))
+    return _placed_sets(np.exp(centres), np.exp(centres[:-1] + shares * gaps), consequents)
+
+
+def _placed_sets(centres: Array, crossings: Array, consequents: Array) -> tuple[PlacedSet, ...]:
+    names = NAMES[centres.size]
+    ends = [*crossings, np.inf]
+    return tuple(
+        PlacedSet(*row)
+        for row in zip(
+            names, map(float, centres), map(float, ends), map(float, consequents), strict=True
+        )
+    )
+
+
+def with_combinations(
+    placed: Placement, knowledge: str, sizes: Sequence[int] = tuple(CELLS)
+) -> Placement:
+    """The sets with shift and power of their combinations of so many diseases fitted."""
+    judged = Judged(JUDGED[::2], JUDGED[::2])
+
+    def fitted(size: int) -> Combination:
+        def misfit(x: Array) -> Array:
+            tried = Placement(placed.sets, {**UNCOMBINED, size: Combination(x[0], x[1])})
+            return residuals(tried, CELLS[size], judged, knowledge)
+
+        found = _fitted(misfit, np.array([0.0, 1.0]), (np.array([-2.0, 0.5]), np.array([2.0, 2.0])))
+        return Combination(float(found[0]), float(found[1]))
+
+    return Placement(placed.sets, {**UNCOMBINED, **{size: fitted(size) for size in sizes}})
+
+
+def _fitted(misfit: Callable[[Array], Array], start: Array, bounds: tuple[Array, Array]) -> Array:
+    # Unknowns are counted from 1, so that a relative step is an absolute one; consequents are
+    # rounded to output sets, and it must be wider than their distance.
+    low, high = (bound - start + 1.0 for bound in bounds)
+    found = least_squares(
+        lambda moved: misfit(moved + start - 1.0),
+        np.ones(start.size),
+        bounds=(low, high),
+        diff_step=0.05,
+        max_nfev=60,
+    )
+    return np.asarray(found.x + start - 1.0)
+
+
+def derived() -> dict[str, Placement]:
+    """Both bases by name, from the published figures alone."""
+    sets = {"paper-count": paper_count_sets(), "freed": freed_sets()}
+    return {name: with_combinations(placed, name) for name, placed in sets.items()}
+
+
+def write(bases: Mapping[str, Placement], folder: Path) -> None:
+    """Write both tables into a folder."""
+    partition = [
+        (
+            knowledge,
+            name,
+            one.name,
+            f"{one.centre:.5g}",
+            f"{one.crossing:.5g}" if np.isfinite(one.crossing) else "",
+            f"{one.consequent:.5g}",
+        )
+        for knowledge, placed in bases.items()
+        for name in AETIOLOGIES
+        for one in placed.sets[name]
+    ]
+    combination = [
+        (knowledge, str(size), f"{one.shift:.4f}", f"{one.power:.4f}")
+        for knowledge, placed in bases.items()
+        for size, one in placed.combinations.items()
+    ]
+    for file, lines in (
+        ("partition.csv", [PARTITION, *partition]),
+        ("combination.csv", [COMBINATION, *combination]),
+    ):
+        with (folder / file).open("w", newline="", encoding="utf-8") as opened:
+            csv.writer(opened, lineterminator="\n").writerows(lines)
+
+
+if __name__ == "__main__":
+    write(derived(), Path(str(files("fuzzy.liver") / "data")))

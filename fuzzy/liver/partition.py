@@ -1,0 +1,257 @@
+"""Sets that partition the scale of stiffness, and systems of them that follow the reading.
+
+Neighbouring sets cross at one half and the centres lie evenly on a logarithmic scale, where
+readings spread alike at every stiffness. A set is a Gaussian with a width for either flank; the
+outermost ones stay at 1. A rule concludes the stiffness expected of a liver whose readings stand at
+the centres of its sets: exp(shift + power * mean of ln consequent), over the sets of its
+antecedent. Shift and power, by the number of diseases, take back what the centroid of several
+clipped sets adds. All in kPa.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache, lru_cache, partial
+from itertools import groupby, product
+from math import exp, hypot, inf, log, sqrt
+from typing import NamedTuple
+
+from fuzzy.liver.bases import KNOWLEDGE
+from fuzzy.liver.knowledge import (
+    OUTPUT,
+    SetRecord,
+    Severity,
+    output_records,
+    parameters,
+    rows,
+)
+from fuzzy.liver.readings import READINGS, disease_sets
+from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
+from fuzzy.liver.table1 import AETIOLOGIES, Cell
+from fuzzy.systems.sets import Footprint, FuzzySet
+from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
+
+HALF_WIDTH = sqrt(2.0 * log(2.0))
+"""Distance, in standard deviations, at which a Gaussian is one half."""
+
+
+class PlacedSet(NamedTuple):
+    """One set of an input [kPa]: centre, where it crosses the next one, what it alone concludes."""
+
+    name: str
+    centre: float
+    crossing: float
+    consequent: float
+
+
+class Combination(NamedTuple):
+    """How the consequents of the sets of so many diseases make that of their rule."""
+
+    shift: float
+    power: float
+
+    def consequent(self, members: Sequence[float]) -> float:
+        """Stiffness [kPa] concluded, within what the output's universe can show undisturbed."""
+        p = parameters()
+        expected = exp(self.shift + self.power * sum(map(log, members)) / len(members))
+        return min(max(expected, p["concluded_low"]), p["concluded_high"])
+
+
+class Placement(NamedTuple):
+    """A whole knowledge base: sets by aetiology, combinations by their number of diseases."""
+
+    sets: Mapping[str, tuple[PlacedSet, ...]]
+    combinations: Mapping[int, Combination]
+
+
+@cache
+def placement(knowledge: str) -> Placement:
+    """The knowledge base of that name as `fuzzy.liver.derivation` has written it."""
+    placed = [row for row in rows("partition.csv") if row["knowledge"] == knowledge]
+    return Placement(
+        {
+            name: tuple(
+                PlacedSet(
+                    row["set"],
+                    float(row["centre_kpa"]),
+                    float(row["crossing_kpa"] or "inf"),
+                    float(row["consequent_kpa"]),
+                )
+                for row in found
+            )
+            for name, found in groupby(placed, lambda row: row["aetiology"])
+        },
+        {
+            int(row["diseases"]): Combination(float(row["shift"]), float(row["power"]))
+            for row in rows("combination.csv")
+            if row["knowledge"] == knowledge
+        },
+    )
+
+
+def reading_noise() -> float:
+    """Relative standard deviation of one reading: that of the exam and that between operators."""
+    return hypot(parameters()["exam_noise"], parameters()["operator_noise"])
+
+
+def footprint_half_width(settings: LiverSettings, readings: int) -> float:
+    """Relative half-width of every input set's footprint for a patient with so many readings.
+
+    Readings of one liver err independently, so that together they leave less uncertain.
+    """
+    return settings.footprint_factor * parameters()["band"] * reading_noise() / sqrt(readings)
+
+
+def following_system(
+    placed: Placement, settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES
+) -> FuzzySystem:
+    """The system of a placement, in kPa, for a patient with readings of the aetiologies `present`.
+
+    Rules on the most diseases outweigh those on fewer of them, which speak for patients with no
+    more readings. ValueError if no cell of Table I has only diseases that are present.
+    """
+    reading = settings.base.reading
+    own = placed is placement(settings.knowledge)
+    made = _kept(settings.knowledge, present) if own else _concluded(placed, present, reading)
+    rules, levels = made
+    p = parameters()
+    return FuzzySystem(
+        inputs=tuple(
+            _input(name, placed.sets[name], partial(_footprint, settings, len(present)))
+            for name in AETIOLOGIES
+        ),
+        output=Variable(OUTPUT, p["output_low"], p["output_high"], tuple(map(_output_set, levels))),
+        rules=rules,
+        name=f"liver-{settings.knowledge}",
+    )
+
+
+@lru_cache(maxsize=64)
+def _kept(knowledge: str, present: tuple[str, ...]) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
+    """Rules of a knowledge base, up to some ten thousand, which no other setting changes."""
+    return _concluded(placement(knowledge), present, KNOWLEDGE[knowledge].reading)
+
+
+def _concluded(
+    placed: Placement, present: Sequence[str], reading: str
+) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
+    """Rules of a placement, and the levels of the output sets that they conclude."""
+    cells = antecedents(present, reading)
+    concluded = list(_rules(placed, cells, max(map(len, cells))))
+    levels = sorted({level for _, level, _ in concluded})
+    index = {level: k for k, level in enumerate(levels)}
+    return tuple(Rule(terms, index[level], weight=w) for terms, level, w in concluded), tuple(
+        levels
+    )
+
+
+def antecedents(present: Sequence[str], reading: str) -> list[Cell]:
+    """Cells of Table I all of whose diseases are present. ValueError if there is none."""
+    found = [cell for cell in disease_sets(READINGS[reading]) if {*cell} <= {*present}]
+    if not found:
+        raise ValueError(
+            f"no rule on {' and '.join(present) or 'no aetiology'} alone: give a reading, or set "
+            "absent to normal"
+        )
+    return found
+
+
+def _rules(
+    placed: Placement, cells: Sequence[Cell], most: int
+) -> Iterator[tuple[tuple[Term, ...], int, float]]:
+    """Antecedent, level of the output set and weight of every rule."""
+    for cell in cells:
+        combination = placed.combinations[len(cell)]
+        weight = parameters()["outweighed"] ** (most - len(cell))
+        for members in product(*(tuple(enumerate(placed.sets[name])) for name in cell)):
+            terms = tuple(
+                Term(AETIOLOGIES.index(name), k) for name, (k, _) in zip(cell, members, strict=True)
+            )
+            expected = combination.consequent([one.consequent for _, one in members])
+            yield terms, level_of(expected), weight
+
+
+def level_of(stiffness: float) -> int:
+    """Number of the output set nearest to a stiffness [kPa]; they are a fixed ratio apart."""
+    return round(log(stiffness) / log(parameters()["output_ratio"]))
+
+
+def _output_set(level: int) -> FuzzySet:
+    """A narrow Gaussian: alike for all levels, so that none pulls the centroid by its area."""
+    centre = parameters()["output_ratio"] ** level
+    return FuzzySet(f"about-{centre:.3g}", "gaussmf", (parameters()["output_sd"], centre))
+
+
+def _footprint(settings: LiverSettings, readings: int, centre: float) -> Footprint:
+    half_width = footprint_half_width(settings, readings)
+    return FOOTPRINTS[settings.footprint].footprint(half_width, centre)
+
+
+def _input(
+    name: str, placed: Sequence[PlacedSet], footprint: Callable[[float], Footprint]
+) -> Variable:
+    p = parameters()
+    crossings = [one.crossing for one in placed[:-1]]
+    sets = tuple(
+        _set(one, below, above, footprint(one.centre))
+        for one, below, above in zip(placed, [None, *crossings], [*crossings, None], strict=True)
+    )
+    return Variable(name, p["input_low"], p["input_high"], sets)
+
+
+def _set(
+    one: PlacedSet, below: float | None, above: float | None, footprint: Footprint
+) -> FuzzySet:
+    # The flat sides end so far out that no footprint moves their ends into the universe.
+    far = parameters()["plausible_high"]
+    left, right = flanks(one, below, above)
+    core = (-far if below is None else one.centre, far if above is None else one.centre)
+    return FuzzySet(one.name, "gauss2mf", (left, core[0], right, core[1]), footprint)
+
+
+def flanks(one: PlacedSet, below: float | None, above: float | None) -> tuple[float, float]:
+    """Standard deviations [kPa] of both flanks; a flat side has that of the other, for show."""
+    widths = [
+        None if crossing is None else abs(crossing - one.centre) / HALF_WIDTH
+        for crossing in (below, above)
+    ]
+    left, right = widths
+    return (left or right or 1.0), (right or left or 1.0)
+
+
+def following_records(placed: Placement) -> tuple[SetRecord, ...]:
+    """Record of every input set, in the order of AETIOLOGIES: all placed by this study."""
+    return tuple(
+        _record(name, one, below)
+        for name in AETIOLOGIES
+        for one, below in zip(
+            placed.sets[name], [None, *(s.crossing for s in placed.sets[name])], strict=False
+        )
+    )
+
+
+def _record(aetiology: str, one: PlacedSet, below: float | None) -> SetRecord:
+    noise = parameters()
+    return SetRecord(
+        aetiology=aetiology,
+        stage=one.name,
+        severity=_severity(one.consequent),
+        placement="partition",
+        centre=one.centre,
+        centre_source="this-study",
+        within_stage_sd=max(flanks(one, below, one.crossing if one.crossing < inf else None)),
+        sd_kind="flank",
+        sd_source="this-study",
+        between_study=noise["exam_noise"],
+        between_study_kind="exam",
+        between_study_source="nhanes2017",
+        between_operator=noise["operator_noise"],
+        between_operator_kind="transferred",
+        between_operator_source="fraquelli2007",
+        n=None,
+        sourced="no",
+        note="",
+    )
+
+
+def _severity(stiffness: float) -> Severity:
+    """The severity whose output set has its centre nearest to a stiffness [kPa]."""
+    return min(output_records(), key=lambda one: abs(log(one.centre / stiffness))).severity

@@ -1,0 +1,87 @@
+"""What the difference of each lattice from a reference is made of, as sentences and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from reports.appearance import labels, reference_name
+from reports.differences import resolved
+from reports.digits import DASH, Table, fixed, percent
+from study.results.folder import Results
+from study.results.records import BudgetPart, ErrorBudget
+
+CAUSES = {"stiffness": "estimate of stiffness"}
+"""Causes that read better otherwise, against finite elements."""
+SMALL = 5e-4
+"""Share below which a contribution is printed as zero."""
+
+
+def budgets(results: Results) -> list[dict[str, object]]:
+    """A table per reference: a row a cause, two columns a model, contribution and what is left."""
+    return [_table(results, reference, of) for reference, of in by_reference(results).items()]
+
+
+def by_reference(results: Results) -> dict[str, list[ErrorBudget]]:
+    """Budgets of a run by what they are taken against."""
+    found: dict[str, list[ErrorBudget]] = {}
+    for budget in results.record.budgets:
+        found.setdefault(budget.reference, []).append(budget)
+    return found
+
+
+def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[str, object]:
+    causes = [part.cause for part in found[0].parts]
+    rows: Table = [
+        ["whole", *(c for one in found for c in (resolved(one.total, one.total_error), DASH, ""))]
+    ]
+    for i, cause in enumerate(causes):
+        cells = [text for one in found for text in _cells(one.parts[i])]
+        rows.append([cause_name(cause, reference), *cells])
+    named = labels(results)
+    return {
+        "reference": reference_name(results, reference),
+        "models": [named[one.model] for one in found],
+        "rows": rows,
+    }
+
+
+def _whole(budget: ErrorBudget) -> tuple[str, str, str]:
+    error = DASH if budget.total_error is None else f"± {percent(budget.total_error)}"
+    return resolved(budget.total, budget.total_error), error, ""
+
+
+def cause_name(cause: str, reference: str) -> str:
+    """A cause in print."""
+    return CAUSES.get(cause, cause) if reference == "fem" else cause
+
+
+def _cells(part: BudgetPart) -> tuple[str, str, str]:
+    error = "" if not part.error else f"± {percent(part.error)}"
+    return signed(part.contribution), error, "0" if part.left < SMALL else percent(part.left)
+
+
+def signed(share: float) -> str:
+    """A contribution in per cent with its sign."""
+    if abs(share) < SMALL:
+        return "0"
+    return f"{'+' if share > 0 else '−'}{fixed(100.0 * abs(share), 1)} %"
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """Whether a better estimate would help, and what else would: of the most different model."""
+    found = by_reference(results).get("fem")
+    if not found:
+        return
+    named = labels(results)
+    worst = max(found, key=lambda one: one.total)
+    parts = [part for part in worst.parts if part.cause != "remainder" and part.size >= SMALL]
+    steps = ", ".join(f"{cause_name(part.cause, 'fem')} {percent(part.left)}" for part in parts)
+    if steps:
+        yield (
+            f"Error budget: the field of {named[worst.model]} is {percent(worst.total)} off the "
+            f"finite elements; with one cause after another mended there is left, {steps}."
+        )
+    largest = max(parts, key=lambda part: part.contribution, default=None)
+    if largest is not None:
+        name = cause_name(largest.cause, "fem")
+        yield f"The largest part of it, {signed(largest.contribution)}, is the {name}."

@@ -1,0 +1,202 @@
+"""The paper's ranking over all that the paper leaves open: tables of `robustness` in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from importlib.resources.abc import Traversable
+from itertools import groupby
+
+from reports.appearance import SYSTEM_NAMES, system_name
+from reports.benchmarks import Line, read
+from reports.digits import Table, count, fixed, percent, significant, words
+from reports.paper import TABLE_III
+from reports.tables import CURVE_NAMES, MEASURE_NAMES
+from study.results.folder import Results
+
+NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
+    "ranking_nearest",
+    "ranking_differences",
+    "ranking_table_iii",
+    "ranking_indices",
+    "ranking_nearest_draws",
+    "ranking_unknowns",
+    "ranking_spacing",
+)
+MOST_NAMED = 4
+CLAIM = "interval-type-2"
+"""The system that the paper finds nearest to the benchmark."""
+
+
+def is_ranked(results: Results) -> bool:
+    """Whether a run ranks fuzzy systems by their likeness to the benchmark."""
+    names = [model.name for model in results.record.models]
+    return "basafa" in names and len(results.record.fuzzy.systems) > 1
+
+
+def ranking_study(folder: Traversable | None = None) -> dict[str, object] | None:
+    """What the study found, as sentences and tables; None where it was not delivered.
+
+    Without a folder, of the tables that come with the program.
+    """
+    nearest = read(NEAREST, folder)
+    if not nearest:
+        return None
+    return {
+        "sentences": list(sentences(folder)),
+        "systems": [system_name(system) for system in SYSTEM_NAMES],
+        "nearest": nearest_rows(nearest),
+        "differences": difference_rows(read(DIFFERENCES, folder)),
+        "table_iii": table_iii_rows(read(TABLE_THREE, folder)),
+        "unknowns": [
+            [words(line["unknown"].replace("_", " ")), words(line["range"]), words(line["meaning"])]
+            for line in read(UNKNOWNS, folder)
+        ],
+    }
+
+
+def sentences(folder: Traversable | None = None) -> Iterator[str]:
+    """Whether the paper's order holds, how far scores lie apart, and what moves them."""
+    nearest = read(NEAREST, folder)
+    yield _winners(nearest)
+    yield _apart(read(DIFFERENCES, folder))
+    yield _reproduced(read(TABLE_THREE, folder))
+    yield _movers(read(INDICES, folder))
+    yield from _over_spacing(read(SPACING, folder))
+
+
+def column(line: Line) -> str:
+    """Curve and measure of a line, in print."""
+    curve, measure = line["curve"], line["measure"]
+    return f"{CURVE_NAMES.get(curve, curve)}, {MEASURE_NAMES.get(measure, measure)}"
+
+
+def nearest_rows(lines: Sequence[Line]) -> Table:
+    """A row a measure: share of draws in which each system is nearest, with its interval; ties."""
+    rows = []
+    for name, group in groupby(lines, column):
+        found = {line["system"]: line for line in group}
+        cells = [_share(found[system]) for system in SYSTEM_NAMES]
+        rows.append([name, *cells, percent(float(next(iter(found.values()))["tied"]))])
+    return rows
+
+
+def _share(line: Line) -> str:
+    low, high = (fixed(100.0 * float(line[key]), 1) for key in ("low", "high"))
+    return f"{percent(float(line['share']))} ({low}–{high})"
+
+
+def difference_rows(lines: Sequence[Line]) -> Table:
+    """A row a measure and pair: quantiles of the difference, and the paper's place in them."""
+    return [
+        [
+            column(line),
+            f"{system_name(line['system'])} − {system_name(line['other'])}",
+            *(fixed(float(line[key]), 4) for key in ("p05", "p25", "p50", "p75", "p95")),
+            fixed(float(line["paper"]), 4),
+            percent(float(line["within_paper"])),
+            percent(float(line["paper_sign"])),
+        ]
+        for line in lines
+    ]
+
+
+def table_iii_rows(lines: Sequence[Line]) -> Table:
+    """A row a measure: how near any draw comes to Table III, and how many come how near."""
+    return [
+        [
+            column(line),
+            fixed(float(line["nearest"]), 4),
+            *(count(int(line[key])) for key in ("within_rounding", "within_0005", "within_005")),
+            count(int(line["in_order_of_those"])),
+        ]
+        for line in lines
+    ]
+
+
+def _winners(lines: Sequence[Line]) -> str:
+    shares = [(float(line["share"]), column(line)) for line in lines if line["system"] == CLAIM]
+    low, high = min(shares), max(shares)
+    of_system = {
+        system: [float(line["share"]) for line in lines if line["system"] == system]
+        for system in SYSTEM_NAMES
+    }
+    most = max(of_system, key=lambda system: sum(of_system[system]))
+    return (
+        f"Of {count(int(lines[0]['draws']))} draws of all that the paper leaves open, "
+        f"{system_name(CLAIM)}, the paper's best, is nearest to the benchmark in {percent(low[0])} "
+        f"({low[1]}) to {percent(high[0])} ({high[1]}); most often it is {system_name(most)}, in "
+        f"{percent(min(of_system[most]))} to {percent(max(of_system[most]))}."
+    )
+
+
+def _apart(lines: Sequence[Line]) -> str:
+    pair = [line for line in lines if {line["system"], line["other"]} == {CLAIM, "mamdani"}]
+    shares = [float(line["within_paper"]) for line in pair]
+    printed = abs(TABLE_III[CLAIM] - TABLE_III["mamdani"])
+    signs = [float(line["paper_sign"]) for line in pair]
+    return (
+        f"The two best of the paper lie {fixed(printed, 4)} apart; in {percent(min(shares))} to "
+        f"{percent(max(shares))} of the draws, by measure, ours lie no further apart, and in "
+        f"{percent(min(signs))} to {percent(max(signs))} in the paper's order."
+    )
+
+
+def _reproduced(lines: Sequence[Line]) -> str:
+    exact = sum(int(line["within_rounding"]) for line in lines)
+    best = min(lines, key=lambda line: float(line["nearest"]))
+    close, draws = sum(int(line["within_005"]) for line in lines), int(lines[0]["draws"])
+    verb = "reproduces" if exact < 2 else "reproduce"
+    number = "No draw" if exact == 0 else count(exact)
+    return (
+        f"{number} of {count(draws)} {verb} Table III to its four digits by any of the "
+        f"{len(lines)} measures; the nearest is off by {significant(float(best['nearest']), 2)} "
+        f"({column(best)}), and {count(close)} of {count(draws * len(lines))} scores of all three "
+        f"systems are within 0.005 of it."
+    )
+
+
+def _movers(lines: Sequence[Line]) -> str:
+    """The unknowns with the largest total indices on the lead of the paper's best two."""
+    lead = f"mamdani - {CLAIM}"
+    totals: dict[str, list[float]] = {}
+    for line in lines:
+        if line["output"] == lead:
+            totals.setdefault(line["unknown"], []).append(float(line["total"]))
+    mean = {unknown: sum(values) / len(values) for unknown, values in totals.items()}
+    named = sorted(mean, key=lambda unknown: -mean[unknown])[:MOST_NAMED]
+    parts = ", ".join(f"{words(name.replace('_', ' '))} {fixed(mean[name], 2)}" for name in named)
+    return (
+        f"The lead of {system_name(CLAIM)} over Mamdani is moved most by (total Sobol' index, mean "
+        f"over measures): {parts}."
+    )
+
+
+def _over_spacing(lines: Sequence[Line]) -> Iterator[str]:
+    """Within which reference spacings each system wins, by how many measures."""
+    if not lines:
+        return
+    wins = winners_over_spacing(lines)
+    spacings = sorted({spacing for spacing, _ in wins})
+    low, high = 1e3 * spacings[0], 1e3 * spacings[-1]
+    found = sorted(set(wins.values()))
+    parts = "; ".join(f"{system_name(system)} {_where(wins, system)}" for system in found)
+    yield (
+        f"With the reference spacing alone between {fixed(low, 1)} and {fixed(high, 1)} mm and all "
+        f"else as in the paper scene, the nearest system changes: {parts}."
+    )
+
+
+def winners_over_spacing(lines: Sequence[Line]) -> dict[tuple[float, str], str]:
+    """The system with the highest score at each spacing [m] by each measure in print."""
+    best: dict[tuple[float, str], tuple[float, str]] = {}
+    for line in lines:
+        key = float(line["spacing_m"]), column(line)
+        best[key] = max(best.get(key, (-1.0, "")), (float(line["score"]), line["system"]))
+    return {key: system for key, (_, system) in best.items()}
+
+
+def _where(wins: dict[tuple[float, str], str], system: str) -> str:
+    where = [spacing for (spacing, _), winner in wins.items() if winner == system]
+    span = f"from {fixed(1e3 * min(where), 1)} to {fixed(1e3 * max(where), 1)} mm"
+    share = len(where) / len(wins)
+    return f"{span} ({percent(share)} of spacings and measures)"

@@ -1,0 +1,125 @@
+"""The cohort study at the command line: its table as CSV, and what it comes to as lines.
+
+cohort.csv has a row per contender and group, with the columns of
+`fuzzy.liver.cohort.CohortRow`: stiffness in Pa, shares of one, empty where a column does not apply.
+`displacement_rms` is for a tool pressed by a force, whose displacement goes as one over the
+stiffness.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from fuzzy.liver.bases import KNOWLEDGE
+from fuzzy.liver.cohort import NOMINAL, CohortRow, CohortStudy, Comparison, cohort_study
+from fuzzy.systems.sets import Array
+
+PA_PER_KPA = 1e3
+HEAD = ("contender", "bias kPa", "rms kPa", "rms 1", "95 %", "rms 2+", "displ.", "in band", "width")
+WIDTHS = (30, 9, 8, 7, 13, 7, 7, 8, 6)
+DIGITS = 4
+
+
+def judged(patients: int, seed: int) -> CohortStudy:
+    """The cohort study with a tool's displacement under a force. ValueError for too few patients.
+
+    A negative seed is a ValueError too.
+    """
+    if seed < 0:
+        raise ValueError(f"--seed {seed}: give 0 or more")
+    return cohort_study(patients, seed, compliance)
+
+
+def compliance(stiffness: Array) -> Array:
+    """Displacement of a linear body under a given force, up to a factor."""
+    return 1.0 / stiffness
+
+
+def write_cohort(rows: Iterable[CohortRow], path: Path) -> None:
+    """Write all rows, the fields of CohortRow as columns. ValueError if it cannot be written."""
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(CohortRow._fields)
+            writer.writerows([_cell(value) for value in row] for row in rows)
+    except OSError as error:
+        raise ValueError(f"--out {path}: cannot be written ({error.strerror})") from error
+
+
+def _cell(value: str | float) -> str:
+    if isinstance(value, str | int):
+        return str(value)
+    return f"{value:.{DIGITS}g}" if math.isfinite(value) else ""
+
+
+def cohort_lines(study: CohortStudy) -> Iterator[str]:
+    """A line per contender over all patients, then what the comparisons come to."""
+    by_group = {(row.contender, row.readings): row for row in study.rows if row.aetiology == "all"}
+    (every, *_) = study.rows
+    yield f"{every.patients} virtual patients; rms and width over the true stiffness, by readings"
+    yield _aligned(HEAD)
+    for name in dict.fromkeys(row.contender for row in study.rows):
+        whole, one, more = (by_group[name, readings] for readings in ("all", "1", "2 or more"))
+        yield _aligned(_cells(whole, one, more))
+    yield from map(_sentence, study.comparisons)
+    yield from _bands(study.rows)
+    yield from _falls(study.rows)
+
+
+def _cells(whole: CohortRow, one: CohortRow, more: CohortRow) -> tuple[str, ...]:
+    return (
+        whole.contender,
+        f"{whole.bias / PA_PER_KPA:.2f}",
+        f"{whole.rms / PA_PER_KPA:.2f}",
+        _percent(one.relative_rms),
+        f"{_percent(one.relative_rms_low)}-{_percent(one.relative_rms_high)}",
+        _percent(more.relative_rms),
+        _percent(whole.displacement_rms),
+        _percent(whole.coverage),
+        _percent(whole.width),
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f}" if math.isfinite(share) else ""
+
+
+def _aligned(cells: Iterable[str]) -> str:
+    named, *numbers = zip(cells, WIDTHS, strict=True)
+    right = (f"{cell:>{width}}" for cell, width in numbers)
+    return "  ".join([f"{named[0]:<{named[1]}}", *right]).rstrip()
+
+
+def _sentence(found: Comparison) -> str:
+    low, change, high = (100 * x for x in (found.low, found.difference, found.high))
+    return (
+        f"readings {found.readings}: {found.fuzzy}, the best fuzzy system, is {found.verdict} than "
+        f"{found.baseline}: its rms error {change:+.2f} points ({low:+.2f} to {high:+.2f})"
+        if found.verdict != "undecided"
+        else f"readings {found.readings}: {found.fuzzy}, the best fuzzy system, and "
+        f"{found.baseline} are not told apart: {change:+.2f} points ({low:+.2f} to {high:+.2f})"
+    )
+
+
+def _bands(rows: Iterable[CohortRow]) -> Iterator[str]:
+    following = tuple(f"{name} " for name, base in KNOWLEDGE.items() if base.follows)
+    for row in rows:
+        whole = (row.aetiology, row.readings) == ("all", "all")
+        if whole and row.contender.startswith(following) and math.isfinite(row.coverage):
+            yield (
+                f"{row.contender}: its interval, nominally of {100 * NOMINAL:.0f} %, holds "
+                f"{100 * row.coverage:.1f} % of the patients"
+            )
+
+
+def _falls(rows: Iterable[CohortRow]) -> Iterator[str]:
+    """What falls where it should rise, with one reading alone."""
+    falling: dict[str, float] = {}
+    for row in rows:
+        if row.largest_fall > 0:  # nor for NaN
+            falling[row.contender] = max(row.largest_fall, falling.get(row.contender, 0.0))
+    for name, fall in falling.items():
+        yield f"{name}: falls by up to {100 * fall:.2g} % where one reading rises"

@@ -1,0 +1,40 @@
+"""Numerical errors of the curves that a score compares, as far as they are estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from study.results.records import CurveErrors, ModelRecord
+
+
+def numerical_errors(
+    reference: ModelRecord, models: Sequence[ModelRecord], probe: str, curve: str
+) -> list[float | None]:
+    """Relative L2 errors of curves by the time steps, and by mesh and subspace of the reference.
+
+    Their sum bounds, about, how far a relative L2 score of these models moves or their difference;
+    for other measures it is a yardstick. None stands for one that is not estimated. A spring
+    lattice is a model at its spacing and has none by its mesh.
+    """
+    compared = [reference, *models]
+    steps = [_of_curve(curve, model.time_step_errors.get(probe)) for model in compared]
+    elements = reference.elements
+    if elements is None:
+        return steps
+    mesh = elements.mesh_error
+    by_mesh = None if mesh is None else _of_curve(curve, mesh.by_probe.get(probe))
+    return [*steps, by_mesh, elements.truncation_error or 0.0]
+
+
+def whole_error(parts: Sequence[float | None]) -> float | None:
+    """Sum of errors, None unless all of them are known."""
+    known = [part for part in parts if part is not None]
+    return sum(known) if len(known) == len(parts) else None
+
+
+def _of_curve(curve: str, errors: CurveErrors | None) -> float | None:
+    """A loop of the phase plane has the larger of its two."""
+    if errors is None:
+        return None
+    found = {"displacement": errors.displacement, "velocity": errors.velocity}
+    return found.get(curve, max(found.values()))

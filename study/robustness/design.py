@@ -1,0 +1,34 @@
+"""The draws: Saltelli's design for Sobol's indices, on SciPy's scrambled Sobol points."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.robustness.unknowns import UNKNOWNS
+
+Floats = NDArray[np.float64]
+
+
+def check_size(size: int) -> None:
+    """ValueError unless a size is a power of two, as the points are even only so."""
+    if size < 2 or size & (size - 1):
+        raise ValueError(f"size: {size} is no power of two; give 256, 4096 or the like")
+
+
+def shares(seed: int, size: int) -> Floats:
+    """Shares (size, unknowns + 2, unknowns) of the unknowns' ranges.
+
+    Of each row the first two are points A and B that have nothing to do with each other; the others
+    are A with the value of one unknown taken from B. ValueError unless `size` is a power of two.
+    """
+    from scipy.stats import qmc
+
+    check_size(size)
+    count = len(UNKNOWNS)
+    points = qmc.Sobol(2 * count, seed=seed).random(size)
+    found = np.repeat(points[:, None, :count], count + 2, axis=1)
+    found[:, 1] = points[:, count:]
+    for i in range(count):
+        found[:, i + 2, i] = points[:, count + i]
+    return found

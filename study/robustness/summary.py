@@ -1,0 +1,139 @@
+"""Draws summed up: who is nearest, by how much, whether Table III comes out, what moves scores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.robustness.block import SYSTEMS
+from study.robustness.rows import Difference, Index, Nearest, TableThree
+from study.robustness.unknowns import UNKNOWNS
+from study.similarity.batch import COLUMNS
+
+Floats = NDArray[np.float64]
+
+TABLE_III = {"mamdani": 0.8580, "sugeno": 0.8549, "interval-type-2": 0.8598}
+"""The paper's similarity of each system to the benchmark, by a measure that it does not name."""
+ROUNDING = 0.5e-4
+"""Of the paper's four digits."""
+TIE = 1e-6
+"""Scores closer than this are equal: a hundred times the accuracy of the motions."""
+BOOTSTRAPS = 200
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Stiffness [Pa] (size, unknowns + 2, 3) and scores (.., 3, measures) over the design."""
+
+    estimates: Floats
+    scores: Floats
+
+    def independent(self) -> Floats:
+        """Scores (draws, 3, measures) at the points A and B, without those not finite."""
+        scores = self.scores[:, :2].reshape(-1, *self.scores.shape[2:])
+        return scores[np.isfinite(scores).all(axis=(1, 2))]
+
+
+def nearest(found: Draws) -> Iterator[Nearest]:
+    """How often each system is nearest to the benchmark, by measure."""
+    scores = found.independent()
+    for m, column in enumerate(COLUMNS):
+        ordered = np.sort(scores[:, :, m], axis=1)
+        tied = ordered[:, -1] - ordered[:, -2] < TIE
+        best = scores[:, :, m].argmax(axis=1)
+        for s, system in enumerate(SYSTEMS):
+            count = int(((best == s) & ~tied).sum())
+            low, high = _wilson(count, len(scores))
+            yield Nearest(
+                *column, system, count / len(scores), low, high, float(tied.mean()), len(scores)
+            )
+
+
+def _wilson(count: int, of: int) -> tuple[float, float]:
+    from scipy.stats import binomtest
+
+    interval = binomtest(count, of).proportion_ci(0.95, "wilson")
+    return float(interval.low), float(interval.high)
+
+
+def differences(found: Draws) -> Iterator[Difference]:
+    """Distribution of the score differences of every two systems, by measure."""
+    scores = found.independent()
+    for m, column in enumerate(COLUMNS):
+        for a, b in combinations(range(len(SYSTEMS)), 2):
+            change = scores[:, a, m] - scores[:, b, m]
+            printed = TABLE_III[SYSTEMS[a]] - TABLE_III[SYSTEMS[b]]
+            quantiles = np.percentile(change, (5, 25, 50, 75, 95))
+            within = float((np.abs(change) <= abs(printed)).mean())
+            same = float((np.sign(change) == np.sign(printed)).mean())
+            p05, p25, p50, p75, p95 = map(float, quantiles)
+            pair = (*column, SYSTEMS[a], SYSTEMS[b])
+            yield Difference(*pair, p05, p25, p50, p75, p95, printed, within, same)
+
+
+def table_three(found: Draws) -> Iterator[TableThree]:
+    """How near any draw comes to the paper's three scores, by measure."""
+    printed = np.array([TABLE_III[system] for system in SYSTEMS])
+    scores = found.scores.reshape(-1, *found.scores.shape[2:])
+    order = list(np.argsort(printed))
+    for m, column in enumerate(COLUMNS):
+        away = np.abs(scores[:, :, m] - printed).max(axis=1)
+        away = np.where(np.isfinite(away), away, np.inf)
+        close = away <= 5e-3
+        in_order = (np.diff(scores[close][:, order, m], axis=1) > 0.0).all(axis=1)
+        yield TableThree(
+            *column,
+            float(away.min()),
+            int(away.argmin()),
+            int((away <= ROUNDING).sum()),
+            int((away <= 5e-4).sum()),
+            int(close.sum()),
+            int(in_order.sum()),
+            int(np.isfinite(away).sum()),
+        )
+
+
+def indices(found: Draws) -> Iterator[Index]:
+    """Sobol's indices of each system's score, and of each lead, on every unknown, by measure.
+
+    Rows of the design with a motion that did not finish are left out.
+    """
+    kept = found.scores[np.isfinite(found.scores).all(axis=(1, 2, 3))]
+    for m, column in enumerate(COLUMNS):
+        for name, values in _outputs(kept[..., m]):
+            for unknown, numbers in zip(UNKNOWNS, sobol(values), strict=True):
+                yield Index(*column, name, unknown.name, *map(float, numbers))
+
+
+def sobol(values: Floats) -> Floats:
+    """First-order and total index, each with the ends of its 95 % interval, (unknowns, 6).
+
+    Of an output (size, unknowns + 2) over the design. Intervals are percentiles of seeded
+    bootstraps over its rows, which SciPy's `sobol_indices` cannot seed; without, they are equal.
+    """
+    rows = np.random.default_rng(0).integers(len(values), size=(BOOTSTRAPS, len(values)))
+    first, total = _estimated(values)
+    again = np.stack([_estimated(values[chosen]) for chosen in rows], axis=-1)
+    (f_low, t_low), (f_high, t_high) = np.percentile(again, (2.5, 97.5), axis=-1)
+    return np.stack([first, f_low, f_high, total, t_low, t_high], axis=1)
+
+
+def _estimated(values: Floats) -> tuple[Floats, Floats]:
+    """Indices by Saltelli et al. 2010, doi 10.1016/j.cpc.2009.09.018, table 2 (b) and (f)."""
+    centred = values - values[:, :2].mean()
+    a, b, mixed = centred[:, :1], centred[:, 1:2], centred[:, 2:]
+    variance = centred[:, :2].var() or 1.0  # of an output that never changes
+    first = (b * (mixed - a)).mean(axis=0) / variance
+    return first, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
+
+
+def _outputs(scores: Floats) -> Iterator[tuple[str, Floats]]:
+    """Each system's score, then the lead of one system over another, (size, unknowns + 2) each."""
+    for s, system in enumerate(SYSTEMS):
+        yield system, scores[..., s]
+    for a, b in combinations(range(len(SYSTEMS)), 2):
+        yield f"{SYSTEMS[a]} - {SYSTEMS[b]}", scores[..., a] - scores[..., b]

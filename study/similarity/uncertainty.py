@@ -1,0 +1,176 @@
+"""How far the scores of a pair of motions depend on how the motion was observed.
+
+Scores are computed once more without each block of the motion, from every second sample, over
+shorter windows and on other axes of the phase plane. The same is done for every pair, so that two
+models can be compared block by block: the difference of their scores is then far better known than
+either score.
+
+Interval. It is the delete-block jackknife (Kuensch 1989, doi 10.1214/aos/1176347265): the motion is
+cut into equal blocks, a score is computed without each in turn, and what these differ by, scaled to
+the whole, times Student's t, is half the interval. Five and ten blocks are tried and the wider
+interval is kept, for how long a deviation lasts is not known. A bootstrap would lay blocks behind
+each other in random order, and a loop, a slope or a time warping across their joints is none; what
+is left out here leaves one joint. It says how evenly a score is borne by the motion: how far it
+would move had another stretch of the same kind been recorded. A push and its release are no
+stationary process, so it is a yardstick of 95 % and no probability, and it knows nothing of the
+errors of the models. Scores that are held at 0 or 1 have none.
+
+Curves of more than LONGEST samples are thinned first, to bound the cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.problem.response import Motion
+from study.similarity import batch
+from study.similarity.score import MEASURES, curve
+
+Floats = NDArray[np.float64]
+Pair = tuple[Motion, Motion]
+"""Candidate and reference."""
+
+BLOCK_COUNTS = (5, 10)
+LEVEL = 0.95
+LONGEST = 401
+CUTS = ((0.1, 0.0), (0.0, 0.1), (0.2, 0.0), (0.1, 0.1), (0.0, 0.2))
+"""Shares of the samples that the windows leave out at the start and at the end."""
+WHOLE_RANGE = 1.0
+"""Of a score, for what is not defined on a part of the motion and so is not known."""
+
+
+@dataclass(frozen=True)
+class Variants:
+    """Scores of a pair computed in other ways, or differences of such scores, by m measures.
+
+    `whole` (m,); `blocks` (k, m) without each of k blocks, for every entry of BLOCK_COUNTS;
+    `halved` (m,) from every second sample; `windows` (5, m) over those of CUTS; `axes` (2, m) with
+    the phase plane divided by the larger reach of both curves, and by the reference's root mean
+    square. NaN where the reference does not move in what is left.
+    """
+
+    whole: Floats
+    blocks: tuple[Floats, ...]
+    halved: Floats
+    windows: Floats
+    axes: Floats
+
+    def __sub__(self, other: Variants) -> Variants:
+        """Differences, each of the same blocks, samples, window and axes of both."""
+        return Variants(
+            self.whole - other.whole,
+            tuple(a - b for a, b in zip(self.blocks, other.blocks, strict=True)),
+            self.halved - other.halved,
+            self.windows - other.windows,
+            self.axes - other.axes,
+        )
+
+
+class Spread(NamedTuple):
+    """What scores or differences of two depend on, (m,) each, in units of the score.
+
+    `interval`: half the 95 % block interval; `resampled`: change with every second sample;
+    `window`: range over windows of at least 80 % of the samples; `axes`: largest change with other
+    axes of the phase plane. An interval is infinite, and another part 1, where it is not defined.
+    """
+
+    interval: Floats
+    resampled: Floats
+    window: Floats
+    axes: Floats
+
+
+def variants(candidate: Motion, reference: Motion) -> Variants:
+    """Scores of a pair that `study.similarity.motion.check_pair` accepts, in all these ways."""
+    every = -(-(len(reference.time) - 1) // (LONGEST - 1))
+    pair = _of((candidate, reference), slice(None, None, every))
+    n, whole = len(pair[0].time), _scores(pair)
+    return Variants(
+        whole,
+        tuple(_table(pair, _without_block(n, count)) for count in BLOCK_COUNTS),
+        _scores(_of(pair, slice(None, None, 2))),
+        _table(pair, (slice(round(a * n), n - round(b * n)) for a, b in CUTS)),
+        _on_other_axes(pair, whole),
+    )
+
+
+def spread(found: Variants) -> Spread:
+    """The parts of what scores or differences depend on."""
+    windows = np.vstack([found.whole, found.windows])
+    return Spread(
+        np.max([_half_interval(table) for table in found.blocks], axis=0),
+        _known(np.abs(found.halved - found.whole)),
+        _known(np.ptp(windows, axis=0)),
+        _known(np.abs(found.axes - found.whole).max(axis=0)),
+    )
+
+
+def _half_interval(without: Floats) -> Floats:
+    """Student's t times the jackknife's standard error, of scores (k, m) without each block."""
+    from scipy.special import stdtrit
+
+    count = len(without)
+    apart = without - without.mean(axis=0)
+    error = np.sqrt((count - 1) / count * (apart**2).sum(axis=0))
+    half = stdtrit(count - 1, 0.5 * (1.0 + LEVEL)) * error
+    return np.where(np.isfinite(half), half, np.inf)
+
+
+def _known(change: Floats) -> Floats:
+    return np.where(np.isfinite(change), change, WHOLE_RANGE)
+
+
+def _without_block(n: int, count: int) -> Iterable[NDArray[np.int64]]:
+    """Indices of the samples that are left without each block."""
+    index = np.arange(n)
+    return (np.setdiff1d(index, block) for block in np.array_split(index, min(count, n)))
+
+
+def _of(pair: Pair, part: NDArray[np.int64] | slice) -> Pair:
+    """The same pair at some of its samples."""
+    own, true = (
+        Motion(*(np.ascontiguousarray(x[part]) for x in (m.time, m.displacement, m.velocity)))
+        for m in pair
+    )
+    return own, true
+
+
+def _table(pair: Pair, parts: Iterable[NDArray[np.int64] | slice]) -> Floats:
+    return np.array([_scores(_of(pair, part)) for part in parts])
+
+
+def _scores(pair: Pair) -> Floats:
+    """Scores (m,) in the order of MEASURES; NaN where the reference is at rest."""
+    own, true = pair
+    if min(np.ptp(true.displacement), np.ptp(true.velocity)) <= 0.0:
+        return np.full(sum(map(len, MEASURES.values())), np.nan)
+    compiled = batch.scores(own.displacement, own.velocity, true.displacement, true.velocity)
+    known = dict(zip(batch.COLUMNS, compiled, strict=True))
+    found = (
+        known[column]
+        if (column := (kind, measure.name)) in known
+        else measure.score(curve(own, kind), curve(true, kind))
+        for kind, measures in MEASURES.items()
+        for measure in measures
+    )
+    return np.array(list(found))
+
+
+def _on_other_axes(pair: Pair, whole: Floats) -> Floats:
+    """Scores (2, m), those of anything but the phase plane as they are."""
+    own, true = pair
+    both = ((own.displacement, true.displacement), (own.velocity, true.velocity))
+    reach = [max(np.abs(a).max(), np.abs(b).max()) for a, b in both]
+    root_mean_square = [np.sqrt((b**2).mean()) for _, b in both]
+    names = [(kind, measure.name) for kind, some in MEASURES.items() for measure in some]
+    found = np.tile(whole, (2, 1))
+    for row, (x, y) in zip(found, (reach, root_mean_square), strict=True):
+        arrays = (own.displacement, own.velocity, true.displacement, true.velocity)
+        scores = batch.plane_scores(*arrays, float(x), float(y))
+        row[[names.index(column) for column in batch.COLUMNS[-3:]]] = scores
+    return found

@@ -1,0 +1,87 @@
+"""Vectors inside kernels: at every width the numbers of plain numpy."""
+
+import numpy as np
+import pytest
+from numba import config
+
+from msm import simd
+from msm.kernel import kernel
+from msm.simd import WIDTHS, every, inverse_root, lanes_of, load, root, store, where_not_zero
+
+
+@kernel()
+def compute(lanes, a, b, out):
+    """Everything that vectors can do, a row each, on the columns from 1 on."""
+    for i in range(1, a.shape[1] - len(lanes) + 1, len(lanes)):
+        x, y = load(a, 1, i, lanes), load(b, 0, i, lanes)
+        store(out, 0, i, x + y)
+        store(out, 1, i, 2.0 - x * y)
+        store(out, 2, i, x / y / 3.0)
+        store(out, 3, i, -abs(x))
+        store(out, 4, i, min(x, y))
+        store(out, 5, i, max(x, 0.25))
+        store(out, 6, i, root(y) + every(1.0, lanes))
+        store(out, 7, i, inverse_root(y))
+        store(out, 8, i, where_not_zero(load(a, 0, i, lanes), x, y))
+
+
+def wanted(a, b):
+    x, y = a[1], b[0]
+    return np.stack(
+        [
+            x + y,
+            2.0 - x * y,
+            x / y / 3.0,
+            -np.abs(x),
+            np.minimum(x, y),
+            np.maximum(x, 0.25),
+            np.sqrt(y) + 1.0,
+            1.0 / np.sqrt(y),
+            np.where(a[0] != 0.0, x, y),
+        ]
+    )
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_width_computes_what_numpy_does(width):
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((2, 17)), np.exp(rng.uniform(-50.0, 50.0, (3, 17)))
+    a[0, ::3] = 0.0
+    out = np.zeros((9, 17))
+    compute(lanes_of(width), a, b, out)
+    np.testing.assert_allclose(out[:, 1:], wanted(a, b)[:, 1:], rtol=1e-15, atol=1e-15)
+    assert (out[:, 0] == 0.0).all()  # before the column that it began at
+
+
+@kernel()
+def roots(lanes, q, out):
+    for i in range(0, q.shape[1], len(lanes)):
+        store(out, 0, i, inverse_root(load(q, 0, i, lanes)))
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_inverse_root_is_that_of_ieee_to_two_units(width):
+    q = np.exp(np.linspace(-500.0, 500.0, 80_000))[None]
+    found = np.empty_like(q)
+    roots(lanes_of(width), q, found)
+    assert np.abs(found * np.sqrt(q) - 1.0).max() < 5e-16
+    special = np.array([[0.0, np.nan, -0.0, 1.0] * 2])
+    found = np.empty_like(special)
+    roots(lanes_of(width), special, found)
+    assert np.isinf(found[0, [0, 2]]).all()
+    assert np.isnan(found[0, 1])
+    assert found[0, 3] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("features", "width"),
+    [("+avx512f,+avx,+sse2", 8), ("+avx,-avx512f,+sse2", 4), ("+sse2", 2), ("-neon", 1)],
+)
+def test_the_width_is_that_of_what_numba_compiles_for(monkeypatch, features, width):
+    monkeypatch.setattr(config, "CPU_FEATURES", features)
+    assert simd.widest() == width
+
+
+def test_other_widths_are_refused():
+    with pytest.raises(ValueError, match=r"1, 2, 4, 8.*not 3"):
+        lanes_of(3)
