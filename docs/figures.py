@@ -386,10 +386,14 @@ def stability() -> Iterator[tuple[str, str]]:
 
 def ranking() -> Iterator[tuple[str, str]]:
     """What the study of the paper's unknowns found, a line a finding, as the report says it."""
-    from reports.ranking_study import sentences
+    from reports.ranking_study import CLAIM, sentences
 
     lines = "\n".join(f"- {text}" for text in sentences())
     yield "ranking", f"\n\n{lines}\n\n"
+    nearest = read("reports/data/ranking_nearest.csv")
+    shares = [100.0 * float(line["share"]) for line in nearest if line["system"] == CLAIM]
+    yield "ranking-claim", f"{min(shares):.0f} to {max(shares):.0f} %"
+    yield "ranking-draws", count(nearest[0]["draws"])
 
 
 def figures() -> dict[str, str]:

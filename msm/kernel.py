@@ -4,7 +4,7 @@ Numba keeps the type of a kernel's arguments in an index on disk, a named tuple 
 class. A spring law from outside the package would make that index unreadable for a process that
 cannot import it, and an edit of it would go unseen: its kernels are compiled in each process anew.
 So is an integrator from outside, for it would outlive changes of the kernels that it calls, which
-`msm.compiled` drops in this package's folders only.
+`study.compiled` drops in this package's folders only.
 """
 
 from __future__ import annotations

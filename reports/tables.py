@@ -338,7 +338,9 @@ def provenance_rows(results: Results) -> Table:
     found, wall = results.record.provenance, results.record.study_wall_s
     versions = ", ".join(f"{name} {v}" for name, v in found.versions.items() if v)
     rows = [["versions", versions]]
-    for key in ("commit", "platform", "processor", "seed", "scene_sha256", "mesh_sha256"):
+    keys = ["commit", "platform", "processor", "seed", "scene_sha256", "mesh_sha256"]
+    keys += ["rule_base_sha256"] if found.rule_base_sha256 else []
+    for key in keys:
         value = getattr(found, key)
         rows.append([key.replace("_", " "), DASH if value is None else words(str(value))])
     return [*rows, ["whole study", DASH if wall is None else f"{significant(wall)} s"]]

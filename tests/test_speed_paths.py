@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from msm import compiled
+import msm
 from msm.explicit import symplectic_euler, velocity_verlet
 from msm.forces import add_spring_forces, internal_forces
 from msm.lattice import CORNERS
 from msm.simd import widest
+from study import compiled
 from tests.benchmarks import bench_lattice, field_error
 from tests.benchmarks.bench_lattice import FRACTION, LAW, cube, free, moved, numbered
 
@@ -253,7 +254,7 @@ def test_a_folder_that_cannot_be_written_is_left_alone(tmp_path):
 
 
 def test_looking_for_outdated_kernels_takes_no_time():
-    package = Path(compiled.__file__).parent
+    package = Path(msm.__file__).parent
     taken = []
     for _ in range(10):
         started = time.perf_counter()

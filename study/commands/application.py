@@ -9,7 +9,7 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from study import signals
 from study.commands.check import check
@@ -37,6 +37,7 @@ app = App(
     ),
     version=lambda: version("liver-study"),
     version_flags=["--version"],
+    default_parameter=Parameter(negative_iterable=()),  # no --empty-set and the like
     help_format="plaintext",  # markdown would triple the time of --help
     suppress_keyboard_interrupt=False,  # it would leave without a word
 )

@@ -17,6 +17,7 @@ from fuzzy.liver.system import records_in_use
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
 from fuzzy.systems.options import InferenceOptions
+from study.models.own_rules import own_estimates, system_of
 from study.results.records import FuzzyRecord, StiffnessSet, SystemEstimate
 from study.results.tables import SensitivityEntry
 from study.scene import Scene
@@ -42,7 +43,9 @@ def readings(scene: Scene) -> dict[str, float]:
 
 
 def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
-    """Estimate of each fuzzy system that the scene names."""
+    """Estimate of each fuzzy system that the scene names, of the liver's rules or its own."""
+    if scene.fuzzy.rule_base is not None:
+        return own_estimates(scene)
     return {
         name: stiffness.estimate(readings(scene), name, settings(scene))
         for name in scene.fuzzy.systems
@@ -62,8 +65,10 @@ class FuzzySide:
 
 def run_fuzzy(scene: Scene) -> FuzzySide:
     """Estimates, their sensitivity to every choice, and what the report shows of the systems."""
-    chosen, given = settings(scene), readings(scene)
     found = estimates(scene)
+    if scene.fuzzy.rule_base is not None:
+        return _own_side(scene, found)
+    chosen, given = settings(scene), readings(scene)
     entries, notes = _sensitivity(scene, chosen, given)
     modulus = scene.tissue.youngs_modulus
     record = FuzzyRecord(
@@ -74,6 +79,13 @@ def run_fuzzy(scene: Scene) -> FuzzySide:
     )
     arrays = drawings(chosen, scene.fuzzy.systems, given, scene.fuzzy.surface)
     return FuzzySide(found, record, entries, arrays, notes)
+
+
+def _own_side(scene: Scene, found: dict[str, StiffnessEstimate]) -> FuzzySide:
+    """Of a fuzzy system of one's own: nothing is known of its sets, and nothing varied."""
+    modulus = scene.tissue.youngs_modulus
+    systems = {name: _record(one, modulus) for name, one in found.items()}
+    return FuzzySide(found, FuzzyRecord(systems=systems, rule_count=len(system_of(scene).rules)))
 
 
 def _sensitivity(

@@ -27,8 +27,8 @@ PACKAGES = (
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def provenance(scene: str, mesh: str | None) -> Provenance:
-    """Versions, commit, platform, and hashes of the scene and of its mesh file."""
+def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Provenance:
+    """Versions, commit, platform, and hashes of the scene and of the files that it names."""
     return Provenance(
         versions={p: _version(p) for p in PACKAGES} | {"python": platform.python_version()},
         commit=_commit(),
@@ -37,19 +37,22 @@ def provenance(scene: str, mesh: str | None) -> Provenance:
         seed=None,
         scene_sha256=hashlib.sha256(scene.encode()).hexdigest(),
         mesh_sha256=mesh_sha256(mesh),
+        rule_base_sha256=_sha256(rule_base, "fuzzy.rule_base: {} cannot be read ({}); name a file"),
     )
 
 
 def mesh_sha256(mesh: str | None) -> str | None:
     """SHA-256 of a scene's mesh file, None without one. ValueError if it cannot be read."""
-    if mesh is None:
+    return _sha256(mesh, "organ.mesh: {} cannot be read ({}); name a mesh file")
+
+
+def _sha256(path: str | None, refusal: str) -> str | None:
+    if path is None:
         return None
     try:
-        return hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
-        raise ValueError(
-            f"organ.mesh: {mesh} cannot be read ({error.strerror}); name a mesh file"
-        ) from None
+        raise ValueError(refusal.format(path, error.strerror)) from None
 
 
 def _version(package: str) -> str | None:

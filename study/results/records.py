@@ -317,6 +317,7 @@ class Provenance:
     seed: int | None
     scene_sha256: str
     mesh_sha256: str | None
+    rule_base_sha256: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -56,7 +56,8 @@ def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
     started = time.perf_counter()
     scene = suited(scene, watch.progress)
     given = ready(scene, watch.progress)
-    made_by = provenance(write_scene(scene), scene.organ.mesh)  # as it is now, not after the run
+    # Files as they are now, not after the run.
+    made_by = provenance(write_scene(scene), scene.organ.mesh, scene.fuzzy.rule_base)
     with watch.progress.stage("fuzzy systems"):
         fuzzy = run_fuzzy(scene) if is_tuned(scene) else FuzzySide()
     if isinstance(given, ReadyPoint):

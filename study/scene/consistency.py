@@ -37,6 +37,13 @@ MESH_ONLY = (
 )
 
 
+LIVER_ONLY = (
+    *("knowledge", "reading", "consequent", "placement", "footprint", "footprint_factor"),
+    *("absent", "surface", "sensitivity_readings"),
+)
+"""Keys of the table fuzzy that only the liver's knowledge bases have."""
+
+
 def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     """What is wrong between keys that are each right."""
     yield from _model_contradictions(scene)
@@ -52,6 +59,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     yield from _lattice_contradictions(scene, table)
     yield from _damping_contradictions(scene, table)
     yield from _mesh_contradictions(scene, table)
+    yield from _rule_base_contradictions(scene, table)
     for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
@@ -71,6 +79,20 @@ def _unknown_reading(scene: Scene) -> Iterator[str]:
         LiverSettings(reading=scene.fuzzy.reading, placement=scene.fuzzy.placement)
     except ValueError as error:
         yield f"fuzzy.{error}"
+
+
+def _rule_base_contradictions(scene: Scene, table: Table) -> Iterator[str]:
+    """A fuzzy system of one's own has its own sets and rules, and its own readings."""
+    if scene.fuzzy.rule_base is None:
+        for key in ("inputs", "unit"):
+            if _has(table, ("fuzzy", key)):
+                yield f"fuzzy.{key}: has no effect without fuzzy.rule_base; remove it"
+        return
+    if not scene.fuzzy.inputs:
+        yield "fuzzy.inputs: empty; give the readings of fuzzy.rule_base by the names of its inputs"
+    for key in LIVER_ONLY:
+        if _has(table, ("fuzzy", key)):
+            yield f"fuzzy.{key}: shapes the liver's rules, not fuzzy.rule_base; remove it"
 
 
 def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:

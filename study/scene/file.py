@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 
 from study.annotation.quantity import Quantity
 from study.scene import Organ, Scene, SpringLaw
-from study.scene.consistency import MESH_ONLY, Table, contradictions
+from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
 from study.scene.schema import SuitedKey
 from study.scene.text import key_lines, parsed, read_text
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 BUILT_IN = ("liver", "block", "paper")
+FILES = (("organ", "mesh"), ("fuzzy", "rule_base"))
+"""Tables and their keys that name a file."""
 SUITED: tuple[str, ...] = get_args(SuitedKey)
 
 
@@ -31,10 +33,10 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     """
     text, base = _load(name)
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
-    _resolve_mesh(table, base)
+    _resolve_files(table, base)
     for override in overrides:
         lines[_apply(table, override)] = 0  # on no line
-    _resolve_mesh(table, Path.cwd())
+    _resolve_files(table, Path.cwd())
     if name in BUILT_IN:
         _suit_the_rest(table, overrides)
     return validate(table, name, lines)
@@ -106,6 +108,9 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     yield from _unused_of_organ(scene.organ)
     if not scene.remarks:
         yield ("remarks",)
+    own = ("rule_base", "inputs", "unit")
+    for key in own if scene.fuzzy.rule_base is None else LIVER_ONLY:
+        yield "fuzzy", key
     for key, kind in (
         ("ramp", "ramp-hold-release"),
         ("hold", "ramp-hold-release"),
@@ -159,11 +164,12 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _resolve_mesh(table: Table, base: Path) -> None:
-    """Make a mesh path relative to the scene file that names it."""
-    organ = table.get("organ")
-    if isinstance(organ, dict) and isinstance(organ.get("mesh"), str):
-        organ["mesh"] = str((base / organ["mesh"]).absolute())
+def _resolve_files(table: Table, base: Path) -> None:
+    """Make the paths of files relative to the scene file that names them."""
+    for name, key in FILES:
+        group = table.get(name)
+        if isinstance(group, dict) and isinstance(group.get(key), str):
+            group[key] = str((base / group[key]).absolute())
 
 
 def _apply(table: Table, override: str) -> str:

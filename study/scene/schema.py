@@ -121,7 +121,9 @@ class Fuzzy:
     `consequent` of a combination, `placement` of the sets on elastography data. `footprint` of
     uncertainty and its factor on the published spread, what an `absent` reading does; then how the
     systems are evaluated. `surface`: the two readings of the output surfaces.
-    `sensitivity_readings`: readings over which each of these choices is varied.
+    `sensitivity_readings`: readings over which each of these choices is varied. `rule_base`: a
+    fuzzy system of one's own (.fis or .json) instead, which answers in `unit` to `inputs`, its
+    readings by name in its own units.
     """
 
     systems: tuple[SystemName, ...] = ("mamdani", "sugeno", "interval-type-2")
@@ -139,6 +141,9 @@ class Fuzzy:
     out_of_range: Annotated[str, Choice("fuzzy.systems.options:OUT_OF_RANGE")] = "clamp"
     surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
     sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
+    rule_base: str | None = None
+    inputs: dict[str, float] = field(default_factory=dict)
+    unit: Literal["Pa", "kPa"] = "kPa"
 
 
 @dataclass(frozen=True, kw_only=True)
