@@ -141,3 +141,16 @@ def test_blanks_and_decimal_commas_go_together(tmp_path):
     settings = LiverSettings(absent="normal")
     alone = estimate({"hcv": 9500.0, "hbv": 7000.0}, "mamdani", settings).estimate / PA_PER_KPA
     assert float(row.split(";")[-1].replace(",", ".")) == pytest.approx(alone, rel=1e-12)
+
+
+def test_a_row_of_blanks_between_others_is_not_lost(table):
+    """It is a patient without any reading, whose answer must not become that of the next."""
+    path = table([{"hcv": 9.5}, {}, {"hcv": 20.0}])
+    text = path.read_text().replace("1,,,,,", ",,,,,")
+    path.write_text(text)
+    asked(path, "mamdani", "normal")
+    found = estimates(path.parent / "out.csv")
+    assert len(found) == 3
+    assert found[0] < found[2]
+    with pytest.raises(ValueError, match=r"in\.csv:3: .*no aetiology"):
+        asked(path, "mamdani", "silent")

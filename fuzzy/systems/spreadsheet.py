@@ -76,13 +76,20 @@ def _header_width(text: str, delimiter: str) -> int:
 
 
 def _filled(path: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """The rows with a cell that is not blank, and the lines on which they begin."""
+    """The rows up to the last with a cell that is not blank, and the lines on which they begin.
+
+    A row of blanks between others is that of somebody; an empty line is nobody's.
+    """
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    after = 0
+    after, blank = 0, list[tuple[int, list[str]]]()
     try:
         for cells in reader:
             if any(cell.strip() for cell in cells):
+                yield from blank
+                blank.clear()
                 yield after + 1, cells
+            elif len(cells) > 1 and after:
+                blank.append((after + 1, cells))
             after = reader.line_num
     except csv.Error as error:
         raise TableError(f"{path}:{reader.line_num}: {error}; export the table again") from None

@@ -49,6 +49,9 @@ def check(
     else:
         for flag, given in (("--set", set_), ("--out", out)):
             if given:
-                raise ValueError(f"{flag}: {target} is a mesh, not a scene; leave it out")
+                raise ValueError(
+                    f"{flag}: {target} is a mesh, not a scene; leave it out, or give --unit, "
+                    "--axes or --pieces"
+                )
         lines = describe_mesh(Path(target), unit, axes, pieces)
     print("\n".join(lines))
