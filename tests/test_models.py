@@ -461,3 +461,12 @@ def test_the_reading_as_it_is_needs_no_fuzzy_system():
 def test_the_reading_as_it_is_needs_a_reading():
     with pytest.raises(ValueError, match="models: reading needs a reading"):
         validate({"organ": {"shape": "point"}, "models": ["basafa", "reading"]}, "own.toml")
+
+
+def test_a_scene_without_readings_says_which_key_is_missing():
+    table = {"organ": {"shape": "point"}, "models": ["basafa", "msm"]}
+    scene = validate(table, "own.toml")
+    with pytest.raises(ValueError, match=r"patient: no reading .* patient\.hcv"):
+        run_study(scene)
+    normal = dataclasses.replace(scene, fuzzy=dataclasses.replace(scene.fuzzy, absent="normal"))
+    assert run_study(normal).record.fuzzy.systems.keys() == set(scene.fuzzy.systems)

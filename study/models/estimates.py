@@ -43,9 +43,17 @@ def readings(scene: Scene) -> dict[str, float]:
 
 
 def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
-    """Estimate of each fuzzy system that the scene names, of the liver's rules or its own."""
+    """Estimate of each fuzzy system that the scene names, of the liver's rules or its own.
+
+    ValueError naming the key, for one without readings among them.
+    """
     if scene.fuzzy.rule_base is not None:
         return own_estimates(scene)
+    if settings(scene).missing.silences and not readings(scene):
+        raise ValueError(
+            'patient: no reading to estimate from; give one, such as patient.hcv = "9.5 kPa", or '
+            'set fuzzy.absent to "normal"'
+        )
     return {
         name: stiffness.estimate(readings(scene), name, settings(scene))
         for name in scene.fuzzy.systems
