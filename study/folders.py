@@ -39,8 +39,8 @@ def replacing(folder: Path, foreign: Foreign, writer: str) -> Iterator[Path]:
     """A folder beside `folder` that takes its place when the block ends without an exception.
 
     FolderError before the block if `folder` holds what no `writer` wrote, cannot be written, or is
-    being written by another. After a failure nothing new is left. An OSError of the block names
-    `folder`.
+    being written by another. What somebody puts there meanwhile stays. After a failure nothing new
+    is left. An OSError of the block names `folder`.
     """
     _check_name(folder, "--out")
     shown, folder = folder, folder.resolve()
@@ -55,6 +55,7 @@ def replacing(folder: Path, foreign: Foreign, writer: str) -> Iterator[Path]:
                 if folder.exists():
                     folder.replace(aside / OLD)
                 partial.replace(folder)
+                _bring_back(aside / OLD, folder, foreign)
         finally:
             _settle(aside, folder)
 
@@ -169,6 +170,16 @@ def refusal(path: Path, error: OSError) -> Exception:
 
 
 # --- steps -------------------------------------------------------------------------------------
+
+
+def _bring_back(old: Path, folder: Path, foreign: Foreign) -> None:
+    """Move what no writer wrote from the folder that was replaced into the new one."""
+    present = {path.name for path in old.iterdir()} if old.is_dir() else set[str]()
+    while (found := foreign(present)) in present:
+        present.discard(str(found))
+        if not (folder / str(found)).exists():
+            (old / str(found)).replace(folder / str(found))
+            tell(f"{folder / str(found)} was put there meanwhile, and stays")
 
 
 def refuse_unwritable(folder: Path, foreign: Foreign, writer: str) -> None:

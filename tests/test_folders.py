@@ -212,3 +212,20 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(tmp_path, capsys):
         pass
     assert ".out.state: left by an interrupted run" in capsys.readouterr().err
     assert names(tmp_path) == ["kept"]
+
+
+def test_what_is_put_into_a_folder_meanwhile_stays(tmp_path, capsys):
+    def foreign(present):
+        return min(present - {"ours"}, default=None)
+
+    for turn in range(2):
+        with replacing(tmp_path / "out", foreign, "test") as partial:
+            (partial / "ours").write_text(str(turn))
+            if turn:
+                (tmp_path / "out" / "sub").mkdir()
+                (tmp_path / "out" / "sub" / "a.txt").write_text("mine")
+    assert names(tmp_path / "out") == ["ours", "sub"]
+    assert (tmp_path / "out" / "ours").read_text() == "1"
+    assert (tmp_path / "out" / "sub" / "a.txt").read_text() == "mine"
+    assert "sub was put there meanwhile" in capsys.readouterr().err
+    assert names(tmp_path) == ["out"]
