@@ -201,7 +201,8 @@ def _rankings(results: Results) -> Iterator[str]:
         found = list(leads(results, reference, probe))
         if found:
             yield (
-                f"Similarity to {reference_name(results, reference)} at control point "
+                f"Similarity of the fuzzy systems to {reference_name(results, reference)} at "
+                f"control point "
                 f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
             )
             yield from _first_ranks(results, reference, probe)
