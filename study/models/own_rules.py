@@ -15,10 +15,10 @@ from fuzzy.systems.inference import Inferred, infer
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
 from study.scene import Scene
+from study.scene.answer_units import UNITS
 
 Floats = NDArray[np.float64]
 
-UNITS = {"Pa": 1.0, "kPa": 1e3}
 FINER = 10
 """Times as many samples, to tell the error of those that are taken."""
 SOFTEST, STIFFEST = 10.0, 1e7

@@ -143,7 +143,7 @@ class Fuzzy:
     sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
     rule_base: str | None = None
     inputs: dict[str, float] = field(default_factory=dict)
-    unit: Literal["Pa", "kPa"] = "kPa"
+    unit: Annotated[str, Choice("study.scene.answer_units:UNITS")] = "kPa"
 
 
 @dataclass(frozen=True, kw_only=True)
