@@ -158,17 +158,26 @@ def _reproduced(lines: Sequence[Line]) -> str:
 def _movers(lines: Sequence[Line]) -> str:
     """The unknowns with the largest total indices on the lead of the paper's best two."""
     lead = f"mamdani - {CLAIM}"
-    totals: dict[str, list[float]] = {}
+    found: dict[str, list[Line]] = {}
     for line in lines:
         if line["output"] == lead:
-            totals.setdefault(line["unknown"], []).append(float(line["total"]))
-    mean = {unknown: sum(values) / len(values) for unknown, values in totals.items()}
+            found.setdefault(line["unknown"], []).append(line)
+    mean = {name: _mean(of, "total") for name, of in found.items()}
     named = sorted(mean, key=lambda unknown: -mean[unknown])[:MOST_NAMED]
-    parts = ", ".join(f"{words(name.replace('_', ' '))} {fixed(mean[name], 2)}" for name in named)
+    parts = ", ".join(f"{words(name.replace('_', ' '))} {_index(found[name])}" for name in named)
     return (
-        f"The lead of {system_name(CLAIM)} over Mamdani is moved most by (total Sobol' index, mean "
-        f"over measures): {parts}."
+        f"The lead of {system_name(CLAIM)} over Mamdani is moved most by (total Sobol' index and "
+        f"its 95 % interval, means over measures): {parts}."
     )
+
+
+def _index(lines: Sequence[Line]) -> str:
+    total, low, high = (fixed(_mean(lines, key), 2) for key in ("total", "total_low", "total_high"))
+    return f"{total} ({low}–{high})"
+
+
+def _mean(lines: Sequence[Line], column: str) -> float:
+    return sum(float(line[column]) for line in lines) / len(lines)
 
 
 def _over_spacing(lines: Sequence[Line]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from study.models import basafa
 from study.models.estimates import estimates
 from study.models.model import SILENT
 from study.models.table import point_models_of
@@ -39,7 +40,7 @@ def over_spacing(scene: Scene) -> Iterator[AtSpacing]:
             model.name: problem.response.motion(model.run(problem, SILENT).trajectory, 0)
             for model in models
         }
-        benchmark = 2.5 * scene.basafa.k1 / float(h_0) ** 2
+        benchmark = basafa.modulus(at)
         for system, estimate in found.items():
             for one in scores(motions[f"msm-{system}"], motions["basafa"]):
                 yield AtSpacing(

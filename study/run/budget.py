@@ -133,9 +133,9 @@ def _steps(lattice: PreparedLattice, modulus: float, changes: Changes) -> Iterat
 
 
 def _differences(causes: Iterable[str], fields: Sequence[Floats]) -> Iterator[Difference]:
-    """What each change did; steps are as long before and after, so their errors cancel."""
+    """What each change did; the steps' errors cancel in part, and are not told for a difference."""
     for cause, (before, after) in zip(causes, pairwise(fields), strict=True):
-        yield Difference(cause, before - after, 0.0)
+        yield Difference(cause, before - after, None)
 
 
 def _toward_elements(
@@ -173,8 +173,8 @@ def _toward_benchmark(
     damped = _moved(_damped_as(steps[-1], benchmark))
     return fields[0], (
         *_differences(changes, fields),
-        Difference(DAMPING, fields[-1] - damped, 0.0),
-        Difference(LAW, damped - _peak(run), 0.0),
+        Difference(DAMPING, fields[-1] - damped, None),
+        Difference(LAW, damped - _peak(run), None),
     )
 
 
@@ -197,7 +197,7 @@ def _own_error(run: ModelRun) -> float | None:
 def _budget(run: ModelRun, reference: ModelRun, mended: Mended, volumes: Floats) -> ErrorBudget:
     """The parts of one lattice's difference, the remainder last."""
     whole = _peak(run) - _peak(reference)
-    parts = [Difference(ESTIMATE, _peak(run) - mended.field, 0.0), *mended.others]
+    parts = [Difference(ESTIMATE, _peak(run) - mended.field, None), *mended.others]
     if reference.record.lattice is None:  # a lattice has much the same error by its steps
         parts = [*_by_time_step(run), *parts]
     left = whole - np.sum([part.field for part in parts], axis=0)
