@@ -63,7 +63,8 @@ HEADING_ROWS = 2
 """Height of a group's name in rows."""
 KEY, VALUE = 20, 14
 """Characters that fit on a line of a column of the scene."""
-LEFT_OUT = ("title", "renders")
+LEFT_OUT = ("title", "renders", "remarks")
+"""Of the scene's own values: remarks stand among the notes."""
 FIELD_QUANTITIES = (
     "field-relative-l2-peak",
     "field-relative-l2-final",

@@ -30,6 +30,7 @@ USUAL = {
     "s": ("s", "ms", "us", "min"),
     "Hz": ("Hz", "kHz"),
     "kg/m^3": ("kg/m^3", "g/cm^3"),
+    "byte": ("MB", "GB", "byte"),
 }
 """Units that are suggested, by the SI unit."""
 

@@ -18,6 +18,7 @@ from study.commands.compare import compare
 from study.commands.estimate import estimate
 from study.commands.export import export
 from study.commands.flags import EXIT_BAD_INPUT, EXIT_MACHINE
+from study.commands.plan import plan
 from study.commands.recommend import recommend
 from study.commands.report import report
 from study.commands.robustness import robustness
@@ -121,6 +122,6 @@ def _say(message: str) -> None:
 
 for command in (
     *(run, scenes, check, report, compare, export, verify),
-    *(tradeoff, recommend, stability, robustness, estimate, rules, cohort),
+    *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
 
 if TYPE_CHECKING:
+    from study.plan.plan import Plan
     from study.progress import Progress
     from study.results import Results
+    from study.scene import Scene
 
 
 def run(
@@ -51,6 +54,12 @@ def run(
         raise ValueError("--fields: a single point has none; leave it out")
     folder = out or default_folder(scene)
     with on_stderr() as progress:
+        if chosen.require is not None:
+            planned = _planned(chosen, progress)
+            if not planned.moves:
+                _run_at_rest(planned, out or folder.with_name(f"{folder.name}-rest"), progress)
+                return
+            chosen = planned.scene
         with replacing(folder) as partial, continuing(folder, resume=resume) as state:
             keeping = Keeping(state, resume, partial if fields else None)
             results = run_study(chosen, Watch(progress, keeping))
@@ -68,6 +77,41 @@ def run(
         sys.exit(EXIT_MACHINE)
     if any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
+
+
+def _planned(scene: Scene, progress: Progress) -> Plan:
+    """What is modelled of a scene that says what it requires; the plan is told and kept."""
+    from study.plan.plan import lines, plan
+    from study.run.suiting import suited
+
+    with progress.stage("plan"):
+        found = plan(suited(scene, progress))
+    told = lines(found)
+    print("\n".join(told))
+    remarks = (*found.scene.remarks, *(f"Planned: {line}." for line in told))
+    return replace(found, scene=replace(found.scene, remarks=remarks))
+
+
+def _run_at_rest(planned: Plan, folder: Path, progress: Progress) -> None:
+    """Solve at rest and write a folder of that, which has no curves and so no report."""
+    from study.results import rest as results
+    from study.run.rest import rest_of
+    from study.scene.file import write_scene
+
+    required = planned.scene.require
+    with results.replacing(folder) as partial:
+        found = rest_of(planned.scene, progress, large=planned.large)
+        results.write(found.rows, write_scene(planned.scene), partial)
+        if required is not None and "field" in required.quantities:
+            results.write_field(found.mesh, found.displacement, partial)
+    for row in found.rows:
+        errors = (row.mesh_error, row.large_displacement_error)
+        known = " and ".join("unknown" if e is None else f"{100.0 * e:.2g} %" for e in errors)
+        print(
+            f"{row.probe}: {1e3 * row.along_push_m:.4g} mm along the push, estimated error "
+            f"{known} by mesh and large displacements"
+        )
+    print(f"results in {folder}")
 
 
 def _report_failure(folder: Path, progress: Progress) -> Exception | KeyboardInterrupt | None:

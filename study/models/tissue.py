@@ -17,6 +17,14 @@ from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.scene import Scene
 
+FRACTION = 0.8
+"""Of the critical step, where nothing else is asked for."""
+
+
+def lacks_poisson_ratio(scene: Scene) -> bool:
+    """Whether the tissue's Poisson ratio is one that springs alone do not have."""
+    return scene.tissue.poisson_ratio > SPRING_POISSON_RATIO
+
 
 def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> SpringMaterial:
     """Springs of the scene's law for a modulus [Pa], with the volume term if the scene has it."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
 from study.scene.law import SpringLaw
-from study.scene.schema import Lattice, Scene
+from study.scene.schema import Lattice, Require, Scene
 
 if TYPE_CHECKING:
     from study.models.model import ModelKind
@@ -64,6 +64,8 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
     yield from _tool_contradictions(scene)
+    if scene.require is not None:
+        yield from _require_contradictions(scene, scene.require)
     yield from _unseen_load(scene)
     if scene.is_point:
         yield from _point_contradictions(scene, table)
@@ -233,6 +235,25 @@ def _tool_contradictions(scene: Scene) -> Iterator[str]:
     if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
         needed = math.ceil(8 * history.frequency * time.duration)
         yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+
+
+def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
+    """Wants that contradict each other, or that a single point has no part in."""
+    wanted = set(required.quantities)
+    if not wanted & {"rest", "history"}:
+        yield "require.quantities: name rest, history or both; field says where, not what"
+    if len(wanted) < len(required.quantities):
+        yield "require.quantities: a quantity is named twice"
+    if required.rate is not None and "history" not in wanted:
+        yield "require.rate: nothing moves at rest; add history to require.quantities or remove it"
+    for name in required.at:
+        if scene.control_points and name not in scene.control_points:
+            yield (
+                f"require.at: {name!r} is no control point; there are "
+                f"{', '.join(scene.control_points)}"
+            )
+    if scene.is_point and "field" in wanted:
+        yield "require.quantities: a single point has no field; remove it"
 
 
 def _unseen_load(scene: Scene) -> Iterator[str]:

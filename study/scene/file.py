@@ -219,12 +219,18 @@ def _fields(location: Sequence[str]) -> list[str]:
     """Field names of the table at a location of the scene."""
     kind: Any = Scene
     for key in location:
-        kind = get_type_hints(kind).get(key) if dataclasses.is_dataclass(kind) else None
+        kind = _held(get_type_hints(kind).get(key)) if dataclasses.is_dataclass(kind) else None
         if get_origin(kind) is dict:
             return _place_fields()
         if kind is None:
             return _place_fields() if location[0] == "control_points" else []
     return [f.name for f in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
+
+
+def _held(hint: Any) -> Any:
+    """The dataclass of a table that may be left out, else the annotation itself."""
+    tables = [option for option in get_args(hint) if dataclasses.is_dataclass(option)]
+    return tables[0] if tables else hint
 
 
 def _elsewhere(key: str) -> list[str]:

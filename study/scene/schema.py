@@ -37,6 +37,7 @@ SuitedKey = Literal[
     "lattice.spacing",
     "reference.element_size",
 ]
+Quantities = Literal["rest", "history", "field"]
 Aetiology = Annotated[str, Choice("fuzzy.liver.table1:AETIOLOGIES")]
 
 
@@ -236,6 +237,22 @@ class Time:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Require:
+    """What is wanted of a scene, from which `study.plan` derives what of it is modelled.
+
+    `quantities`: the rest under the full load, the history of the motion, and with "field" the
+    whole organ beside the control points `at`, all by default. `error`: relative, the largest of
+    these; `rate`: states per second in real time; `memory` on top of the program's own.
+    """
+
+    quantities: tuple[Quantities, ...] = ("history",)
+    at: tuple[str, ...] = ()
+    error: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
+    rate: Annotated[float, Quantity("Hz", 0.1, 1e5)] | None = None
+    memory: Annotated[float, Quantity("byte", 1e6, 1e13)] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system.
 
@@ -259,6 +276,7 @@ class Scene:
     superposition: Superposition = field(default_factory=Superposition)
     time: Time = field(default_factory=Time)
     control_points: dict[str, Place] = field(default_factory=dict)
+    require: Require | None = None
     renders: bool = True
     remarks: tuple[str, ...] = ()
 

@@ -10,18 +10,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from msm.calibration import SPRING_POISSON_RATIO
 from msm.integrators import INTEGRATORS
 from msm.stability import DEFAULT
 from study.models.model import Model
 from study.models.table import MODELS, kind, model
+from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.scene import Scene
 
 Settings = Mapping[str, str | float | int | bool]
 """Plain values by name, as `Model.varied` takes them."""
 
-FRACTION = 0.8
-"""Of the critical step, where nothing else is asked for."""
 FRAME_RATE = 60.0
 FAST = 250.0
 """Steps per second [Hz] beyond a frame's, to show what the step contributes."""
@@ -37,11 +35,6 @@ class Contender:
     model: str
     settings: Callable[[Scene], Iterator[Settings]]
     always: Settings = field(default_factory=dict)
-
-
-def lacks_poisson_ratio(scene: Scene) -> bool:
-    """Whether the tissue's Poisson ratio is one that springs alone do not have."""
-    return scene.tissue.poisson_ratio > SPRING_POISSON_RATIO
 
 
 def lattice_settings(scene: Scene, times: float, **more: str | float | bool) -> Settings:

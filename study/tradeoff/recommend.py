@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.models.lattice import LatticeModel
+from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
 from study.scene import Scene
 from study.scene.file import write_scene
@@ -24,7 +25,7 @@ from study.sweep.store import Store
 from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lineup import FRACTION, Configuration, lacks_poisson_ratio
+from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import Stated, arguments, stated, tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth

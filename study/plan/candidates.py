@@ -1,0 +1,239 @@
+"""What may be modelled, with what each is expected to leave out and to cost.
+
+To add one: a function of the look, and a line in `CANDIDATES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from fem_reference.memory import needed
+from study.models.finite_elements import FRAME_RATE
+from study.models.tissue import FRACTION, lacks_poisson_ratio
+from study.plan.look import LatticeLook, Look
+from study.plan.prediction import (
+    GEOMETRY,
+    MESH,
+    REMAINDER,
+    SPACING,
+    SUBSPACE,
+    TRUNCATION,
+    Foresight,
+    Part,
+    Prediction,
+)
+from study.scene import Scene
+
+SIZES = (1.0, 0.75, 0.75**2, 0.75**3)
+"""Of elements, times that of the scene: levels of its organ."""
+SPACINGS = (2.0, 1.5, 1.25, 1.0, 0.8, 2.0 / 3.0, 0.5)
+"""Of lattices, times that of the scene."""
+CORRECTED = (2.0, 1.5, 1.0)
+VECTORS = 16
+SOLUTIONS = 3.0
+"""That so many Ritz vectors take, in solutions of the static problem to full accuracy: measured."""
+REFERENCES = 2.0
+"""What a reference with its coarser meshes costs, in subspaces on the scene's own mesh."""
+GROWTH = 1.2
+"""Power of the unknowns by which a solution grows."""
+STREAM = 5e9
+"""Numbers a second that a product with a few vectors reads, of any machine of these years."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A way to model a scene.
+
+    `scene`: the same with these models and settings; `step` [s] and `step_wall` [s] of a step;
+    `setup` [s], with a reference where the error is not known without one; `memory` [byte] on top
+    of the program; `leaves_out`: in words.
+    """
+
+    name: str
+    scene: Scene
+    prediction: Prediction
+    step: float
+    step_wall: float
+    setup: float
+    memory: float
+    leaves_out: tuple[str, ...] = ()
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it has small displacements alone."""
+        return any(part.cause == GEOMETRY for part in self.prediction.parts)
+
+    @property
+    def wall_per_s(self) -> float:
+        """Wall per simulated second."""
+        return self.step_wall / self.step
+
+    @property
+    def wall(self) -> float:
+        """Wall of the whole run [s]."""
+        return self.setup + self.wall_per_s * self.scene.time.duration
+
+
+Kind = Callable[[Scene, Look, Foresight], Iterator[Candidate]]
+
+
+def candidates(scene: Scene, look: Look, foresight: Foresight) -> list[Candidate]:
+    """All there are for a motion in time."""
+    return [one for kind in CANDIDATES.values() for one in kind(scene, look, foresight)]
+
+
+# --- finite elements in a subspace ---------------------------------------------------------------
+
+
+def _superpositions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    for times in SIZES:
+        yield superposition(scene, look, foresight, times)
+
+
+def superposition(scene: Scene, look: Look, foresight: Foresight, times: float) -> Candidate:
+    """Ritz vectors of linear finite elements, of so many times the scene's size."""
+    parts = (
+        Part(GEOMETRY, foresight.geometry),
+        Part(MESH, foresight.mesh(times * _scene_size(look))),
+        Part(TRUNCATION, SUBSPACE),
+    )
+    found = on_elements(scene, look, times)
+    return replace(
+        found,
+        name=f"{VECTORS} Ritz vectors of finite elements of {_mm(found.scene)}",
+        prediction=Prediction(parts),
+        leaves_out=("large displacements", "any other place of the load"),
+    )
+
+
+def on_elements(scene: Scene, look: Look, times: float) -> Candidate:
+    """A subspace of finite elements and what it costs; its error is for others to say."""
+    chosen = replace(
+        scene.reference, element_size=times * scene.reference.element_size, accuracy=None
+    )
+    last = look.elements[-1]
+    count = last.unknowns * (last.size / (times * _scene_size(look))) ** 3
+    return Candidate(
+        name="finite elements",
+        scene=replace(scene, models=("superposition",), reference=chosen),
+        prediction=Prediction(()),
+        step=1.0 / FRAME_RATE,
+        step_wall=VECTORS * count / STREAM,
+        setup=SOLUTIONS * last.wall * (count / last.unknowns) ** GROWTH,
+        memory=needed(int(count), "p2", stepping=False),
+    )
+
+
+def _scene_size(look: Look) -> float:
+    """Size of the scene's own mesh, in the measure of its levels."""
+    base = look.problem.geometry.level(0)
+    assert base is not None  # noqa: S101 - the organ was built of it
+    return base.size
+
+
+def _mm(scene: Scene) -> str:
+    return f"{1e3 * scene.reference.element_size:.3g} mm"
+
+
+# --- lattices ------------------------------------------------------------------------------------
+
+
+def _lattices(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    for times in SPACINGS:
+        spacing = times * scene.lattice.spacing
+        found = lattice(scene, look, spacing)
+        yield replace(found, prediction=Prediction((Part(SPACING, foresight.spacing(spacing)),)))
+
+
+def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:
+    """The lattice of the tissue's modulus at a spacing [m], stepped explicitly, and its cost."""
+    seen = _nearest(look, spacing)
+    finer = seen.spacing / spacing
+    chosen = replace(
+        scene.lattice,
+        spacing=spacing,
+        springs="lattice",
+        volume_term=lacks_poisson_ratio(scene),
+        time_step=None,
+        step_rate=None,
+        step_fraction=FRACTION,
+    )
+    return Candidate(
+        name=f"lattice of {1e3 * spacing:.3g} mm",
+        scene=replace(scene, models=("fem", "tissue"), lattice=chosen),
+        prediction=Prediction(()),
+        step=FRACTION * seen.critical / finer,
+        step_wall=look.wall_per_spring * seen.springs * finer**3,
+        setup=REFERENCES * on_elements(scene, look, 1.0).setup,
+        memory=seen.nbytes * finer**3,
+    )
+
+
+def _nearest(look: Look, spacing: float) -> LatticeLook:
+    return min(look.lattices, key=lambda one: abs(one.spacing - spacing))
+
+
+# --- a coarse lattice corrected by finite elements ------------------------------------------------
+
+
+def _corrected(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    for size in SIZES:
+        for times in CORRECTED:
+            yield corrected(scene, look, foresight, size, times * scene.lattice.spacing)
+
+
+def corrected(
+    scene: Scene, look: Look, foresight: Foresight, size: float, spacing: float
+) -> Candidate:
+    """A coarse lattice, and the difference of finite elements from its own linear motion."""
+    coarse, fine = lattice(scene, look, spacing), on_elements(scene, look, size)
+    parts = (
+        Part(REMAINDER, foresight.remainder(spacing)),
+        Part(MESH, foresight.mesh(size * _scene_size(look))),
+        Part(TRUNCATION, SUBSPACE),
+    )
+    return Candidate(
+        name=f"{coarse.name}, corrected by finite elements of {_mm(fine.scene)}",
+        scene=replace(fine.scene, models=("corrected",), lattice=coarse.scene.lattice),
+        prediction=Prediction(parts),
+        step=coarse.step,
+        step_wall=coarse.step_wall + 2.0 * fine.step_wall,
+        setup=fine.setup,
+        memory=2.0 * coarse.memory + fine.memory,
+        leaves_out=("any other place of the load",),
+    )
+
+
+CANDIDATES: dict[str, Kind] = {
+    "superposition": _superpositions,
+    "corrected": _corrected,
+    "lattice": _lattices,
+}
+
+
+# --- at rest --------------------------------------------------------------------------------------
+
+
+def resting(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    """What there is for rest under the full load: finite elements, and their correction."""
+    for times in SIZES:
+        found = on_elements(scene, look, times)
+        wall = found.setup / SOLUTIONS
+        mesh = Part(MESH, foresight.mesh(times * _scene_size(look)))
+        chosen = replace(found, scene=replace(found.scene, models=("fem",)), setup=wall)
+        yield replace(
+            chosen,
+            name=f"finite elements of {_mm(found.scene)}, solved once",
+            prediction=Prediction((Part(GEOMETRY, foresight.geometry), mesh)),
+            leaves_out=("large displacements", "inertia and damping"),
+        )
+        remainder = Part(REMAINDER, foresight.remainder(scene.lattice.spacing))
+        yield replace(
+            chosen,
+            name=f"finite elements of {_mm(found.scene)}, and large displacements by a lattice of "
+            f"{1e3 * scene.lattice.spacing:.3g} mm",
+            prediction=Prediction((remainder, mesh)),
+            setup=2.0 * wall,  # the lattice is at rest after some hundred steps
+            leaves_out=("inertia and damping",),
+        )

@@ -1,0 +1,173 @@
+"""A quick look at a scene: coarse lattices and coarse finite elements at rest under the full load.
+
+It takes seconds, and tells from solutions that are cheap what dear ones would cost and be worth.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.elements import chosen_element
+from fem_reference.memory import unknowns
+from fem_reference.observation import at_points, evaluation, largest_strain
+from fem_reference.solvers import solve_static
+from msm.assembly import arrays
+from msm.relaxation import relax
+from msm.statics import static_displacement
+from study.models.finite_elements import PreparedElements, reference_of
+from study.models.lattice import LatticeModel, PreparedLattice
+from study.models.table import model
+from study.models.tissue import lacks_poisson_ratio
+from study.problem.problem import Problem
+from study.scene import Scene
+
+Floats = NDArray[np.float64]
+
+SPACINGS = (2.0, 1.5, 1.0)
+"""Of the lattices, times that of the scene."""
+LEVELS = (-1, 0, 1)
+MOST_UNKNOWNS = 30_000
+"""Of a mesh that is looked at, which takes a few seconds; one is, however large."""
+AT_REST = 1e-5
+"""Residual of a lattice at rest, relative to its load."""
+STEPS, TURNS = 40, 3
+"""Timed at once, and how often: the least counts, which others on the machine disturb least."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Displacement [m] at the control points (p, 3) and over the organ (q, 3)."""
+
+    probes: Floats
+    field: Floats
+
+    def plus(self, other: Rest, times: float = 1.0) -> Rest:
+        """The sum of this and so many times another."""
+        return Rest(self.probes + times * other.probes, self.field + times * other.field)
+
+
+@dataclass(frozen=True)
+class LatticeLook:
+    """A lattice of a spacing [m] at rest, of small displacements and, if it got there, of large.
+
+    `critical`: its critical step [s]; `nbytes`: its arrays.
+    """
+
+    spacing: float
+    nodes: int
+    springs: int
+    critical: float
+    nbytes: int
+    linear: Rest
+    nonlinear: Rest | None
+
+
+@dataclass(frozen=True)
+class ElementsLook:
+    """Finite elements of a `size` [m] at rest, and what the solution took [s]."""
+
+    level: int
+    size: float
+    unknowns: int
+    wall: float
+    rest: Rest
+
+
+@dataclass(frozen=True)
+class Look:
+    """Solutions from coarse to fine, and what a step of the finest lattice takes a spring [s].
+
+    `strain`: largest of the finite elements.
+    """
+
+    problem: Problem
+    lattices: tuple[LatticeLook, ...]
+    elements: tuple[ElementsLook, ...]
+    strain: float
+    wall_per_spring: float
+
+
+def look(scene: Scene, problem: Problem) -> Look:
+    """Look at a scene. ValueError where support or tool misses even the coarsest of its models."""
+    elements, strain = _elements(scene, problem)
+    lattices = [on_lattice(scene, problem, times) for times in SPACINGS]
+    return Look(
+        problem,
+        tuple(lattice_at_rest(one) for one in lattices),
+        elements,
+        strain,
+        _wall_per_spring(lattices[-1]),
+    )
+
+
+def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...], float]:
+    found: list[ElementsLook] = []
+    strain = 0.0
+    for level in LEVELS:
+        at = problem.geometry.level(level)
+        element = chosen_element(scene.reference.element, problem.tissue.poisson_ratio)
+        if at is None or (found and unknowns(at.mesh, element) > MOST_UNKNOWNS):
+            continue
+        prepared = reference_of(scene).varied(level=level).prepare(problem)
+        one, strain = _at_rest(prepared, level, at.size)
+        found.append(one)
+    return tuple(found), strain
+
+
+def _at_rest(prepared: PreparedElements, level: int, size: float) -> tuple[ElementsLook, float]:
+    started = time.perf_counter()
+    body = prepared.body()
+    u = solve_static(body)
+    wall = time.perf_counter() - started
+    seen = prepared.problem.observation
+    rest = Rest(
+        *(at_points(evaluation(body, points), u) for points in (seen.probes, seen.volume_points))
+    )
+    return ElementsLook(level, size, body.unknowns, wall, rest), largest_strain(body, u)
+
+
+def on_lattice(scene: Scene, problem: Problem, times: float) -> PreparedLattice:
+    """A lattice of the tissue's modulus, of so many times the scene's spacing."""
+    tissue = model(scene, "tissue")
+    assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
+    spacing = times * scene.lattice.spacing
+    return tissue.varied(spacing=spacing, volume_term=lacks_poisson_ratio(scene)).prepare(problem)
+
+
+def lattice_at_rest(prepared: PreparedLattice) -> LatticeLook:
+    """A lattice under the full load, of small displacements and of large."""
+    assembly, material = prepared.assembly, prepared.springs.material
+    net = arrays(assembly, material)
+    large, how = relax(material.law, net, tolerance=AT_REST)
+    return LatticeLook(
+        prepared.model.lattice.spacing,
+        len(assembly.mass),
+        len(assembly.springs.weight),
+        prepared.critical_time_step,
+        sum(part.nbytes for part in net if isinstance(part, np.ndarray)),
+        _seen(prepared, static_displacement(assembly, material)),
+        _seen(prepared, large) if how.status == "at rest" else None,
+    )
+
+
+def _seen(prepared: PreparedLattice, nodal: Floats) -> Rest:
+    """A displacement of the nodes (n, 3), where it is looked at."""
+    seen, lattice = prepared.problem.observation, prepared.assembly.lattice
+    places = seen.probes, seen.volume_points
+    return Rest(*(np.asarray(lattice.interpolation(points)[0] @ nodal) for points in places))
+
+
+def _wall_per_spring(prepared: PreparedLattice) -> float:
+    """Wall of a step of a run [s], over the number of springs."""
+    stepper = prepared.stepper()
+    walls = []
+    for _ in range(TURNS):
+        started = time.perf_counter()
+        for _ in range(STEPS):
+            stepper.take_step()
+        walls.append(time.perf_counter() - started)
+    return min(walls) / STEPS / len(prepared.assembly.springs.weight)

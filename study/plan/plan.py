@@ -1,0 +1,213 @@
+"""What of a scene is modelled and what not, derived from what it requires.
+
+Chosen is the cheapest candidate that is expected to keep error, rate and memory, by its steps where
+there is a rate and by the whole run where there is none; without an error the most accurate. It is
+chosen before anything heavy runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from msm.timestep import whole_steps
+from study.models.table import named
+from study.plan.candidates import Candidate, candidates, resting
+from study.plan.look import Look, look
+from study.plan.prediction import Foresight, Measure
+from study.problem.problem import Problem
+from study.scene import Require, Scene
+from study.scene.problem import problem_of
+
+HISTORY, FIELD = "history", "field"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What was decided about a part of the model, and why."""
+
+    about: str
+    choice: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The scene to run, and the decisions that made it.
+
+    `candidate`: None where the scene's own models are kept.
+    """
+
+    scene: Scene
+    decisions: tuple[Decision, ...]
+    candidate: Candidate | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything is stepped in time, and not only brought to rest."""
+        required = self.scene.require
+        return required is None or HISTORY in required.quantities
+
+    @property
+    def large(self) -> bool:
+        """Whether large displacements are modelled."""
+        return self.candidate is None or not self.candidate.is_linear
+
+
+def plan(scene: Scene) -> Plan:
+    """Decide what is modelled of a scene.
+
+    Raises ValueError, with the nearest that can be had, for what no candidate is expected to keep.
+    """
+    required = scene.require
+    if required is None:
+        return Plan(scene, tuple(_as_stated(scene, "the scene has no table require")))
+    if scene.is_point:
+        return Plan(scene, tuple(_point(scene)))
+    problem = problem_of(scene)
+    seen = look(scene, problem)
+    foresight = Foresight(seen, measure(required, problem))
+    moves = HISTORY in required.quantities
+    offered = list((candidates if moves else resting)(scene, seen, foresight))
+    chosen = choose(offered, required)
+    return Plan(chosen.scene, tuple(_decisions(scene, seen, foresight, chosen)), chosen)
+
+
+def measure(required: Require, problem: Problem) -> Measure:
+    """Where the error counts. ValueError for a control point that there is not."""
+    for name in required.at:
+        if name not in problem.probes:
+            raise ValueError(
+                f"require.at: {name!r} is no control point; there are {', '.join(problem.probes)}"
+            )
+    names = required.at or problem.probes
+    volumes = problem.volume_rule.weights if FIELD in required.quantities else None
+    return Measure(tuple(problem.probes.index(name) for name in names), volumes)
+
+
+def choose(offered: Sequence[Candidate], required: Require) -> Candidate:
+    """The cheapest that keeps everything. ValueError, with the nearest, where none does."""
+    able = [one for one in offered if _keeps(one, required)]
+    if not able:
+        raise ValueError(_refusal(offered, required))
+    if required.error is None:
+        return min(able, key=lambda one: one.prediction.error)
+    if required.rate is None:
+        return min(able, key=lambda one: one.wall)
+    return min(able, key=lambda one: one.wall_per_s)
+
+
+def _keeps(one: Candidate, required: Require) -> bool:
+    return (
+        (required.error is None or one.prediction.error <= required.error)
+        and (required.memory is None or one.memory <= required.memory)
+        and (required.rate is None or in_time(one, required.rate))
+    )
+
+
+def in_time(one: Candidate, rate: float) -> bool:
+    """Whether the steps of a frame at a rate [Hz] are expected to be done within it."""
+    return whole_steps(1.0 / rate, one.step) * one.step_wall <= 1.0 / rate
+
+
+def _refusal(offered: Sequence[Candidate], required: Require) -> str:
+    """What cannot be had, and the nearest that can: an error at the rate and memory, or a rate."""
+    rest = [one for one in offered if _keeps(one, replace(required, error=None))]
+    if required.error is not None and rest:
+        nearest = min(rest, key=lambda one: one.prediction.error)
+        return (
+            f"require.error: {_percent(required.error)} is not expected of any model; the nearest "
+            f"is {_percent(nearest.prediction.error)}, by a {nearest.name}: allow it, or refine "
+            "lattice.spacing or reference.element_size"
+        )
+    fastest = min(offered, key=lambda one: (one.wall_per_s, one.memory))
+    return (
+        "require: no model keeps this rate or memory; the nearest is a "
+        f"{fastest.name}, {fastest.wall_per_s:.2g} s of wall per simulated second and "
+        f"{fastest.memory / 1e6:.0f} MB: relax require.rate or require.memory"
+    )
+
+
+# --- what was decided, in words -------------------------------------------------------------------
+
+
+def _as_stated(scene: Scene, why: str) -> Iterator[Decision]:
+    yield Decision("models", ", ".join(named(scene)), f"as stated: {why}")
+
+
+def _point(scene: Scene) -> Iterator[Decision]:
+    yield Decision("organ", "none, no mesh", "the scene is a single control mass point")
+    yield from _as_stated(scene, "an equation each, whose solution costs nothing")
+
+
+def _decisions(
+    scene: Scene, seen: Look, foresight: Foresight, chosen: Candidate
+) -> Iterator[Decision]:
+    required = scene.require
+    assert required is not None  # noqa: S101 - there is nothing to decide without
+    moves = HISTORY in required.quantities
+    yield Decision(
+        "time",
+        f"{scene.time.duration:g} s of motion" if moves else "no step: rest under the full load",
+        f"wanted: {', '.join(required.quantities)}",
+    )
+    yield Decision("displacements", _geometry(chosen), _strain(seen, foresight))
+    yield Decision("model", chosen.name, _why(chosen, required))
+    if moves:
+        yield Decision("step", f"{1e3 * chosen.step:.3g} ms", _step(chosen, required))
+    yield Decision("reference", *_reference(chosen))
+    yield Decision("output", *_output(required))
+    yield Decision("left out", *_left_out(scene, chosen))
+
+
+def _geometry(chosen: Candidate) -> str:
+    return "small" if chosen.is_linear else "large"
+
+
+def _strain(seen: Look, foresight: Foresight) -> str:
+    part = foresight.geometry
+    known = f"about {_percent(part)}" if part < float("inf") else "more than a coarse lattice bears"
+    return f"strain of {_percent(seen.strain)} at rest; small ones alone would be off by {known}"
+
+
+def _why(chosen: Candidate, required: Require) -> str:
+    parts = ", ".join(f"{part.cause} {_percent(part.error)}" for part in chosen.prediction.parts)
+    wanted = "" if required.error is None else f" of {_percent(required.error)} allowed"
+    return f"expected error {_percent(chosen.prediction.error)}{wanted}: {parts}"
+
+
+def _step(chosen: Candidate, required: Require) -> str:
+    cost = f"{chosen.wall_per_s:.2g} s of wall per simulated second, {chosen.setup:.2g} s before"
+    if required.rate is None:
+        return cost
+    count = whole_steps(1.0 / required.rate, chosen.step)
+    share = count * chosen.step_wall * required.rate
+    return f"{cost}; {count} to a frame of {required.rate:g} Hz, {_percent(share)} of its time"
+
+
+def _reference(chosen: Candidate) -> tuple[str, str]:
+    if len(chosen.scene.models) > 1:
+        return "finite elements", "a lattice does not know its own error"
+    return "none", "the parts of the error are told without one"
+
+
+def _output(required: Require) -> tuple[str, str]:
+    field = FIELD in required.quantities
+    where = ", ".join(required.at) or "all control points"
+    return f"{where}{', the whole field' if field else ''}", "as wanted"
+
+
+def _left_out(scene: Scene, chosen: Candidate) -> tuple[str, str]:
+    others = [name for name in named(scene) if name not in chosen.scene.models]
+    more = "; ".join(chosen.leaves_out)
+    return ", ".join(others) or "none of its models", more or "not required"
+
+
+def _percent(value: float) -> str:
+    """To a tenth where that says something."""
+    return f"{100.0 * value:.1f} %" if value < 0.0995 else f"{100.0 * value:.0f} %"
+
+
+def lines(found: Plan) -> list[str]:
+    """The decisions, for a person."""
+    return [f"{one.about}: {one.choice} ({one.reason})" for one in found.decisions]

@@ -1,0 +1,140 @@
+"""What is left out by a model, and about how much it matters, predicted from a look at rest.
+
+Everything here is an estimate, nothing a bound. What the look cannot tell, such as what the steps
+cost a motion, is told by the run itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.error_estimate import ASSUMED_ORDER
+from study.plan.look import LatticeLook, Look, Rest
+from study.similarity.fields import norm
+
+Floats = NDArray[np.float64]
+
+GEOMETRY, MESH, SPACING, REMAINDER, TRUNCATION = (
+    "large displacements left out",
+    "elements' mesh",
+    "lattice spacing",
+    "large displacements on a coarse lattice",
+    "subspace",
+)
+NONLINEAR_ORDER = 1.5
+"""Of the lattice's part by large displacements, observed between 20, 10 and 5 mm on the liver."""
+SUBSPACE = 1e-3
+"""Error of displacement that so many Ritz vectors leave, which the run tells itself."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A relative error by a cause."""
+
+    cause: str
+    error: float
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model leaves out; the errors are added, as they may have the same sign."""
+
+    parts: tuple[Part, ...]
+
+    @property
+    def error(self) -> float:
+        """Of all parts."""
+        return math.fsum(part.error for part in self.parts)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Where an error counts: at which control points (p,), and over the organ if `volumes`."""
+
+    probes: tuple[int, ...]
+    volumes: Floats | None
+
+    def __call__(self, apart: Rest, whole: Rest) -> float:
+        """The largest relative size of a difference."""
+        chosen = list(self.probes)
+        size = np.linalg.norm(whole.probes[chosen], axis=1)
+        found = (np.linalg.norm(apart.probes[chosen], axis=1) / size).tolist()
+        if self.volumes is not None:
+            found.append(norm(apart.field, self.volumes) / norm(whole.field, self.volumes))
+        return float(max(found))
+
+
+@dataclass(frozen=True)
+class Foresight:
+    """Errors that a look foretells for models on meshes and lattices that it did not solve."""
+
+    look: Look
+    measure: Measure
+
+    @cached_property
+    def whole(self) -> Rest:
+        """The best displacement known: finest elements, and what large displacements change."""
+        large = _nonlinear(self.look.lattices[-1])
+        linear = self.look.elements[-1].rest
+        return linear if large is None else linear.plus(large)
+
+    @cached_property
+    def geometry(self) -> float:
+        """What a linear model leaves out; infinite where a lattice found no rest.
+
+        The part of the finest lattice and its change from the one before, as it still grows.
+        """
+        parts = [_nonlinear(one) for one in self.look.lattices[-2:]]
+        if any(part is None for part in parts):
+            return math.inf
+        before, last = (part for part in parts if part is not None)
+        return self._size(last) + self._size(last.plus(before, -1.0))
+
+    def remainder(self, spacing: float) -> float:
+        """What large displacements still leave, told on a lattice of a spacing [m] alone.
+
+        From the coarsest and the finest lattice, by the order observed.
+        """
+        first, last = self.look.lattices[0], self.look.lattices[-1]
+        parts = _nonlinear(first), _nonlinear(last)
+        if parts[0] is None or parts[1] is None:
+            return math.inf
+        gain = (first.spacing**NONLINEAR_ORDER - last.spacing**NONLINEAR_ORDER) ** -1.0
+        return float(self._size(parts[1].plus(parts[0], -1.0)) * gain * spacing**NONLINEAR_ORDER)
+
+    def mesh(self, size: float) -> float:
+        """Discretisation error of elements of a size [m]; infinite where one mesh is all there is.
+
+        By Richardson from the two finest meshes looked at, with the order of curved organs and
+        edges of supports. It has no factor of safety: the run states an error that has.
+        """
+        if len(self.look.elements) < 2:
+            return math.inf
+        before, last = self.look.elements[-2:]
+        gain = (before.size / last.size) ** ASSUMED_ORDER - 1.0
+        change = self._size(last.rest.plus(before.rest, -1.0))
+        return float(change / gain * (size / last.size) ** ASSUMED_ORDER)
+
+    def spacing(self, spacing: float) -> float:
+        """Error of a lattice of a spacing [m], by a fit of C h^p to those looked at."""
+        seen = self.look.lattices
+        errors = [self._size(self._of(one).plus(self.whole, -1.0)) for one in seen]
+        sizes = np.log([one.spacing for one in seen])
+        order, level = np.polyfit(sizes, np.log(errors), 1)
+        return float(np.exp(level + order * np.log(spacing)))
+
+    def _of(self, one: LatticeLook) -> Rest:
+        return one.linear if one.nonlinear is None else one.nonlinear
+
+    def _size(self, apart: Rest) -> float:
+        return self.measure(apart, self.whole)
+
+
+def _nonlinear(one: LatticeLook) -> Rest | None:
+    """What large displacements change on a lattice."""
+    return None if one.nonlinear is None else one.nonlinear.plus(one.linear, -1.0)

@@ -1,0 +1,269 @@
+"""What is modelled follows from what a scene requires, and nothing else is computed."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fem_reference.observation import at_points, evaluation
+from fem_reference.solvers import solve_static
+from msm.stepper import LatticeStepper
+from study.commands.plan import plan as plan_command
+from study.commands.run import run
+from study.models.finite_elements import PreparedElements, reference_of
+from study.plan import plan as planning
+from study.plan.candidates import candidates
+from study.plan.look import lattice_at_rest, look, on_lattice
+from study.plan.plan import choose, in_time, lines, measure, plan
+from study.plan.prediction import Foresight, Part, Prediction
+from study.progress import Silent
+from study.results.folder import read
+from study.run.rest import rest_of
+from study.scene import Require
+from study.scene.file import SceneError, read_scene
+from study.scene.problem import problem_of
+from tests.conftest import SMALL
+
+AT_TOOL = ('require.at=["tool"]',)
+
+
+def scene_of(*overrides):
+    return read_scene("block", (*SMALL, *overrides))
+
+
+@cache
+def looked(*overrides):
+    """A look at the small block, and its foresight at the tool."""
+    scene = scene_of("require.error=5 %", *AT_TOOL, *overrides)
+    problem = problem_of(scene)
+    seen = look(scene, problem)
+    return scene, seen, Foresight(seen, measure(scene.require, problem))
+
+
+@cache
+def offered(*overrides):
+    return tuple(candidates(*looked(*overrides)))
+
+
+def of_kind(kind, found):
+    return [one for one in found if kind in one.scene.models]
+
+
+# --- the choice -----------------------------------------------------------------------------------
+
+
+def test_cheapest_that_keeps_the_error_is_chosen():
+    for error in (0.3, 0.1, 0.06):
+        found = choose(offered(), Require(error=error))
+        assert found.prediction.error <= error
+        cheaper = [one for one in offered() if one.wall < found.wall]
+        assert all(one.prediction.error > error for one in cheaper)
+
+
+def test_most_accurate_that_keeps_the_rate_is_chosen_for_a_rate_alone():
+    found = choose(offered(), Require(rate=1000.0))
+    assert in_time(found, 1000.0)
+    better = [one for one in offered() if one.prediction.error < found.prediction.error]
+    assert not any(in_time(one, 1000.0) for one in better)
+
+
+def test_memory_leaves_out_what_does_not_fit():
+    smallest = min(one.memory for one in offered())
+    assert choose(offered(), Require(memory=1.5 * smallest)).memory <= 1.5 * smallest
+
+
+@pytest.mark.parametrize(
+    ("required", "said"),
+    [
+        (Require(error=1e-4), r"require\.error: 0\.0 % is not expected of any model; the nearest"),
+        (Require(memory=1.0), r"require: no model keeps this rate or memory; the nearest is a"),
+    ],
+)
+def test_what_no_candidate_keeps_is_refused_with_the_nearest(required, said):
+    with pytest.raises(ValueError, match=said):
+        choose(offered(), required)
+
+
+def test_planted_error_of_the_linear_models_turns_the_choice():
+    """A foresight that saw far larger displacements leaves small ones out of the question."""
+    required = Require(error=0.2)
+    assert choose(offered(), required).is_linear
+    worse = [
+        replace(
+            one,
+            prediction=Prediction(
+                tuple(
+                    Part(part.cause, 0.5) if one.is_linear and k == 0 else part
+                    for k, part in enumerate(one.prediction.parts)
+                )
+            ),
+        )
+        for one in offered()
+    ]
+    assert not choose(worse, required).is_linear
+
+
+# --- the foresight --------------------------------------------------------------------------------
+
+
+def off_by(found, truth):
+    return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
+
+
+def test_foreseen_error_of_the_mesh_is_that_against_a_much_finer_one():
+    scene, seen, foresight = looked()
+    problem, tool = seen.problem, seen.problem.tool_probe
+
+    def at(level):
+        body = reference_of(scene).varied(level=level).prepare(problem).body()
+        points = evaluation(body, problem.observation.probes)
+        return at_points(points, solve_static(body))[tool]
+
+    size = problem.geometry.level(0).size
+    assert 0.5 < foresight.mesh(size) / off_by(at(0), at(5)) < 5.0  # coarse meshes: rather too much
+    assert foresight.mesh(0.5 * size) == pytest.approx(0.25 * foresight.mesh(size))
+
+
+def test_foreseen_parts_of_large_displacements_are_those_of_a_finer_lattice():
+    scene, seen, foresight = looked("tool.force=0.2 N")
+    tool = seen.problem.tool_probe
+    fine = lattice_at_rest(on_lattice(scene, seen.problem, 0.5))
+    part = (fine.nonlinear.probes - fine.linear.probes)[tool]
+    whole = np.linalg.norm(foresight.whole.probes[tool])
+    assert 0.5 < foresight.geometry / (np.linalg.norm(part) / whole) < 3.0
+    last = seen.lattices[-1]
+    left = part - (last.nonlinear.probes - last.linear.probes)[tool]
+    assert 0.4 < foresight.remainder(last.spacing) / (np.linalg.norm(left) / whole) < 3.0
+
+
+def test_lattice_that_finds_no_rest_leaves_its_parts_unknown():
+    scene, seen, foresight = looked()
+    lost = tuple(replace(one, nonlinear=None) for one in seen.lattices)
+    blind = Foresight(replace(seen, lattices=lost), foresight.measure)
+    assert blind.geometry == blind.remainder(0.01) == float("inf")
+    found = choose(candidates(scene, seen, blind), Require(error=0.9))
+    assert found.scene.models == ("fem", "tissue")
+
+
+def test_field_counts_only_where_it_is_wanted():
+    scene, seen, _ = looked()
+    volumes = measure(Require(quantities=("history", "field")), seen.problem).volumes
+    assert volumes is seen.problem.volume_rule.weights
+    assert measure(Require(), seen.problem).volumes is None
+    assert measure(scene.require, seen.problem).probes == (seen.problem.tool_probe,)
+
+
+# --- nothing needless -----------------------------------------------------------------------------
+
+
+def no_step(_, dt):
+    """In place of the steps that a look times."""
+    assert dt > 0.0
+
+
+def refuse(*_, **__):
+    raise AssertionError("this is not needed")
+
+
+def test_scene_that_wants_rest_takes_no_step_and_tells_its_errors(tmp_path, monkeypatch):
+    monkeypatch.setattr(LatticeStepper, "take_step", no_step)
+    monkeypatch.setattr("msm.model.run", refuse)
+    monkeypatch.setattr("fem_reference.model.run", refuse)
+    out = tmp_path / "rest"
+    overrides = [*SMALL, 'require.quantities=["rest", "field"]', "require.error=60 %"]
+    run("block", set_=overrides, out=out)
+    rows = list(csv.DictReader((out / "rest.csv").read_text().splitlines()))
+    assert [row["probe"] for row in rows] == ["tool", "corner"]
+    assert all(float(row["mesh_error"]) > 0.0 for row in rows)
+    assert (out / "rest.vtu").exists()
+    run("block", set_=overrides, out=out)  # replaces its own, and nothing else
+    (out / "mine.txt").write_text("kept", encoding="utf-8")
+    with pytest.raises(ValueError, match="holds"):
+        run("block", set_=overrides, out=out)
+    assert (out / "mine.txt").exists()
+
+
+def test_rest_has_what_large_displacements_change_where_it_is_asked_for():
+    scene = scene_of('require.quantities=["rest"]', "require.error=50 %")
+    found = {large: rest_of(scene, Silent(), large=large).rows[0] for large in (False, True)}
+    seen = looked()[1]
+    change = seen.lattices[-1].nonlinear.probes - seen.lattices[-1].linear.probes
+    gained = found[True].along_push_m - found[False].along_push_m
+    assert gained == pytest.approx(float(change[0] @ seen.problem.tool.direction), rel=1e-6)
+    assert found[True].large_displacement_error < found[False].large_displacement_error
+
+
+def test_scene_that_knows_its_error_needs_no_reference(tmp_path, monkeypatch):
+    monkeypatch.setattr(PreparedElements, "run", refuse)
+    monkeypatch.setattr(LatticeStepper, "take_step", no_step)
+    monkeypatch.setattr("msm.model.run", refuse)
+    out = tmp_path / "results"
+    run("block", set_=[*SMALL, "require.error=30 %", *AT_TOOL], out=out, report=False)
+    results = read(out)
+    assert [one.name for one in results.record.models] == ["superposition"]
+    assert any("Planned: model" in note for note in results.record.notes)
+
+
+def test_point_builds_no_mesh(monkeypatch):
+    monkeypatch.setattr(planning, "problem_of", refuse)
+    found = plan(read_scene("paper", ("require.error=5 %",)))
+    assert found.decisions[0].choice == "none, no mesh"
+    assert found.scene.models == read_scene("paper").models
+
+
+# --- what is said ---------------------------------------------------------------------------------
+
+
+WALL = re.compile(r"\([^)]*of wall per simulated second[^)]*\)")
+WANTS = {
+    "as-stated": (),
+    "rest": ('require.quantities=["rest"]', "require.error=10 %"),
+    "tool": ("require.error=6 %", *AT_TOOL),
+    "large": ("require.error=6 %", *AT_TOOL, "tool.force=1 N"),
+    "field": ('require.quantities=["history", "field"]', "require.error=15 %"),
+}
+
+
+@pytest.mark.parametrize("name", WANTS)
+def test_plan_of_the_block_is_as_kept(name, request):
+    """Numbers that a machine's speed decides are left out."""
+    said = WALL.sub("", "\n".join(lines(plan(read_scene("block", WANTS[name]))))) + "\n"
+    kept = request.path.parent / "data" / "plans" / f"block-{name}.txt"
+    if request.config.getoption("--update-scores"):
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_text(said, encoding="utf-8")
+    assert said == kept.read_text(encoding="utf-8")
+
+
+def test_planned_scene_is_written_and_runs_as_it_is(tmp_path, capsys):
+    out = tmp_path / "planned.toml"
+    plan_command("block", set_=[*SMALL, "require.error=30 %", *AT_TOOL], out=out)
+    assert "model: " in capsys.readouterr().out
+    assert read_scene(str(out)).models == ("superposition",)
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ('require.at=["liver"]', "'liver' is no control point; there are tool, corner"),
+        ('require.quantities=["field"]', "name rest, history or both"),
+        ('require.quantities=["rest", "rest"]', "named twice"),
+        ("require.rate=60 s", "'s' is not a unit like Hz"),
+        ("require.memory=2 mm", "'mm' is not a unit like byte"),
+        ("require.eror=5 %", "did you mean 'error'?"),
+    ],
+)
+def test_wrong_wants_are_refused_by_their_key(override, said):
+    with pytest.raises(SceneError, match="require") as error:
+        scene_of(override)
+    assert said in str(error.value)
+
+
+def test_rate_of_what_does_not_move_is_refused():
+    with pytest.raises(SceneError, match="nothing moves at rest"):
+        scene_of('require.quantities=["rest"]', "require.rate=60 Hz")
