@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
+from study.folders import tell
 
 if TYPE_CHECKING:
     from study.progress import Progress
     from study.results import Results
+    from study.scene import Scene
+    from study.stages.store import Store
 
 
 def run(
@@ -21,8 +25,12 @@ def run(
     report: bool = True,
     fields: Switch = False,
     resume: Switch = False,
+    fresh: Switch = False,
+    workers: int | None = None,
 ) -> None:
     """Run a scene through every model it names and write a results folder with its report.
+
+    What an earlier run has computed, and this one would again, is taken from the user's store.
 
     Parameters
     ----------
@@ -37,37 +45,88 @@ def run(
     fields
         Keep the motion of all nodes of lattices and fem as MODEL.vtkhdf, which ParaView reads.
     resume
-        Go on from where an interrupted run into the same folder last kept its state.
+        Go on within the models that an interrupted run into the same folder was at.
+    fresh
+        Compute everything anew.
+    workers
+        Processes that stages run in side by side, as many as processors by default; 1 for none.
     """
-    from study.models.keeping import Keeping
-    from study.models.model import Watch
-    from study.progress import on_stderr
-    from study.results.folder import continuing, default_folder, replacing, write
-    from study.run.study import run_study
+    from study.results.folder import default_folder
     from study.scene.file import read_scene
+    from study.stages.store import user_store
 
+    if resume and fresh:
+        raise ValueError("--resume and --fresh: give one; --fresh takes nothing from before")
+    if workers is not None and workers < 1:
+        raise ValueError(f"--workers {workers}: give 1 or more")
     chosen = read_scene(scene, set_ or ())
     if fields and chosen.is_point:
         raise ValueError("--fields: a single point has none; leave it out")
-    folder = out or default_folder(scene)
+    how = _How(out or default_folder(scene), report, fields, resume, fresh, workers)
+    results = _results(chosen, how, user_store())
+    if any(not check.passed for check in results.record.checks):
+        sys.exit(EXIT_FAILED_CHECK)
+
+
+@dataclass(frozen=True)
+class _How:
+    """Flags of a run."""
+
+    folder: Path
+    report: bool
+    fields: bool
+    resume: bool
+    fresh: bool
+    workers: int | None
+
+
+def _results(scene: Scene, how: _How, store: Store | None) -> Results:
+    """Results that the folder has, or that are written into it, once a person is told of them."""
+    from study.progress import on_stderr
+    from study.run import unchanged
+
+    key = "" if store is None else unchanged.run_key(scene, fields=how.fields)
+    left = None if store is None or how.fresh else unchanged.left_by(store, key, how.folder, scene)
+    if left is not None:
+        tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")
     with on_stderr() as progress:
-        with replacing(folder) as partial, continuing(folder, resume=resume) as state:
-            keeping = Keeping(state, resume, partial if fields else None)
-            results = run_study(chosen, Watch(progress, keeping))
-            with progress.stage("results"):
-                write(results, partial)
-        failure = _report_failure(folder, progress) if report else None  # the results are safe
-    _print_summary(results, folder)
+        results = _computed(scene, how, store, progress) if left is None else left.results
+        wanted = how.report and not (left and left.has_report)
+        failure = _report_failure(how.folder, progress) if wanted else None
+    if store is not None and (left is None or wanted):
+        unchanged.note(store, key, how.folder)
+    _print_summary(results, how.folder)
     if failure is not None:
         reason = str(failure) or type(failure).__name__
         print(
-            f"liver-study: results kept, but no report: {reason}; liver-study report {folder} "
+            f"liver-study: results kept, but no report: {reason}; liver-study report {how.folder} "
             "makes it",
             file=sys.stderr,
         )
         sys.exit(EXIT_MACHINE)
-    if any(not check.passed for check in results.record.checks):
-        sys.exit(EXIT_FAILED_CHECK)
+    return results
+
+
+def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
+    from study.models.keeping import Keeping
+    from study.models.model import Watch
+    from study.results.folder import continuing, replacing, write
+    from study.run.stages import Means, told
+    from study.run.study import run_study
+    from study.stages.lanes import available
+
+    means = Means(store, how.fresh, how.workers or available())
+    with (
+        replacing(how.folder) as partial,
+        continuing(how.folder, scene, resume=how.resume) as state,
+    ):
+        keeping = Keeping(state, how.resume, partial if how.fields else None)
+        results = run_study(scene, Watch(progress, keeping), means)
+        with progress.stage("results"):
+            write(results, partial)
+    if store is not None:
+        tell(told(results.record.stages, store))
+    return results
 
 
 def _report_failure(folder: Path, progress: Progress) -> Exception | KeyboardInterrupt | None:

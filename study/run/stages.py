@@ -7,7 +7,7 @@ by side.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Generic, TypeVar
@@ -17,7 +17,8 @@ from study.progress import Progress
 from study.results.records import StageRecord
 from study.stages.flat import flattened, restored
 from study.stages.lanes import Job, Lanes
-from study.stages.store import Entry, Store
+from study.stages.store import Entry, Store, shown_size
+from study.sweep.tally import duration
 
 T = TypeVar("T")
 
@@ -123,3 +124,12 @@ def _keep(stage: Stage[T], value: T, store: Store, wall: float) -> None:
 def _record(name: str, entry: Entry, *, kept: bool) -> StageRecord:
     at = datetime.fromtimestamp(entry.measured, UTC).isoformat(timespec="seconds")
     return StageRecord(name=name, wall_s=entry.wall, measured_at=at, kept=kept)
+
+
+def told(records: Sequence[StageRecord], store: Store) -> str:
+    """For a person: which stages were kept from earlier runs, and how large the store is."""
+    kept = [one.name for one in records if one.kept]
+    seconds = sum(one.wall_s for one in records if one.kept)
+    what = f"kept from earlier runs, {duration(seconds)} of work: {', '.join(kept)}"
+    size = f"{shown_size(store.size())} of at most {shown_size(store.limit)}"
+    return f"{what if kept else 'no stage was kept before'}; the store {store.folder} has {size}"

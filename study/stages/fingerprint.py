@@ -12,6 +12,7 @@ import functools
 import hashlib
 import platform
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from types import FunctionType, MethodType, NoneType
 from typing import Any
 
@@ -34,7 +35,7 @@ def key(stage: str, *things: object, modules: tuple[str, ...] = ()) -> str | Non
         programs = {name: program(name) for name in sorted(found)}
     except (NotToldError, ValueError):
         return None
-    return digest([stage, told, programs, _machine()])
+    return digest([stage, told, programs, machine()])
 
 
 def text(thing: object) -> str:
@@ -43,11 +44,18 @@ def text(thing: object) -> str:
 
 
 @functools.cache
-def _machine() -> list[str]:
+def machine() -> list[str]:
     """What rounding depends on beside the program, and what a wall time is one of."""
-    import llvmlite.binding as llvm
+    return [platform.system(), platform.machine(), platform.processor(), *_processor()]
 
-    return [platform.machine(), platform.system(), llvm.get_host_cpu_name()]
+
+def _processor() -> list[str]:
+    """Name and instructions of the processor as Linux tells them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    return sorted({line for line in lines if line.startswith(("model name", "flags"))})
 
 
 @functools.singledispatch

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.folders import FolderError, naming, refusal
+from study.folders import FolderError, naming, refusal, tell
 from study.sweep.canonical import Plain, canonical, digest
 
 if TYPE_CHECKING:
@@ -134,10 +134,22 @@ class Store:
                     path.unlink()
 
 
-def default_store() -> Store:
-    """The store of this user, as the environment names it. ValueError for a limit that is none."""
+def user_store() -> Store | None:
+    """The store of this user, as the environment names it, ready to be used.
+
+    ValueError for a folder or a limit named there that will not do; where the user's own cache will
+    not, there is no store, and a person is told.
+    """
     named = os.environ.get(FOLDER)
-    return Store(Path(named).absolute() if named else _user_cache(), _limit())
+    store = Store(Path(named).absolute() if named else _user_cache(), _limit())
+    try:
+        store.prepare()
+    except (FolderError, OSError) as error:
+        if named:
+            raise
+        tell(f"stages are not kept for the next run: {error}")
+        return None
+    return store
 
 
 def _user_cache() -> Path:
