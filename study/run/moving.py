@@ -115,7 +115,7 @@ class Moving:
 
         ValueError for whatever a run would refuse, before it is waited for.
         """
-        posed = self.stages.now(self._posed())
+        posed = self.stages.now(self.posed())
         missing = self._missing(posed.mesh)
         if missing and posed.mesh != self.posing.mesh:  # made anew, and otherwise
             posed = self.posing.posed()
@@ -162,7 +162,8 @@ class Moving:
 
     # --- the stages --------------------------------------------------------------------------
 
-    def _posed(self) -> Stage[Posed]:
+    def posed(self) -> Stage[Posed]:
+        """The problem as its results tell it."""
         lattice = self.scene.lattice
         given = (self.posing.part, self.organ, lattice.springs, lattice.spacing)
         found = key(ORGAN, *given, modules=(__name__,))
@@ -170,9 +171,9 @@ class Moving:
 
     def _missing(self, mesh: str) -> list[Wanted]:
         """What is not kept, the dearest first."""
-        return [one for one in self._all(mesh) if self.stages.kept(one.stage) is None]
+        return [one for one in self.all_stages(mesh) if self.stages.kept(one.stage) is None]
 
-    def _all(self, mesh: str) -> Iterator[Wanted]:
+    def all_stages(self, mesh: str) -> Iterator[Wanted]:
         """All stages on a mesh."""
         yield from (self._of_model(name, mesh) for name in self.models)
         if self.lattice is None:

@@ -92,14 +92,17 @@ def _suited(scene: Scene, stages: Stages) -> Scene:
 
 
 def _start_fuzzy(scene: Scene, stages: Stages, rule_base: str | None) -> None:
-    """Let the fuzzy systems be evaluated, if a model is tuned by them."""
-    if not is_tuned(scene):
-        return
+    """Let the fuzzy systems be evaluated, if a model is tuned by them and it is not kept."""
+    stage = fuzzy_stage(scene, rule_base)
+    if is_tuned(scene) and stages.kept(stage) is None:
+        stages.start(stage)
+
+
+def fuzzy_stage(scene: Scene, rule_base: str | None) -> Stage[FuzzySide]:
+    """The fuzzy systems of a scene; `rule_base`: SHA-256 of a file of one's own rules."""
     seen = without(scene, NO_FUZZY)
     found = key(FUZZY, seen, rule_base, modules=("study.models.estimates",))
-    stage = Stage(FUZZY, FuzzySide, found, partial(_fuzzy, seen))
-    if stages.kept(stage) is None:
-        stages.start(stage)
+    return Stage(FUZZY, FuzzySide, found, partial(_fuzzy, seen))
 
 
 def _fuzzy(seen: Scene, progress: Progress) -> FuzzySide:

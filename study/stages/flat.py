@@ -61,7 +61,7 @@ def restored(kind: type[Value], plain: Any, arrays: Mapping[str, NDArray[Any]]) 
     """A value of a kind from what `flattened` gave. ValueError where it is none of that kind."""
     try:
         found: Value = _made(kind, plain, arrays)
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ValueError(f"holds no {kind.__name__} ({error})") from None
     return found
 
@@ -86,12 +86,11 @@ def _made(kind: Any, plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
 
 def _of_class(kind: Any, plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     hints = _hints(kind)
-    if hints and isinstance(plain, dict):
-        return kind(**{name: _made(hints[name], value, arrays) for name, value in plain.items()})
+    if dataclasses.is_dataclass(kind):
+        return kind(**{name: _made(hints[name], value, arrays) for name, value in plain.items()})  # type: ignore[operator] # a class
     if hints:  # a named tuple
-        return kind(
-            *(_made(hint, x, arrays) for hint, x in zip(hints.values(), plain, strict=True))
-        )
+        pairs = zip(hints.values(), plain, strict=True)
+        return kind(*(_made(hint, value, arrays) for hint, value in pairs))
     if kind is float and isinstance(plain, dict):
         return float(plain[NUMBER])
     if type(plain) is not kind and not (kind is float and type(plain) is int):

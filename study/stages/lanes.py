@@ -240,8 +240,9 @@ def _serve(pipe: Connection, jobs: list[Job], progress: Progress) -> NoReturn:
 def _heed_the_parent() -> None:
     """Leave what is typed at the terminal to the parent, and end with it."""
     for number in signals.numbers():
-        signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        # One that waits to be answered would be lost if it were ignored, be it for a moment.
+        ends = number == signal.SIGTERM
+        signal.signal(number, signal.SIG_DFL if ends else signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, signals.numbers())
     Thread(target=_end_with_the_parent, daemon=True).start()
 
