@@ -43,6 +43,14 @@ def _heeding_signals():
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _store_of_their_own(tmp_path_factory):
+    """Tests and their children neither read nor fill the store of whoever runs them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIVER_STUDY_STORE", str(tmp_path_factory.mktemp("store")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def small_scene() -> Scene:
     return read_scene("block", SMALL)

@@ -10,7 +10,7 @@ from fuzzy.liver.stiffness import StiffnessEstimate
 from reports import budget as printed
 from study.models.estimates import FuzzySide
 from study.run import budget as causes
-from study.run import ready, study
+from study.run import study
 from study.scene.file import read_scene
 
 SMALL = (
@@ -35,7 +35,7 @@ def budget(*changes, factor=1.0):
     made = StiffnessEstimate("mamdani", modulus, None, 0.0, (), "")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "run_fuzzy", lambda _: FuzzySide({"mamdani": made}))
-        patch.setattr(ready, "estimates", lambda _: {"mamdani": made})
+        patch.setattr(study, "estimates", lambda _: {"mamdani": made})
         return study.run_study(scene)
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
+from study.folders import tell
 
 if TYPE_CHECKING:
-    from study.plan.plan import Plan
     from study.progress import Progress
     from study.results import Results
     from study.scene import Scene
+    from study.stages.store import Store
 
 
 def run(
@@ -24,8 +25,12 @@ def run(
     report: bool = True,
     fields: Switch = False,
     resume: Switch = False,
+    fresh: Switch = False,
+    workers: int | None = None,
 ) -> None:
     """Run a scene through every model it names and write a results folder with its report.
+
+    What an earlier run has computed, and this one would again, is taken from the user's store.
 
     Parameters
     ----------
@@ -40,78 +45,100 @@ def run(
     fields
         Keep the motion of all nodes of lattices and fem as MODEL.vtkhdf, which ParaView reads.
     resume
-        Go on from where an interrupted run into the same folder last kept its state.
+        Go on within the models that an interrupted run into the same folder was at.
+    fresh
+        Compute everything anew.
+    workers
+        Processes that stages run in side by side, as many as processors by default; 1 for none.
     """
-    from study.models.keeping import Keeping
-    from study.models.model import Watch
     from study.progress import on_stderr
-    from study.results.folder import continuing, default_folder, replacing, write
-    from study.run.study import run_study
+    from study.results.folder import default_folder
     from study.scene.file import read_scene
+    from study.stages.store import user_store
 
+    if resume and fresh:
+        raise ValueError("--resume and --fresh: give one; --fresh takes nothing from before")
+    if workers is not None and workers < 1:
+        raise ValueError(f"--workers {workers}: give 1 or more")
     chosen = read_scene(scene, set_ or ())
     if fields and chosen.is_point:
         raise ValueError("--fields: a single point has none; leave it out")
     folder = out or default_folder(scene)
-    with on_stderr() as progress:
-        if chosen.require is not None:
-            planned = _planned(chosen, progress)
-            if not planned.moves:
-                _run_at_rest(planned, out or folder.with_name(f"{folder.name}-rest"), progress)
+    if chosen.require is not None:
+        from study.run import planned
+
+        with on_stderr() as progress:
+            found = planned.planned(chosen, progress)
+            if not found.moves:
+                at = out or folder.with_name(f"{folder.name}-rest")
+                print("\n".join(planned.at_rest(found, at, progress)))
                 return
-            chosen = planned.scene
-        with replacing(folder) as partial, continuing(folder, resume=resume) as state:
-            keeping = Keeping(state, resume, partial if fields else None)
-            results = run_study(chosen, Watch(progress, keeping))
-            with progress.stage("results"):
-                write(results, partial)
-        failure = _report_failure(folder, progress) if report else None  # the results are safe
-    _print_summary(results, folder)
-    if failure is not None:
-        reason = str(failure) or type(failure).__name__
-        print(
-            f"liver-study: results kept, but no report: {reason}; liver-study report {folder} "
-            "makes it",
-            file=sys.stderr,
-        )
-        sys.exit(EXIT_MACHINE)
+        chosen = found.scene
+    how = _How(folder, report, fields, resume, fresh, workers)
+    results = _results(chosen, how, user_store())
     if any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
 
 
-def _planned(scene: Scene, progress: Progress) -> Plan:
-    """What is modelled of a scene that says what it requires; the plan is told and kept."""
-    from study.plan.plan import lines, plan
-    from study.run.suiting import suited
+@dataclass(frozen=True)
+class _How:
+    """Flags of a run."""
 
-    with progress.stage("plan"):
-        found = plan(suited(scene, progress))
-    told = lines(found)
-    print("\n".join(told))
-    remarks = (*found.scene.remarks, *(f"Planned: {line}." for line in told))
-    return replace(found, scene=replace(found.scene, remarks=remarks))
+    folder: Path
+    report: bool
+    fields: bool
+    resume: bool
+    fresh: bool
+    workers: int | None
 
 
-def _run_at_rest(planned: Plan, folder: Path, progress: Progress) -> None:
-    """Solve at rest and write a folder of that, which has no curves and so no report."""
-    from study.results import rest as results
-    from study.run.rest import rest_of
-    from study.scene.file import write_scene
+def _results(scene: Scene, how: _How, store: Store | None) -> Results:
+    """Results that the folder has, or that are written into it, once a person is told of them."""
+    from study.progress import on_stderr
+    from study.run import unchanged
 
-    required = planned.scene.require
-    with results.replacing(folder) as partial:
-        found = rest_of(planned.scene, progress, large=planned.large)
-        results.write(found.rows, write_scene(planned.scene), partial)
-        if required is not None and "field" in required.quantities:
-            results.write_field(found.mesh, found.displacement, partial)
-    for row in found.rows:
-        errors = (row.mesh_error, row.large_displacement_error)
-        known = " and ".join("unknown" if e is None else f"{100.0 * e:.2g} %" for e in errors)
+    key = "" if store is None else unchanged.run_key(scene, fields=how.fields)
+    left = None if store is None or how.fresh else unchanged.left_by(store, key, how.folder, scene)
+    if left is not None:
+        tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")
+    with on_stderr() as progress:
+        results = _computed(scene, how, store, progress) if left is None else left.results
+        wanted = how.report and not (left and left.has_report)
+        failure = _report_failure(how.folder, progress) if wanted else None
+    if store is not None and (left is None or wanted):
+        unchanged.note(store, key, how.folder)
+    _print_summary(results, how.folder)
+    if failure is not None:
+        reason = str(failure) or type(failure).__name__
         print(
-            f"{row.probe}: {1e3 * row.along_push_m:.4g} mm along the push, estimated error "
-            f"{known} by mesh and large displacements"
+            f"liver-study: results kept, but no report: {reason}; liver-study report {how.folder} "
+            "makes it",
+            file=sys.stderr,
         )
-    print(f"results in {folder}")
+        sys.exit(EXIT_MACHINE)
+    return results
+
+
+def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
+    from study.models.keeping import Keeping
+    from study.models.model import Watch
+    from study.results.folder import continuing, replacing, write
+    from study.run.stages import Means, told
+    from study.run.study import run_study
+    from study.stages.lanes import available
+
+    means = Means(store, how.fresh, how.workers or available())
+    with (
+        replacing(how.folder) as partial,
+        continuing(how.folder, scene, resume=how.resume) as state,
+    ):
+        keeping = Keeping(state, how.resume, partial if how.fields else None)
+        results = run_study(scene, Watch(progress, keeping), means)
+        with progress.stage("results"):
+            write(results, partial)
+    if store is not None:
+        tell(told(results.record.stages, store))
+    return results
 
 
 def _report_failure(folder: Path, progress: Progress) -> Exception | KeyboardInterrupt | None:

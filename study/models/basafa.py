@@ -70,4 +70,10 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, on_point=on_point, assumptions=assumptions, is_reference=True)
+KIND = ModelKind(
+    models=models,
+    on_point=on_point,
+    assumptions=assumptions,
+    is_reference=True,
+    blind_to=("reference", "superposition"),
+)

@@ -67,4 +67,5 @@ KIND = ModelKind(
     is_tuned=True,
     of_patient=True,
     follows_law=True,
+    blind_to=("patient", "fuzzy", "reference", "superposition", "basafa"),
 )

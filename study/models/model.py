@@ -18,6 +18,7 @@ from study.problem.trajectory import Trajectory
 from study.progress import Progress, Silent
 from study.results.records import Check, ModelRecord
 from study.scene import Scene
+from study.scene.part import without
 
 if TYPE_CHECKING:
     from fuzzy.liver.stiffness import StiffnessEstimate
@@ -160,8 +161,9 @@ class ModelKind:
     the others are compared with it; `any_load`: whether it follows a load whose place was not known
     beforehand; `is_tuned`: whether its models are those of the fuzzy estimates; `of_patient`:
     whether their stiffness is a patient's, who has no part in trade-offs and extremes;
-    `follows_law`: whether its springs have the law and damping of the scene. A model that is a
-    reference has the name of its kind.
+    `follows_law`: whether its springs have the law and damping of the scene; `blind_to`: tables and
+    keys of the scene that its models are made without, so that a run that differs in these alone
+    need not move them again. A model that is a reference has the name of its kind.
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
@@ -172,3 +174,9 @@ class ModelKind:
     of_patient: bool = False
     follows_law: bool = False
     any_load: bool = True
+    blind_to: tuple[str, ...] = ()
+
+    def seen(self, scene: Scene) -> Scene:
+        """What its models see of a scene: only a patient's are made of readings and rules."""
+        unread = () if self.of_patient else ("patient", "fuzzy")
+        return without(scene, (*unread, *self.blind_to))

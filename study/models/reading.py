@@ -55,4 +55,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     of_patient=True,
     follows_law=True,
+    blind_to=("fuzzy", "reference", "superposition", "basafa"),
 )

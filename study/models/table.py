@@ -38,7 +38,8 @@ def models_of(scene: Scene, estimates: Estimates) -> Iterator[Model]:
     """All models that a scene with an organ names. ValueError for two of the same name."""
     seen: set[str] = set()
     for name in named(scene):
-        for found in kind(name).models(scene, estimates):
+        of_kind = kind(name)
+        for found in of_kind.models(of_kind.seen(scene), estimates):
             if found.name in seen:
                 raise ValueError(f"models: {name} makes a second model named {found.name}")
             seen.add(found.name)
@@ -56,7 +57,7 @@ def point_models_of(scene: Scene, estimates: Estimates) -> Iterator[PointModel]:
 
 def model(scene: Scene, name: str) -> Model:
     """The model of a kind that has one. ValueError for a kind of several, as of fuzzy estimates."""
-    found = list(kind(name).models(scene, {}))
+    found = list(kind(name).models(kind(name).seen(scene), {}))
     if len(found) != 1:
         raise ValueError(f"models: {name} stands for several models; name a kind that is one model")
     return found[0]

@@ -58,4 +58,9 @@ def assumptions(scene: Scene) -> list[str]:
     return [*layout(scene), *springs(scene)]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, follows_law=True)
+KIND = ModelKind(
+    models=models,
+    assumptions=assumptions,
+    follows_law=True,
+    blind_to=("reference", "superposition", "basafa"),
+)

@@ -24,11 +24,12 @@ HISTORY, FIELD = "history", "field"
 
 @dataclass(frozen=True)
 class Decision:
-    """What was decided about a part of the model, and why."""
+    """What was decided about a part of the model, and why; `cost` is that of one machine."""
 
     about: str
     choice: str
-    reason: str
+    reason: str = ""
+    cost: str = ""
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def _decisions(
     yield Decision("displacements", _geometry(chosen), _strain(seen, foresight))
     yield Decision("model", chosen.name, _why(chosen, required))
     if moves:
-        yield Decision("step", f"{1e3 * chosen.step:.3g} ms", _step(chosen, required))
+        yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
     yield Decision("reference", *_reference(chosen))
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
@@ -208,6 +209,11 @@ def _percent(value: float) -> str:
     return f"{100.0 * value:.1f} %" if value < 0.0995 else f"{100.0 * value:.0f} %"
 
 
-def lines(found: Plan) -> list[str]:
-    """The decisions, for a person."""
-    return [f"{one.about}: {one.choice} ({one.reason})" for one in found.decisions]
+def lines(found: Plan, *, costs: bool = True) -> list[str]:
+    """The decisions, for a person; without costs they are the same on every machine."""
+    return [_line(one, one.cost if costs else "") for one in found.decisions]
+
+
+def _line(one: Decision, cost: str) -> str:
+    why = "; ".join(part for part in (one.reason, cost) if part)
+    return f"{one.about}: {one.choice}" + (f" ({why})" if why else "")

@@ -166,6 +166,22 @@ def read(folder: Path) -> Results:
     return results
 
 
+def summary(folder: Path, scene: Scene) -> Results | None:
+    """Numbers of a folder that a run of the scene has left: its record, differences of the field.
+
+    None if it is not as that run left it; its content is taken for that of the scene.
+    """
+    try:
+        table = _numbers(folder)
+        _check_version(folder, table)
+        if manifest.altered(folder):
+            return None
+        rows = read_table(folder / "errors.csv", FieldDifference)
+        return Results(scene, _record(table), field_differences=rows)
+    except (OSError, ValueError):
+        return None
+
+
 def _content(folder: Path, table: Mapping[str, object]) -> Results:
     """All files in memory. ValueError naming file and line of what is damaged or does not fit."""
     record, scene = _record(table), _scene(folder)
@@ -290,18 +306,21 @@ def _foreign(present: set[str]) -> str | None:
 
 
 @contextmanager
-def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
+def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
     """A folder beside `folder` for what an interrupted run goes on from; success removes it.
 
-    What the machine or a signal ends in the block has a note of how to go on.
+    ResultsError if it is of another scene than the one that is to be resumed. What the machine or a
+    signal ends in the block has a note of how to go on.
     """
     folder = folder.resolve()
     state = folder.with_name(f".{folder.name}.state")
     if state.is_dir() and not resume:
         shutil.rmtree(state, ignore_errors=True)
         folders.tell(f"{state}: left by an interrupted run; removed, for this one has no --resume")
+    _check_same(state, scene)
     state.mkdir(parents=True, exist_ok=True)
     try:
+        (state / SCENE).write_text(write_scene(scene), encoding="utf-8")
         yield state
         shutil.rmtree(state, ignore_errors=True)
     except (KeyboardInterrupt, MemoryError, OSError) as error:
@@ -312,6 +331,21 @@ def continuing(folder: Path, *, resume: bool) -> Iterator[Path]:
             shutil.rmtree(state, ignore_errors=True)
 
 
+def _check_same(state: Path, scene: Scene) -> None:
+    """A state is of one scene: another would be refused by its first lattice, after hours maybe."""
+    try:
+        before = tomllib.loads((state / SCENE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # there is none, or a kill left half of it: each state tells
+        return
+    now = tomllib.loads(write_scene(scene))
+    changed = [key for key in sorted(before.keys() | now.keys()) if before.get(key) != now.get(key)]
+    if changed:
+        raise ResultsError(
+            f"{state}: is of a run of another scene (it differs in {', '.join(changed)}); run "
+            "without --resume: stages that do not depend on these are kept all the same"
+        )
+
+
 def _kept(state: Path) -> list[str]:
     """Names of the models that have a state; fields without one are of no use."""
     return sorted(path.stem for path in state.glob("[!.]*.npz")) if state.is_dir() else []
@@ -319,5 +353,5 @@ def _kept(state: Path) -> list[str]:
 
 def _how_to_go_on(state: Path, kept: list[str]) -> str:
     if not kept:
-        return "no model had run far enough to be kept for --resume: start again"
+        return "start again: stages that had ended are kept, and no model had a state to --resume"
     return f"kept {', '.join(kept)} in {state}: the same command with --resume goes on from there"

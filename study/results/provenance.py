@@ -37,13 +37,18 @@ def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Pr
         seed=None,
         scene_sha256=hashlib.sha256(scene.encode()).hexdigest(),
         mesh_sha256=mesh_sha256(mesh),
-        rule_base_sha256=_sha256(rule_base, "fuzzy.rule_base: {} cannot be read ({}); name a file"),
+        rule_base_sha256=rule_base_sha256(rule_base),
     )
 
 
 def mesh_sha256(mesh: str | None) -> str | None:
     """SHA-256 of a scene's mesh file, None without one. ValueError if it cannot be read."""
     return _sha256(mesh, "organ.mesh: {} cannot be read ({}); name a mesh file")
+
+
+def rule_base_sha256(rule_base: str | None) -> str | None:
+    """SHA-256 of a scene's rule base, None without one. ValueError if it cannot be read."""
+    return _sha256(rule_base, "fuzzy.rule_base: {} cannot be read ({}); name a file")
 
 
 def _sha256(path: str | None, refusal: str) -> str | None:

@@ -321,6 +321,20 @@ class Provenance:
 
 
 @dataclass(frozen=True, kw_only=True)
+class StageRecord:
+    """A stage of a run: its wall time, when that was measured (UTC), and whether it was `kept`.
+
+    A kept stage was computed by an earlier run of this program here, and is not computed again;
+    stages may run side by side.
+    """
+
+    name: str
+    wall_s: float
+    measured_at: str
+    kept: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class StudyRecord:
     """The whole of results.json but for the checksums of the other files.
 
@@ -343,4 +357,5 @@ class StudyRecord:
     lattice_limits: LatticeLimits | None = None
     control_point: ControlPoint | None = None
     budgets: tuple[ErrorBudget, ...] = ()
+    stages: tuple[StageRecord, ...] = ()
     schema_version: int = SCHEMA_VERSION

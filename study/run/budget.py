@@ -7,7 +7,7 @@ its projection on it, and these add up too. What nothing named explains is left 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -20,12 +20,10 @@ from msm.integrators import INTEGRATORS
 from study.models.damping import nodal_damping
 from study.models.lattice import PreparedLattice, SpringMaterial
 from study.models.model import ModelRun, Prepared
-from study.models.table import references
 from study.models.tissue import of_modulus
 from study.problem.problem import Problem
-from study.progress import Progress
 from study.results.records import BudgetPart, ErrorBudget
-from study.scene import Lattice, Scene
+from study.scene import Lattice
 from study.similarity.fields import norm
 
 Floats = NDArray[np.float64]
@@ -52,6 +50,24 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class Mending:
+    """Displacement [m] (q, 3) at the peak as a lattice is mended: the stiffness first, then causes.
+
+    `last`: what is left of the way to the reference once these are mended, at rest for finite
+    elements, at the peak, with its damping, for a lattice.
+    """
+
+    causes: tuple[str, ...]
+    fields: tuple[Floats, ...]
+    last: Floats
+
+    @property
+    def finished(self) -> bool:
+        """Whether the lattice did not diverge as it was mended."""
+        return all(np.isfinite(field).all() for field in (*self.fields, self.last))
+
+
+@dataclass(frozen=True)
 class Mended:
     """The displacement (q, 3) at the peak once the stiffness is right, and the other parts."""
 
@@ -59,41 +75,39 @@ class Mended:
     others: tuple[Difference, ...]
 
 
-def error_budgets(
-    scene: Scene,
-    problem: Problem,
-    ready: Mapping[str, Prepared],
-    runs: Mapping[str, ModelRun],
-    progress: Progress,
-) -> tuple[ErrorBudget, ...]:
-    """Budgets of the lattices that are no reference, against finite elements and the benchmark.
+def mending(lattice: PreparedLattice, reference: Prepared) -> Mending:
+    """A lattice mended toward a reference, a lattice or else finite elements.
 
-    Of those that finished; there is none where a lattice diverges as it is mended.
+    ValueError for a lattice that there cannot be.
     """
-    sound = {n: ready[n] for n, run in runs.items() if run.trajectory.status == "finished"}
-    named = [name for name in references(scene) if name in sound]
-    lattices = {n: p for n, p in sound.items() if isinstance(p, PreparedLattice) and n not in named}
-    found = list[ErrorBudget]()
-    for reference in named if lattices else ():
-        with progress.stage(f"error budget against {reference}"):
-            mended = _mended(next(iter(lattices.values())), sound[reference], runs[reference])
-        if mended is not None:
-            weights = problem.volume_rule.weights
-            found += [_budget(runs[n], runs[reference], mended, weights) for n in lattices]
-    return tuple(found)
-
-
-def _mended(lattice: PreparedLattice, reference: Prepared, run: ModelRun) -> Mended | None:
-    """None for a reference of another kind, or where a lattice diverges as it is mended."""
     short = replace(lattice, problem=_until_peak(lattice.problem))
     if isinstance(reference, PreparedLattice):
-        field, others = _toward_benchmark(short, reference, run)
-    elif run.record.elements is not None:
-        field, others = _toward_elements(short, reference, run)
-    else:
-        return None
-    finished = all(np.isfinite(part).all() for part in (field, *(one.field for one in others)))
-    return Mended(field, others) if finished else None
+        return _toward_benchmark(short, reference)
+    return _toward_elements(short)
+
+
+def error_budgets(
+    mendings: Mapping[str, Mending],
+    runs: Mapping[str, ModelRun],
+    rest: Mapping[str, Floats],
+    volumes: Floats,
+) -> tuple[ErrorBudget, ...]:
+    """Budgets of the lattices that are no reference, against those that a lattice is mended toward.
+
+    Of the models that finished; there is none where a lattice diverges as it is mended. `rest`:
+    displacement [m] (q, 3) of finite elements at rest, by name.
+    """
+    sound = {n: run for n, run in runs.items() if run.trajectory.status == "finished"}
+    found = list[ErrorBudget]()
+    for name in (n for n, way in mendings.items() if n in sound and way.finished):
+        reference, way = sound[name], mendings[name]
+        mended = Mended(way.fields[0], (*_differences(way), *_last(way, reference, rest.get(name))))
+        found += [
+            _budget(run, reference, mended, volumes)
+            for n, run in sound.items()
+            if run.record.lattice is not None and n not in mendings
+        ]
+    return tuple(found)
 
 
 def _until_peak(problem: Problem) -> Problem:
@@ -132,16 +146,23 @@ def _steps(lattice: PreparedLattice, modulus: float, changes: Changes) -> Iterat
         yield replace(lattice, model=replace(lattice.model, scene=changed), springs=springs)
 
 
-def _differences(causes: Iterable[str], fields: Sequence[Floats]) -> Iterator[Difference]:
+def _differences(way: Mending) -> Iterator[Difference]:
     """What each change did; the steps' errors cancel in part, and are not told for a difference."""
-    for cause, (before, after) in zip(causes, pairwise(fields), strict=True):
+    for cause, (before, after) in zip(way.causes, pairwise(way.fields), strict=True):
         yield Difference(cause, before - after, None)
 
 
-def _toward_elements(
-    lattice: PreparedLattice, elements: Prepared, run: ModelRun
-) -> tuple[Floats, tuple[Difference, ...]]:
-    """As the lattice gets the tissue's constants and becomes linear; then the part of its spacing.
+def _last(way: Mending, reference: ModelRun, rest: Floats | None) -> Iterator[Difference]:
+    """The parts that need the reference's own motion, or its displacement at rest."""
+    if rest is not None:
+        yield Difference(SPACING, way.last - rest, _own_error(reference))
+    else:
+        yield Difference(DAMPING, way.fields[-1] - way.last, None)
+        yield Difference(LAW, way.last - _peak(reference), None)
+
+
+def _toward_elements(lattice: PreparedLattice) -> Mending:
+    """As the lattice gets the tissue's constants and becomes linear; then at rest.
 
     What the spacing costs is told at rest, where both solve the same equations.
     """
@@ -154,14 +175,10 @@ def _toward_elements(
     if asked.geometry == "nonlinear":
         changes[GEOMETRY] = {"geometry": "linear"}
     steps = list(_steps(lattice, tissue.youngs_modulus, changes))
-    fields = [_moved(one) for one in steps]
-    spacing = Difference(SPACING, steps[-1].rest() - elements.rest(), _own_error(run))
-    return fields[0], (*_differences(changes, fields), spacing)
+    return Mending(tuple(changes), tuple(map(_moved, steps)), steps[-1].rest())
 
 
-def _toward_benchmark(
-    lattice: PreparedLattice, benchmark: PreparedLattice, run: ModelRun
-) -> tuple[Floats, tuple[Difference, ...]]:
+def _toward_benchmark(lattice: PreparedLattice, benchmark: PreparedLattice) -> Mending:
     """As the lattice gets the benchmark's modulus, then its damping and its law."""
     changes: Changes = {}
     if lattice.model.lattice.volume_term:
@@ -169,13 +186,8 @@ def _toward_benchmark(
     if lattice.model.lattice.law is not None:
         changes[LAW] = {"law": None}
     steps = list(_steps(lattice, benchmark.springs.modulus, changes))
-    fields = [_moved(one) for one in steps]
-    damped = _moved(_damped_as(steps[-1], benchmark))
-    return fields[0], (
-        *_differences(changes, fields),
-        Difference(DAMPING, fields[-1] - damped, None),
-        Difference(LAW, damped - _peak(run), None),
-    )
+    damped = _damped_as(steps[-1], benchmark)
+    return Mending(tuple(changes), tuple(map(_moved, steps)), _moved(damped))
 
 
 def _damped_as(lattice: PreparedLattice, other: PreparedLattice) -> PreparedLattice:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from msm.calibration import LARGEST_POISSON_RATIO, SPRING_POISSON_RATIO
-from study.models.finite_elements import PreparedElements
 from study.models.model import Prepared
 from study.models.tissue import models
 from study.problem.problem import Problem
-from study.progress import Progress
 from study.results.records import LatticeLimits
 from study.scene import Scene
 from study.similarity.fields import best_factor, relative_l2
@@ -20,8 +19,53 @@ from study.similarity.fields import best_factor, relative_l2
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class LatticeAtRest:
+    """Displacement [m] (q, 3) at rest of linear springs of the tissue's modulus.
+
+    At a `spacing` [m], and with the volume term where there can be one.
+    """
+
+    spacing: float
+    field: Floats
+    with_volume_term: Floats | None
+
+
+@dataclass(frozen=True)
+class ReferenceAtRest:
+    """Displacement [m] (q, 3) of a reference at rest: the tissue's, and of Poisson ratio 1/4."""
+
+    field: Floats
+    at_quarter: Floats | None = None
+
+
+@runtime_checkable
+class OfAnyRatio(Protocol):
+    """A prepared model of an isotropic solid, which can be asked for another Poisson ratio."""
+
+    def rest_at(self, poisson_ratio: float) -> Floats:
+        """Displacement [m] (q, 3) at rest under the full load, after a run on its mesh."""
+
+
+def lattice_at_rest(scene: Scene, problem: Problem) -> LatticeAtRest:
+    """Springs at rest. ValueError for a lattice that there cannot be, beside those of the scene."""
+    nu = problem.tissue.poisson_ratio
+    is_cubic = scene.lattice.springs == "lattice"
+    can_have_term = is_cubic and SPRING_POISSON_RATIO < nu <= LARGEST_POISSON_RATIO
+    spacing, field = _at_rest(scene, problem, volume_term=False)
+    term = _at_rest(scene, problem, volume_term=True)[1] if can_have_term else None
+    return LatticeAtRest(spacing, field, term)
+
+
+def reference_at_rest(reference: Prepared, *, at_quarter: bool) -> ReferenceAtRest:
+    """A reference at rest after a run, on the mesh of that run; if asked at 1/4, if it can."""
+    if at_quarter and isinstance(reference, OfAnyRatio):
+        return ReferenceAtRest(reference.rest(), reference.rest_at(SPRING_POISSON_RATIO))
+    return ReferenceAtRest(reference.rest())
+
+
 def lattice_limits(
-    scene: Scene, problem: Problem, reference: Prepared, progress: Progress
+    lattice: LatticeAtRest, reference: ReferenceAtRest, poisson_ratio: float, volumes: Floats
 ) -> LatticeLimits:
     """Compare lattice and reference at rest, both with the tissue's modulus.
 
@@ -29,26 +73,17 @@ def lattice_limits(
     tissue's nu the springs' fixed Poisson ratio comes on top; the best factor on the field then
     shows what is left after the best possible stiffness, and the volume term what is left with it.
     """
-    assert isinstance(reference, PreparedElements)  # noqa: S101 - the model of that name
-    volumes, nu = problem.volume_rule.weights, problem.tissue.poisson_ratio
-    with progress.stage("limits of the lattice at rest"):
-        spacing, field = _at_rest(scene, problem, volume_term=False)
-        truth, quarter = reference.rest(), reference.rest_at(SPRING_POISSON_RATIO)
+    field, truth, term = lattice.field, reference.field, lattice.with_volume_term
+    assert reference.at_quarter is not None  # noqa: S101 - as was asked
     factor = best_factor(field, truth, volumes)
-    is_cubic = scene.lattice.springs == "lattice"
-    can_have_term = is_cubic and SPRING_POISSON_RATIO < nu <= LARGEST_POISSON_RATIO
     return LatticeLimits(
-        spacing_m=spacing,
-        poisson_ratio=nu,
-        relative_l2_at_quarter=relative_l2(field, quarter, volumes),
+        spacing_m=lattice.spacing,
+        poisson_ratio=poisson_ratio,
+        relative_l2_at_quarter=relative_l2(field, reference.at_quarter, volumes),
         relative_l2=relative_l2(field, truth, volumes),
         best_factor=factor,
         relative_l2_at_best_factor=relative_l2(factor * field, truth, volumes),
-        relative_l2_with_volume_term=(
-            relative_l2(_at_rest(scene, problem, volume_term=True)[1], truth, volumes)
-            if can_have_term
-            else None
-        ),
+        relative_l2_with_volume_term=None if term is None else relative_l2(term, truth, volumes),
     )
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
+import tomllib
 from dataclasses import dataclass, field, replace
+from functools import partial
 
-import numpy as np
-
-from study.models.estimates import FuzzySide, run_fuzzy
+from study.models.estimates import FuzzySide, estimates, run_fuzzy
 from study.models.linear_limits import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Watch
 from study.models.table import is_tuned, references
-from study.problem.problem import Problem
 from study.problem.response import Response
+from study.progress import Progress
 from study.results.folder import Arrays, Results
-from study.results.provenance import provenance
+from study.results.provenance import mesh_sha256, provenance
 from study.results.records import (
     ControlPoint,
     Dimensionless,
@@ -24,14 +24,25 @@ from study.results.records import (
     StudyRecord,
 )
 from study.run.assumptions import assumptions
-from study.run.dimensionless import dimensionless
-from study.run.ready import Ready, ReadyPoint, ready
+from study.run.posed import Posed
+from study.run.ready import ReadyPoint, ready
 from study.run.score_errors import error_rows, rating_rows
+from study.run.stages import ALONE, Means, Stage, Stages
 from study.run.suiting import suited
 from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
-from study.scene.file import write_scene
+from study.scene.file import validate, write_scene
+from study.scene.part import without
+from study.stages.fingerprint import key
+from study.stages.lanes import lanes
+
+SUITED, FUZZY = "scene suited to the organ", "fuzzy systems"
+NO_FUZZY = (
+    *("organ", "support", "tool", "lattice", "damping", "basafa", "reference", "superposition"),
+    *("time", "control_points"),
+)
+"""Tables of a scene that its fuzzy systems do not read."""
 
 
 @dataclass(frozen=True)
@@ -48,29 +59,61 @@ class Compared:
     budgets: tuple[ErrorBudget, ...] = ()
 
 
-def run_study(scene: Scene, watch: Watch = SILENT) -> Results:
-    """Run all that the scene names and gather the results.
+def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Results:
+    """Run all that the scene names, or take it from the store, and gather the results.
 
     Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
     """
     started = time.perf_counter()
-    scene = suited(scene, watch.progress)
-    given = ready(scene, watch.progress)
-    # Files as they are now, not after the run.
-    made_by = provenance(write_scene(scene), scene.organ.mesh, scene.fuzzy.rule_base)
-    with watch.progress.stage("fuzzy systems"):
-        fuzzy = run_fuzzy(scene) if is_tuned(scene) else FuzzySide()
-    if isinstance(given, ReadyPoint):
-        compared = _on_point(given, watch)
-    else:
-        compared = _on_organ(scene, given, watch, tuned=bool(fuzzy.estimates))
+    with lanes(means.workers, watch.progress) as side_by_side:
+        stages = Stages(means, side_by_side, watch.progress)
+        scene = _suited(scene, stages)
+        # Files as they are now, not after the run.
+        made_by = provenance(write_scene(scene), scene.organ.mesh, scene.fuzzy.rule_base)
+        if scene.is_point:
+            found = _on_point(scene, stages, watch, made_by)
+        else:
+            found = _on_organ(scene, stages, watch, made_by)
+        fuzzy = stages.results().get(FUZZY, FuzzySide())
     with watch.progress.stage("similarity"):
-        results = _results(scene, fuzzy, compared, made_by)
-    record = replace(results.record, study_wall_s=time.perf_counter() - started)
+        results = _results(scene, fuzzy, found, made_by)
+    wall = time.perf_counter() - started
+    record = replace(results.record, stages=stages.records(), study_wall_s=wall)
     return replace(results, record=record)
 
 
-def _on_point(given: ReadyPoint, watch: Watch) -> Compared:
+def _suited(scene: Scene, stages: Stages) -> Scene:
+    """The scene with the keys chosen that are to suit its organ, whose file is looked at."""
+    if not scene.organ.suit or scene.organ.mesh is None:
+        return scene
+    found = key(SUITED, scene, mesh_sha256(scene.organ.mesh), modules=("study.run.suiting",))
+    text = stages.now(Stage(SUITED, str, found, lambda p: write_scene(suited(scene, p))))
+    return validate(tomllib.loads(text), SUITED)
+
+
+def _start_fuzzy(scene: Scene, stages: Stages, rule_base: str | None) -> None:
+    """Let the fuzzy systems be evaluated, if a model is tuned by them and it is not kept."""
+    stage = fuzzy_stage(scene, rule_base)
+    if is_tuned(scene) and stages.kept(stage) is None:
+        stages.start(stage)
+
+
+def fuzzy_stage(scene: Scene, rule_base: str | None) -> Stage[FuzzySide]:
+    """The fuzzy systems of a scene; `rule_base`: SHA-256 of a file of one's own rules."""
+    seen = without(scene, NO_FUZZY)
+    found = key(FUZZY, seen, rule_base, modules=("study.models.estimates",))
+    return Stage(FUZZY, FuzzySide, found, partial(_fuzzy, seen))
+
+
+def _fuzzy(seen: Scene, progress: Progress) -> FuzzySide:
+    with progress.stage(FUZZY):
+        return run_fuzzy(seen)
+
+
+def _on_point(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -> Compared:
+    given = ready(scene)
+    assert isinstance(given, ReadyPoint)  # noqa: S101 - of such a scene
+    _start_fuzzy(scene, stages, made_by.rule_base_sha256)
     problem = given.problem
     runs = {model.name: model.run(problem, watch) for model in given.models}
     point = ControlPoint(mass_kg=problem.mass, rest_length_m=problem.rest_length)
@@ -80,47 +123,32 @@ def _on_point(given: ReadyPoint, watch: Watch) -> Compared:
     return Compared(problem.response, runs, notes, control_point=point)
 
 
-def _on_organ(scene: Scene, given: Ready, watch: Watch, *, tuned: bool) -> Compared:
-    from study.run.budget import error_budgets  # imports finite elements, which a point has none of
+def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -> Compared:
+    from study.run.moving import Moving  # imports what moves an organ, which a point has no need of
 
-    problem, notes = given.problem, list(given.problem.geometry.notes)
-    runs: dict[str, ModelRun] = {}
-    limits = None
-    for name, prepared in given.models.items():
-        runs[name] = prepared.run(watch)
-        if name == "fem" and tuned:
-            from study.run.limits import lattice_limits
-
-            try:
-                limits = lattice_limits(scene, problem, prepared, watch.progress)
-            except ValueError as error:  # of a lattice beside those of the scene
-                notes.append(f"What the lattice cannot do at rest is not known: {error}.")
-    budgets: tuple[ErrorBudget, ...] = ()
-    if any(run.record.lattice is not None for run in runs.values()):
-        from study.run.budget import error_budgets
-
-        try:
-            budgets = error_budgets(scene, problem, given.models, runs, watch.progress)
-        except ValueError as error:  # of a lattice that is mended
-            notes.append(f"There is no error budget: {error}.")
+    tuned = estimates(scene) if is_tuned(scene) else {}
+    _start_fuzzy(scene, stages, made_by.rule_base_sha256)
+    moving = Moving(scene, tuned, made_by.mesh_sha256, stages, watch)
+    posed = moving.start()
+    found = moving.motions(posed)
     return Compared(
-        problem.response,
-        runs,
-        tuple(notes),
-        _fields(problem, runs),
-        dimensionless(scene, problem),
-        limits,
-        budgets=budgets,
+        posed.response,
+        found.runs,
+        (*posed.notes, *found.notes),
+        _fields(posed, found.runs),
+        posed.dimensionless,
+        found.limits,
+        budgets=found.budgets,
     )
 
 
-def _fields(problem: Problem, runs: dict[str, ModelRun]) -> Arrays:
+def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
     """Surface, tool and probes, and the displacement of each model on the surface."""
     return {
-        "points": problem.geometry.surface.points,
-        "triangles": problem.geometry.surface.triangles,
-        "tool": np.stack([problem.tool.centre, problem.tool.direction]),
-        "probes": problem.observation.probes,
+        "points": posed.points,
+        "triangles": posed.triangles,
+        "tool": posed.tool,
+        "probes": posed.probes,
     } | {name: run.trajectory.surface_field for name, run in runs.items()}
 
 

@@ -1,0 +1,250 @@
+"""The models of a scene on its organ: moved where no stage of them is kept, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+from study.models.lattice import LatticeModel, PreparedLattice
+from study.models.model import Estimates, Model, ModelRun, Prepared, Watch
+from study.models.table import kind, models_of, references
+from study.progress import Progress
+from study.results.records import ErrorBudget, LatticeLimits
+from study.run.budget import Mending, error_budgets, mending
+from study.run.limits import (
+    LatticeAtRest,
+    ReferenceAtRest,
+    lattice_at_rest,
+    lattice_limits,
+    reference_at_rest,
+)
+from study.run.posed import Posed, Posing
+from study.run.ready import set_up
+from study.run.stages import Stage, Stages
+from study.scene import Scene
+from study.stages.fingerprint import key
+
+Work = Callable[[Progress], Any]
+
+ORGAN, AT_REST, BUDGET = "organ", "lattice at rest", "error budget against {}"
+WITH_LIMITS = "fem"
+"""The reference that a lattice's limits are told against."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The run of a model; of a solid also at rest, if it is asked for, or why part of it is not."""
+
+    run: ModelRun
+    rest: ReferenceAtRest | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Rested:
+    """The lattice at rest, or why it is not."""
+
+    found: LatticeAtRest | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A lattice mended toward a reference, or why it is not."""
+
+    found: Mending | None
+    why: str = ""
+
+
+class Wanted(NamedTuple):
+    """A stage, and the names of the models that it needs set up."""
+
+    stage: Stage[Any]
+    needs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Runs by model, what was found on their differences, and notes on what was not."""
+
+    runs: dict[str, ModelRun]
+    limits: LatticeLimits | None
+    budgets: tuple[ErrorBudget, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """A scene with an organ, to be moved by stages.
+
+    `organ`: SHA-256 of the file that it names, if any.
+    """
+
+    scene: Scene
+    estimates: Estimates
+    organ: str | None
+    stages: Stages
+    watch: Watch
+    prepared: dict[str, Prepared] = field(default_factory=dict)
+
+    @cached_property
+    def posing(self) -> Posing:
+        """The problem, built when it is needed."""
+        return Posing(self.scene, self.watch.progress)
+
+    @cached_property
+    def models(self) -> dict[str, Model]:
+        """All models of the scene by name, in the order in which they run."""
+        return {one.name: one for one in models_of(self.scene, self.estimates)}
+
+    @cached_property
+    def lattice(self) -> str | None:
+        """Name of the first lattice that is no reference, if there is one: all are mended alike."""
+        names = (n for n, one in self.models.items() if isinstance(one, LatticeModel))
+        return next((name for name in names if name not in references(self.scene)), None)
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether the limits of the lattice are told: of tuned lattices beside finite elements."""
+        return bool(self.estimates) and WITH_LIMITS in self.models
+
+    def start(self) -> Posed:
+        """Take what is kept, and start what is not; the problem as its results tell it.
+
+        ValueError for whatever a run would refuse, before it is waited for.
+        """
+        posed = self.stages.now(self.posed())
+        missing = self._missing(posed.mesh)
+        if missing and posed.mesh != self.posing.mesh:  # made anew, and otherwise
+            posed = self.posing.posed()
+            missing = self._missing(posed.mesh)
+        for stage, needs in missing:
+            for name in needs:
+                self._prepare(name)
+            self.stages.start(stage)
+        return posed
+
+    def motions(self, posed: Posed) -> Motions:
+        """What all stages gave, once they have ended."""
+        given = self.stages.results()
+        moved: dict[str, Moved] = {name: given[name] for name in self.models}
+        limits, notes = self._limits(given, posed)
+        ways: dict[str, Mended] = {
+            name: given[BUDGET.format(name)]
+            for name in references(self.scene)
+            if BUDGET.format(name) in given
+        }
+        notes += [f"There is no error budget: {way.why}." for way in ways.values() if way.why]
+        budgets = error_budgets(
+            {name: way.found for name, way in ways.items() if way.found is not None},
+            {name: one.run for name, one in moved.items()},
+            {name: one.rest.field for name, one in moved.items() if one.rest is not None},
+            posed.response.volumes,
+        )
+        runs = {name: one.run for name, one in moved.items()}
+        return Motions(runs, limits, budgets, tuple(dict.fromkeys(notes)))
+
+    def _limits(
+        self, given: dict[str, Any], posed: Posed
+    ) -> tuple[LatticeLimits | None, list[str]]:
+        """The limits of the lattice, or a note on why they are not known."""
+        if AT_REST not in given:
+            return None, []
+        lattice: Rested = given[AT_REST]
+        reference: Moved = given[WITH_LIMITS]
+        why = lattice.why or reference.why
+        if lattice.found is None or reference.rest is None or why:
+            return None, [f"What the lattice cannot do at rest is not known: {why}."]
+        nu, volumes = self.scene.tissue.poisson_ratio, posed.response.volumes
+        return lattice_limits(lattice.found, reference.rest, nu, volumes), []
+
+    # --- the stages --------------------------------------------------------------------------
+
+    def posed(self) -> Stage[Posed]:
+        """The problem as its results tell it."""
+        lattice = self.scene.lattice
+        given = (self.posing.part, self.organ, lattice.springs, lattice.spacing)
+        found = key(ORGAN, *given, modules=(__name__,))
+        return Stage(ORGAN, Posed, found, lambda _: self.posing.posed())
+
+    def _missing(self, mesh: str) -> list[Wanted]:
+        """What is not kept, the dearest first."""
+        return [one for one in self.all_stages(mesh) if self.stages.kept(one.stage) is None]
+
+    def all_stages(self, mesh: str) -> Iterator[Wanted]:
+        """All stages on a mesh."""
+        yield from (self._of_model(name, mesh) for name in self.models)
+        if self.lattice is None:
+            return
+        if self.has_limits:
+            seen = kind("tissue").seen(self.scene)
+            yield Wanted(self._stage(AT_REST, Rested, partial(self._rest, seen), mesh, seen))
+        for name in references(self.scene):
+            yield self._of_budget(self.lattice, name, mesh)
+
+    def _of_model(self, name: str, mesh: str) -> Wanted:
+        model, keeping = self.models[name], self.watch.keeping
+        at_rest, at_quarter = self._asked_at_rest(name)
+        work = partial(self._move, name, at_rest, at_quarter)
+        stage = self._stage(name, Moved, work, mesh, model, at_rest, at_quarter)
+        # Of a stage that is kept there are no fields of all nodes.
+        readable = keeping is None or keeping.fields is None
+        return Wanted(replace(stage, readable=readable), (name,))
+
+    def _of_budget(self, lattice: str, name: str, mesh: str) -> Wanted:
+        """A lattice mended toward a reference, whatever its own stiffness is."""
+        mended, reference = self.models[lattice], self.models[name]
+        assert isinstance(mended, LatticeModel)  # noqa: S101 - as it was chosen
+        toward = reference if isinstance(reference, LatticeModel) else None
+        work = partial(self._mend, lattice, name)
+        stage = self._stage(BUDGET.format(name), Mended, work, mesh, mended.scene, toward)
+        return Wanted(stage, (lattice, name))
+
+    def _stage(self, name: str, of: type, work: Work, mesh: str, *given: object) -> Stage[Any]:
+        """A stage on a mesh of the problem, and of what else it is given."""
+        found = key(name, of, self.posing.part, self.organ, mesh, *given, modules=(__name__,))
+        return Stage(name, of, found, work)
+
+    def _asked_at_rest(self, name: str) -> tuple[bool, bool]:
+        """Whether a model is wanted at rest, and with a Poisson ratio of 1/4."""
+        of_springs = isinstance(self.models[name], LatticeModel)
+        wanted = self.lattice is not None and not of_springs and name in references(self.scene)
+        return wanted, wanted and self.has_limits and name == WITH_LIMITS
+
+    # --- their work ------------------------------------------------------------------------------
+
+    def _prepare(self, name: str) -> Prepared:
+        """A model set up once. ValueError for one that would not run."""
+        if name not in self.prepared:
+            one = [self.models[name]]
+            self.prepared.update(set_up(one, self.posing.problem, self.watch.progress))
+        return self.prepared[name]
+
+    def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> Moved:
+        model = self._prepare(name)
+        run = model.run(replace(self.watch, progress=progress))
+        if not at_rest:
+            return Moved(run)
+        with progress.stage(f"{name}: at rest"):
+            try:
+                return Moved(run, reference_at_rest(model, at_quarter=at_quarter))
+            except ValueError as error:
+                return Moved(run, reference_at_rest(model, at_quarter=False), str(error))
+
+    def _rest(self, seen: Scene, progress: Progress) -> Rested:
+        with progress.stage(AT_REST):
+            try:
+                return Rested(lattice_at_rest(seen, self.posing.problem))
+            except ValueError as error:  # of a lattice beside those of the scene
+                return Rested(None, str(error))
+
+    def _mend(self, lattice: str, reference: str, progress: Progress) -> Mended:
+        mended = self._prepare(lattice)
+        assert isinstance(mended, PreparedLattice)  # noqa: S101 - as its model is a lattice
+        with progress.stage(BUDGET.format(reference)):
+            try:
+                return Mended(mending(mended, self._prepare(reference)))
+            except ValueError as error:  # of a lattice that is mended
+                return Mended(None, str(error))

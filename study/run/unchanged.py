@@ -1,0 +1,64 @@
+"""Whether a results folder holds what a run of a scene would give, so that there is none to make.
+
+Of each run the store keeps the checksums of what it wrote, under the key of the whole scene, the
+files that it names, and the whole program.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from study.results import Results, manifest
+from study.results.folder import summary
+from study.results.provenance import mesh_sha256, rule_base_sha256
+from study.scene import Scene
+from study.scene.file import resolved
+from study.stages.fingerprint import machine
+from study.stages.store import Store
+from study.sweep.canonical import digest
+from study.sweep.program import everything
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a run left in a folder: when [UTC], in short, and whether it has the run's report."""
+
+    at: str
+    results: Results
+    has_report: bool
+
+
+def run_key(scene: Scene, *, fields: bool) -> str:
+    """SHA-256 of all that the files of a run depend on. ValueError for a file that is missing."""
+    files = [mesh_sha256(scene.organ.mesh), rule_base_sha256(scene.fuzzy.rule_base)]
+    return digest(["run", resolved(scene), files, fields, everything("reports"), machine()])
+
+
+def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
+    """What the folder holds of the run of a key, None if it is not what that wrote."""
+    found = store.get(key)
+    if found is None or found.value["sums"] != _sha256(folder / manifest.NAME):
+        return None
+    results = summary(folder, scene)
+    if results is None:
+        return None
+    at = datetime.fromtimestamp(found.measured, UTC).isoformat(timespec="seconds")
+    report = _sha256(folder / manifest.REPORT)
+    return Left(at, results, report is not None and found.value["report"] == report)
+
+
+def note(store: Store, key: str, folder: Path) -> None:
+    """Note what a run has left in a folder."""
+    sums, report = (_sha256(folder / name) for name in (manifest.NAME, manifest.REPORT))
+    store.put(key, {"sums": sums, "report": report}, {}, wall=0.0)
+
+
+def _sha256(path: Path) -> str | None:
+    """SHA-256 of a file, None if there is none."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return None

@@ -1,0 +1,231 @@
+"""What stages gave, on disk: a file for each under its key, the oldest removed when they are many.
+
+A file is written aside and moved into place, so it is whole or absent, whenever a run is killed and
+however many run at once: two that write the same stage write equal files. It is an .npz of plain
+arrays, read without unpickling anything, and is held against its own SHA-256 and its key. One that
+fails is as good as none, and is removed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import struct
+import sys
+import time
+import uuid
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.folders import FolderError, naming, refusal, tell
+from study.sweep.canonical import Plain, canonical, digest
+
+if TYPE_CHECKING:
+    from study.stages.flat import Arrays
+
+FOLDER, LIMIT = "LIVER_STUDY_STORE", "LIVER_STUDY_STORE_LIMIT"
+"""Environment variables: the folder of stages, and its limit with a unit, such as "4 GB"."""
+DEFAULT_LIMIT = 2_000_000_000
+UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+SUFFIX = ".npz"
+RECORD, SEAL = "record", "sha256"
+LEFT_ASIDE = 3600.0
+"""Seconds after which a file that is being written aside is one of a killed run."""
+DAMAGED = (
+    *(OSError, ValueError, EOFError, KeyError, TypeError, NotImplementedError, RuntimeError),
+    *(MemoryError, RecursionError, AttributeError, zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""What numpy, zipfile and json raise for files that are cut or altered."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a stage gave: a plain value, its arrays, seconds of work, and when it ended [s, UTC]."""
+
+    value: Any
+    arrays: Arrays
+    wall: float
+    measured: float
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of stages, of at most `limit` bytes once a stage has been put there."""
+
+    folder: Path
+    limit: int = DEFAULT_LIMIT
+
+    def prepare(self) -> None:
+        """Make the folder, for its owner alone.
+
+        FolderError if it cannot be written, or others may write what would be believed here.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            state = self.folder.stat()
+        except OSError as error:
+            raise refusal(self.folder, error) from None
+        if not os.access(self.folder, os.R_OK | os.W_OK | os.X_OK):
+            raise FolderError(f"{self.folder}: may not be written; give {FOLDER} another folder")
+        if _is_open_to_others(state):
+            raise FolderError(
+                f"{self.folder}: others may write there, so its stages cannot be believed; "
+                f"chmod 700 it, or give {FOLDER} another folder"
+            )
+
+    def get(self, key: str) -> Entry | None:
+        """What the stage of a key gave, None if there is nothing that can be believed."""
+        path = self._path(key)
+        if not path.exists():
+            return None
+        found = _read(path, key)
+        with suppress(OSError):  # another run may remove it
+            if found is None:
+                path.unlink()
+            else:
+                os.utime(path)  # used now: the last to be removed
+        return found
+
+    def put(self, key: str, value: Any, arrays: Arrays, wall: float) -> Entry:
+        """Keep what a stage gave. OSError naming the folder if it cannot be written."""
+        entry = Entry(value, arrays, wall, time.time())
+        path = self._path(key)
+        aside = path.with_name(f".{uuid.uuid4().hex}{SUFFIX}")
+        try:
+            with naming(self.folder, aside):
+                _write(aside, key, entry)
+                aside.replace(path)
+        finally:
+            with suppress(OSError):
+                aside.unlink(missing_ok=True)
+        self._evict(path)
+        return entry
+
+    def size(self) -> int:
+        """Bytes of all stages."""
+        return sum(state.st_size for _, state in self._files())
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{SUFFIX}"
+
+    def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
+        for path in self.folder.glob(f"*{SUFFIX}"):
+            with suppress(OSError):  # another run may have removed it
+                yield path, path.stat()
+
+    def _evict(self, newest: Path) -> None:
+        """Remove what was not used for longest until the limit is kept, and what killed runs left.
+
+        The newest stays: a stage larger than the limit would else be computed for nothing.
+        """
+        files = sorted(self._files(), key=lambda file: file[1].st_mtime)
+        excess = sum(state.st_size for _, state in files) - self.limit
+        for path, state in files:
+            is_left = path.name.startswith(".") and state.st_mtime < time.time() - LEFT_ASIDE
+            if is_left or (excess > 0 and path != newest and not path.name.startswith(".")):
+                excess -= state.st_size
+                with suppress(OSError):
+                    path.unlink()
+
+
+def user_store() -> Store | None:
+    """The store of this user, as the environment names it, ready to be used.
+
+    ValueError for a folder or a limit named there that will not do; where the user's own cache will
+    not, there is no store, and a person is told.
+    """
+    named = os.environ.get(FOLDER)
+    store = Store(Path(named).absolute() if named else _user_cache(), _limit())
+    try:
+        store.prepare()
+    except (FolderError, OSError) as error:
+        if named:
+            raise
+        tell(f"stages are not kept for the next run: {error}")
+        return None
+    return store
+
+
+def _user_cache() -> Path:
+    """The folder for what a program may make again, as this system has it."""
+    given = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    if given and Path(given).is_absolute():
+        return Path(given) / "liver-study"
+    home = Path.home()
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "liver-study"
+
+
+def _limit() -> int:
+    text = os.environ.get(LIMIT)
+    if not text:
+        return DEFAULT_LIMIT
+    number, unit = text.strip().rstrip("BKMGTbkmgt "), text.strip().lstrip("0123456789. ").upper()
+    try:
+        return round(float(number) * UNITS[unit])
+    except (ValueError, KeyError, OverflowError):
+        raise ValueError(
+            f'{LIMIT}: {text} is no size; give a number and one of {", ".join(UNITS)}, "4 GB"'
+        ) from None
+
+
+def shown_size(count: int) -> str:
+    """A number of bytes for a person: "12 MB"."""
+    unit = max((u for u in UNITS if UNITS[u] <= max(count, 1)), key=UNITS.__getitem__)
+    return f"{count / UNITS[unit]:.3g} {unit}"
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+def _is_open_to_others(state: os.stat_result) -> bool:
+    """Whether another user may write a folder; only systems that know such users tell."""
+    if not hasattr(os, "geteuid"):
+        return False
+    return state.st_uid != os.geteuid() or bool(state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+
+
+def _write(path: Path, key: str, entry: Entry) -> None:
+    """To the disk itself, so that a power cut leaves no empty file under a key."""
+    import numpy as np
+
+    text = canonical({"key": key, "value": entry.value, "wall": entry.wall, "at": entry.measured})
+    arrays = {name: np.ascontiguousarray(array) for name, array in entry.arrays.items()}
+    marks = {RECORD: np.array(text), SEAL: np.array(_seal(text, arrays))}
+    with path.open("xb") as file:
+        np.savez(file, allow_pickle=False, **marks, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _read(path: Path, key: str) -> Entry | None:
+    import numpy as np
+
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
+            arrays: Arrays = {name: found[name] for name in found.files}
+        text, seal = str(arrays.pop(RECORD)), str(arrays.pop(SEAL))
+        record: Plain = json.loads(text)
+        if seal != _seal(text, arrays) or record["key"] != key:
+            return None
+        return Entry(record["value"], arrays, record["wall"], record["at"])
+    except DAMAGED:
+        return None
+
+
+def _seal(text: str, arrays: Arrays) -> str:
+    """SHA-256 of the record and of each array with its name, type and shape."""
+    import hashlib
+
+    return digest(
+        [text]
+        + [
+            [name, a.dtype.str, list(a.shape), hashlib.sha256(a.tobytes()).hexdigest()]
+            for name, a in sorted(arrays.items())
+        ]
+    )
