@@ -65,10 +65,12 @@ def run(
         raise ValueError("--fields: a single point has none; leave it out")
     folder = out or default_folder(scene)
     if chosen.require is not None:
+        from study.plan.plan import lines
         from study.run import planned
 
         with on_stderr() as progress:
             found = planned.planned(chosen, progress)
+            print("\n".join(lines(found)))
             if not found.moves:
                 at = out or folder.with_name(f"{folder.name}-rest")
                 print("\n".join(planned.at_rest(found, at, progress)))

@@ -17,13 +17,12 @@ from study.scene.file import write_scene
 
 
 def planned(scene: Scene, progress: Progress) -> Plan:
-    """What is modelled of a scene; it is told, and stands among the notes of its results.
+    """What is modelled of a scene, which will stand among the notes of its results.
 
     ValueError for what no model is expected to keep.
     """
     with progress.stage("plan"):
         found = plan(suited(scene, progress))
-    print("\n".join(lines(found)))
     said = (f"Planned: {line}." for line in lines(found, costs=False))
     return replace(found, scene=replace(found.scene, remarks=(*found.scene.remarks, *said)))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from study.scene.schema import Scene
 
-UNSEEN = ("title", "models", "renders", "remarks")
+UNSEEN = ("title", "models", "renders", "remarks", "require")
 """Keys that no motion depends on."""
 
 
