@@ -133,9 +133,23 @@ class SubspaceMotion:
 
     def take_step(self) -> None:
         """Go one step on, to the displacement there."""
+        self.go_on()
+        self.deliver()
+
+    def go_on(self) -> None:
+        """Go one step on, and leave the displacement where it was."""
         self.advance(*self.factor(np.array([self.time, self.time + self.step])))
         self.time += self.step
+
+    def deliver(self) -> Floats:
+        """Bring the displacement [m] (n,) to where the motion is."""
         self.displacement = self._shapes @ self.state[:, 0]
+        return self.displacement
+
+    def restart(self) -> None:
+        """Put it at rest again, at the time zero."""
+        self.time, self.displacement = 0.0, np.zeros_like(self.displacement)
+        self.state[:] = 0.0
 
     def advance(self, before: float, after: float) -> None:
         """Take the state over a step with so much of the load at its start and its end."""

@@ -12,6 +12,7 @@ CONTENDERS = {
     "basafa": "Basafa benchmark",
     "finite-elements": "finite elements in steps",
     "superposition": "superposition",
+    "corrected": "corrected lattice",
 }
 SPRINGS = {"True": "springs and volume term", "False": "springs alone"}
 """Name of a lattice by its setting `volume_term`."""

@@ -58,6 +58,7 @@ def document(results: Results) -> dict[str, object]:
         "budgets": budget.budgets(results),
         "models": tables.model_rows(results),
         "numerics": tables.numerics_rows(results),
+        "corrections": tables.correction_rows(results),
         "reference": reference(results),
         "checks": tables.check_rows(results),
         "assumptions": [words(text) for text in record.assumptions],

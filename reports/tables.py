@@ -33,7 +33,7 @@ from reports.ranking import (
 )
 from reports.summary import real_time_factor, status
 from study.results.folder import Results
-from study.results.records import CurveErrors, ModelRecord, SystemEstimate
+from study.results.records import CorrectionRecord, CurveErrors, ModelRecord, SystemEstimate
 from study.scene.file import resolved as resolved_scene
 from study.similarity.score import FORMULAS
 
@@ -318,6 +318,30 @@ def _both(errors: CurveErrors | None) -> list[float | None]:
 
 def _share(share: float) -> str:
     return percent(share) if share == 0.0 or share >= ROUNDING else f"< {percent(ROUNDING)}"
+
+
+def correction_rows(results: Results) -> Table:
+    """What the lattices of corrected ones add, and each estimated error apart, by control point."""
+    return [
+        row
+        for model in results.record.models
+        if model.correction is not None
+        for row in _corrections(model, model.correction, results.record.probes)
+    ]
+
+
+def _corrections(
+    model: ModelRecord, found: CorrectionRecord, probes: tuple[str, ...]
+) -> Iterator[list[str]]:
+    mesh = {} if model.mesh_error is None else model.mesh_error.by_probe
+    vectors = None if model.elements is None else model.elements.truncation_error
+    by_probe = (found.remainder, found.remainder_errors, mesh, model.time_step_errors)
+    for probe in probes:
+        added, spacing, by_mesh, steps = (
+            None if (one := errors.get(probe)) is None else one.displacement for errors in by_probe
+        )
+        parts = (added, spacing, by_mesh, vectors, found.truncation_error, steps)
+        yield [model.label, words(probe), *(DASH if one is None else _share(one) for one in parts)]
 
 
 def check_rows(results: Results) -> Table:

@@ -236,8 +236,9 @@ class PreparedElements:
                 continue
             yield level
 
-    def solved_on(self, level: Level, progress: Progress) -> MeshSolution:
-        """Body and motion on one of the organ's meshes."""
+    def solved_on(self, level: Level | None, progress: Progress) -> MeshSolution:
+        """Body and motion on one of the organ's meshes, None for that of the model."""
+        level = level or self._level()
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
             body = self.body(level)

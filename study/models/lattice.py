@@ -179,7 +179,7 @@ class PreparedLattice:
             order = INTEGRATORS[self.model.lattice.integrator].order
             errors = time_step_errors(order, self.problem.probes, found.trajectory, half)
         sound = half if half is not None and half.status == "finished" else None
-        record = replace(self._record(found), time_step_errors=errors)
+        record = replace(self.record(found), time_step_errors=errors)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
         bounds = self._bounds(watch)
         return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
@@ -278,7 +278,8 @@ class PreparedLattice:
             meaning="mass of the lattice against that of the finite-element mesh",
         )
 
-    def _record(self, found: Run) -> ModelRecord:
+    def record(self, found: Run) -> ModelRecord:
+        """What is said of a run, without the error of its steps."""
         model, trajectory, damping = self.model, found.trajectory, self.springs.material.damping
         return ModelRecord(
             name=model.name,

@@ -17,6 +17,7 @@ MODELS = {
     "reading": "study.models.reading:KIND",
     "tissue": "study.models.tissue:KIND",
     "superposition": "study.models.superposition:KIND",
+    "corrected": "study.models.corrected:KIND",
 }
 """Where each kind stands; imported when it is used, for what computes it is heavy."""
 

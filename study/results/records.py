@@ -122,6 +122,24 @@ class LatticeRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CorrectionRecord:
+    """What only a corrected lattice has: its coarse lattice, and what that leaves uncertain.
+
+    `remainder`: what the lattice does beyond itself linear, L2 by control point, and
+    `remainder_errors`: the estimated error of that by the lattice's spacing, from a lattice of
+    `compared_spacing_m`, None and empty where it is not estimated; both relative to the whole
+    motion. `vectors` of the linear lattice, and `truncation_error`: of its motion by them.
+    """
+
+    spacing_m: float
+    compared_spacing_m: float | None
+    remainder: dict[str, CurveErrors]
+    remainder_errors: dict[str, CurveErrors]
+    vectors: int
+    truncation_error: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class PointRecord:
     """What only a single control mass point has."""
 
@@ -132,7 +150,7 @@ class PointRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelRecord:
-    """What a run says of every model, and in `elements`, `lattice` or `point` of its kind.
+    """What a run says of every model, and in its last four of what it is made of.
 
     `label`: its name in print; `system`: the fuzzy system whose estimate it was given;
     `small_strain_modulus_pa`: Young's modulus it has at small strain; `time_step_errors`: by
@@ -159,6 +177,7 @@ class ModelRecord:
     elements: ElementsRecord | None = None
     lattice: LatticeRecord | None = None
     point: PointRecord | None = None
+    correction: CorrectionRecord | None = None
 
     @property
     def parts(self) -> int | None:

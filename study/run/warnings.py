@@ -19,12 +19,14 @@ def warnings(
         for check in checks
         if not check.passed
     )
-    return (*of_models, *failed)
+    return tuple(dict.fromkeys((*of_models, *failed)))  # two may stand on one mesh
 
 
 def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.elements is not None:
-        yield from _of_elements(record, record.elements)
+        if record.lattice is None:  # which adds what is not linear
+            yield from _of_linear(record, record.elements)
+        yield from _of_mesh(record.elements)
     if record.status == "diverged":
         yield (
             f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
@@ -37,7 +39,7 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
         )
 
 
-def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+def _of_linear(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
     if strain is not None and strain > STRAIN_LIMIT:
         yield (
@@ -50,6 +52,9 @@ def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]
             f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
             "it should not be trusted. Reduce tool.force or hold the organ better."
         )
+
+
+def _of_mesh(elements: ElementsRecord) -> Iterator[str]:
     if elements.accuracy_missed and elements.mesh_error:
         yield (
             f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "

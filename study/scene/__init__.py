@@ -6,6 +6,7 @@ from study.scene.law import SpringLaw
 from study.scene.schema import (
     Aetiology,
     BasafaConstants,
+    Corrected,
     Damping,
     Fuzzy,
     Lattice,
@@ -25,6 +26,7 @@ from study.scene.schema import (
 __all__ = [
     "Aetiology",
     "BasafaConstants",
+    "Corrected",
     "Damping",
     "Fuzzy",
     "Lattice",

@@ -27,6 +27,7 @@ MESH_ONLY = (
     ("lattice",),
     ("reference",),
     ("superposition",),
+    ("corrected",),
     ("control_points",),
     ("renders",),
     ("tool", "place"),

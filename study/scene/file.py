@@ -126,8 +126,9 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield "damping", key
     if scene.reference.method != "modal":
         yield "reference", "modes"
-    if "superposition" not in scene.models:
-        yield ("superposition",)
+    for name in ("superposition", "corrected"):
+        if name not in scene.models:
+            yield (name,)
 
 
 def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:

@@ -229,6 +229,13 @@ class Superposition:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Corrected:
+    """Of the model of that name: `spacing` of its coarse lattice, else twice `lattice.spacing`."""
+
+    spacing: Length | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Time:
     """Simulated time and number of equally spaced samples, both ends included."""
 
@@ -274,6 +281,7 @@ class Scene:
     basafa: BasafaConstants = field(default_factory=BasafaConstants)
     reference: Reference = field(default_factory=Reference)
     superposition: Superposition = field(default_factory=Superposition)
+    corrected: Corrected = field(default_factory=Corrected)
     time: Time = field(default_factory=Time)
     control_points: dict[str, Place] = field(default_factory=dict)
     require: Require | None = None

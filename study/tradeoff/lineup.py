@@ -107,6 +107,13 @@ def _superposition(_: Scene) -> Iterator[Settings]:
         yield {"vectors": vectors, "count": count, "level": level}
 
 
+def _corrected(scene: Scene) -> Iterator[Settings]:
+    """By the spacing of the coarse lattice, and the coarsest on the scene's own mesh too."""
+    for times, level in ((2.0, 0), (2.0, 1), (1.5, 1), (1.0, 1), (0.8, 1)):
+        spacing = times * scene.lattice.spacing
+        yield {"spacing": spacing, "level": level, "step_fraction": FRACTION}
+
+
 CONTENDERS: dict[str, Contender] = {
     "springs": Contender("tissue", _springs),
     "volume-springs": Contender("tissue", _volume_springs),
@@ -115,6 +122,7 @@ CONTENDERS: dict[str, Contender] = {
     "basafa": Contender("basafa", _basafa),
     "finite-elements": Contender("fem", _finite_elements, {"method": "tr-bdf2"}),
     "superposition": Contender("superposition", _superposition),
+    "corrected": Contender("corrected", _corrected),
 }
 
 

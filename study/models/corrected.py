@@ -1,0 +1,281 @@
+"""A coarse lattice corrected by linear finite elements: the sum of what each of them does well.
+
+The finite elements know shape, load and surface, and nothing of geometry that changes; a coarse
+lattice knows how geometry changes the motion, roughly. So the motion is that of the elements in a
+subspace plus what the lattice does beyond itself linear (`study.models.remainder`). For small loads
+it is that of the elements. Nothing here knows the tool or its path: it is made of prepared models,
+which follow from the problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.calibration import SPRING_POISSON_RATIO
+from msm.damping import NodalDamping
+from msm.integrators import INTEGRATORS
+from msm.lattice import LatticeMesh
+from msm.model import Counts, Fixed, Step
+from msm.timestep import whole_steps
+from study.models.corrected_errors import Errors, checks
+from study.models.damping import reference_damping
+from study.models.deformed import Deformed, superposed
+from study.models.finite_elements import (
+    FiniteElements,
+    PreparedElements,
+    reference_of,
+)
+from study.models.keeping import recorded
+from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, asked_step
+from study.models.lattice_assumptions import springs
+from study.models.mesh_error import MeshSolution
+from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.remainder import FINER, ORDER, PreparedRemainder, Remainder, plus
+from study.models.tissue import of_modulus
+from study.models.together import Together
+from study.problem.damping import RayleighDamping
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Progress, Silent
+from study.results.fields import Mesh
+from study.results.records import ModelRecord
+from study.scene import Scene
+
+Floats = NDArray[np.float64]
+
+TIMES = 2.0
+"""Spacing of the coarse lattice, times that of the scene, where none is given."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CorrectedLattice:
+    """Finite elements and a coarse lattice of the same tissue; `fine` has the level of the mesh."""
+
+    fine: FiniteElements
+    coarse: LatticeModel
+    name: str = "corrected"
+    label: str = "Corrected lattice"
+
+    def varied(self, **settings: Any) -> Self:
+        """With another level of the mesh, or other keys of the scene's table `lattice`."""
+        own = {key: settings.pop(key) for key in ("level",) if key in settings}
+        coarse = self.coarse.varied(**settings) if settings else self.coarse
+        return replace(self, fine=self.fine.varied(**own), coarse=coarse)
+
+    def prepare(self, problem: Problem) -> PreparedCorrected:
+        """Set up both; vectors are computed when they are needed.
+
+        ValueError as of either, and for an integrator whose material depends on its step.
+        """
+        if self.coarse.lattice.integrator == "xpbd":
+            raise ValueError(
+                f"lattice.integrator: xpbd is softer the longer its step, and {self.name} needs a "
+                "lattice whose small motions are those of its stiffness; choose another"
+            )
+        return PreparedCorrected(
+            self, problem, self.fine.prepare(problem), self.coarse.prepare(problem)
+        )
+
+
+@dataclass(eq=False)
+class PreparedCorrected:
+    """Both on their organ; after a run, `best` is what was solved on the last mesh."""
+
+    model: CorrectedLattice
+    problem: Problem
+    fine: PreparedElements
+    coarse: PreparedLattice
+    best: MeshSolution | None = field(default=None, init=False)
+
+    @property
+    def critical_time_step(self) -> float:
+        """That of the coarse lattice [s]; the linear parts take its steps."""
+        return self.coarse.critical_time_step
+
+    def describe(self) -> list[str]:
+        """The mesh, then the coarse lattice."""
+        return [f"{self.model.name}: {text}" for text in self.fine.describe()] + [
+            text if text.startswith(self.model.name) else f"{self.model.name}: coarse {text}"
+            for text in self.coarse.describe()
+        ]
+
+    def refuse(self) -> None:
+        """ValueError for what either refuses."""
+        self.fine.refuse()
+        self.coarse.refuse()
+
+    @cached_property
+    def _on_level(self) -> MeshSolution:
+        """The finite elements on the level of the model."""
+        return self.fine.solved_on(None, Silent())
+
+    def simulate(self, longest: float | None = None) -> Simulation:
+        """The motion by the lattice's own steps, or by equal ones of at most `longest` [s]."""
+        solved = self._on_level
+        step: Step = asked_step(self.model.coarse.lattice)
+        if longest is not None:
+            interval = float(self.problem.observation.times[1])
+            step = Fixed(interval / whole_steps(interval, longest))
+        found = self._remainder(solved).run(step)
+        shape = self._deformed(solved)
+        return Simulation(
+            plus(found.trajectory, solved.found.trajectory),
+            found.lattice.smallest_step,
+            found.lattice.margin,
+            shape.inverted_cells(found),
+            shape.largest_strain(found, self.problem.observation.frames),
+        )
+
+    def _deformed(self, solved: MeshSolution) -> Deformed:
+        return Deformed.of(solved, self.coarse.assembly.lattice)
+
+    def _remainder(self, solved: MeshSolution) -> PreparedRemainder:
+        """That of the coarse lattice, in as many vectors as the elements needed."""
+        return PreparedRemainder(self.coarse, superposed(solved).subspace.load.size)
+
+    def rest(self) -> Floats:
+        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
+
+        That of the elements: linear about rest, a lattice does nothing beyond itself linear.
+        """
+        return self.fine.rest()
+
+    def run(self, watch: Watch) -> ModelRun:
+        """The motion, and apart the errors of its steps, mesh, vectors and coarse lattice."""
+        linear = self.fine.run(Watch(watch.progress))
+        assert self.fine.best is not None  # noqa: S101 - a run leaves it
+        solved = self.best = self.fine.best
+        prepared, shape = self._remainder(solved), self._deformed(solved)
+        with watch.progress.stage(self.model.name) as advance:
+            found = prepared.run(asked_step(self.model.coarse.lattice), advance)
+        self._keep_fields(found, shape, watch)
+        record = replace(self._record(found, solved, shape), elements=linear.record.elements)
+        whole = plus(found.trajectory, linear.trajectory)
+        if whole.status == "diverged":
+            return ModelRun(whole, record, notes=linear.notes)
+        half = plus(self._halved(prepared, found, watch.progress), linear.trajectory)
+        compared = self._compared(found, watch.progress)
+        errors = Errors(self.problem.probes, found, whole)
+        steps = errors.by_steps(self._order, half, linear.record.time_step_errors)
+        correction = errors.by_spacing(self.model.coarse.lattice.spacing, compared)
+        record = replace(record, time_step_errors=steps, correction=correction)
+        return ModelRun(
+            whole,
+            record,
+            tuple(checks(self.model.name, steps, solved, found)),
+            (*linear.notes, *_unknown(self.model.name, compared)),
+            halved=half if steps else None,
+        )
+
+    @property
+    def _order(self) -> int:
+        """Of the error of the steps."""
+        return INTEGRATORS[self.model.coarse.lattice.integrator].order
+
+    def _halved(
+        self, prepared: PreparedRemainder, found: Remainder, progress: Progress
+    ) -> Trajectory:
+        """The remainder by half as long steps."""
+        with progress.stage(f"{self.model.name}: halved steps") as advance:
+            return prepared.run(Counts(2 * found.lattice.substeps), advance).trajectory
+
+    def _compared(self, found: Remainder, progress: Progress) -> Trajectory | str:
+        """The remainder of a lattice of FINER times the spacing, or why there is none."""
+        coarse = self.model.coarse
+        spacing = FINER * coarse.lattice.spacing
+        try:
+            other = coarse.varied(spacing=spacing).prepare(self.problem)
+            remainder = PreparedRemainder(other, found.vectors)
+            with progress.stage(f"{self.model.name}: {1e3 * spacing:.3g} mm") as advance:
+                compared = remainder.run(asked_step(other.model.lattice), advance).trajectory
+        except ValueError as error:  # of a lattice that is too large
+            return str(error)
+        lost = f"its lattice of {1e3 * spacing:.3g} mm diverged"
+        return compared if compared.status == "finished" else lost
+
+    def _record(self, found: Remainder, solved: MeshSolution, shape: Deformed) -> ModelRecord:
+        record = self.coarse.record(found.lattice)
+        assert record.lattice is not None  # noqa: S101 - a lattice's record
+        inverted = shape.inverted_cells(found)
+        return replace(
+            record,
+            name=self.model.name,
+            label=self.model.label,
+            nodes=solved.found.nodes,
+            wall_s=solved.found.wall + found.lattice.wall,
+            largest_strain=shape.largest_strain(found, self.problem.observation.frames),
+            lattice=replace(record.lattice, inverted_cells=inverted),
+        )
+
+    def _keep_fields(self, found: Remainder, shape: Deformed, watch: Watch) -> None:
+        """Keep the motion of the mesh's vertices, if it is wanted."""
+        if watch.keeping is None or watch.keeping.fields is None:
+            return
+        mesh, times = Mesh(shape.mesh.points, shape.mesh.tetrahedra), self.problem.observation.times
+        afresh = replace(watch.keeping, resume=False)
+        with recorded(afresh, self.model.name, mesh, times) as on_sample:
+            for sample in found.samples:
+                on_sample(sample, *shape.state(sample, found))
+
+    def stepper(self) -> Stepper:
+        """All parts at rest, stepped together; the vertices of the mesh are delivered by frames."""
+        solved = self.best or self._on_level
+        parts = self._remainder(solved), self._deformed(solved)
+        return Together(*parts, self.problem.factor, self.fine.model.damping).stepper()
+
+
+def _unknown(name: str, compared: Trajectory | str) -> Iterator[str]:
+    """A note where there is nothing to tell the error of the coarse lattice by."""
+    if isinstance(compared, str):
+        yield f"What the spacing of {name} leaves out is not estimated: {compared}."
+
+
+def models(scene: Scene, _: Estimates) -> Iterator[CorrectedLattice]:
+    """The one corrected lattice, of the tissue's modulus."""
+    reference = reference_of(scene).varied(method="ritz-vectors", large_strain="none")
+    fine = replace(reference, name="corrected, linear part", label="Linear part")
+    yield CorrectedLattice(fine=fine, coarse=_coarse(scene))
+
+
+def _coarse(scene: Scene) -> LatticeModel:
+    """Nonlinear, over the organ, with the volume term where the Poisson ratio asks for it."""
+    spacing = scene.corrected.spacing or TIMES * scene.lattice.spacing
+    lattice = replace(
+        scene.lattice,
+        springs="lattice",
+        spacing=spacing,
+        geometry="nonlinear",
+        volume_term=scene.tissue.poisson_ratio > SPRING_POISSON_RATIO,
+    )
+    make = partial(_springs, damping=reference_damping(scene))
+    changed = replace(scene, lattice=lattice)
+    return LatticeModel(name="corrected", label="Coarse lattice", scene=changed, make=make)
+
+
+def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> SpringMaterial:
+    """Springs of the scene's law and the tissue's modulus, damped as the elements are."""
+    made = of_modulus(scene, mesh, modulus=scene.tissue.youngs_modulus)
+    damped = NodalDamping(damping.mass, beta=damping.stiffness)
+    return replace(made, material=replace(made.material, damping=damped))
+
+
+def assumptions(scene: Scene) -> list[str]:
+    """On what the sum takes for granted."""
+    coarse = _coarse(scene).lattice
+    return [
+        "The corrected lattice is the linear finite elements plus what a lattice of "
+        f"{1e3 * coarse.spacing:.3g} mm does beyond itself linear, for this place of the load "
+        "only. Its errors are estimates, none of them a bound: of what the spacing leaves out of "
+        f"the nonlinear part, from a lattice of {FINER:.2g} times the spacing and an assumed order "
+        f"of {ORDER:g}; of the linear part by its mesh and by its vectors.",
+        *springs(_coarse(scene).scene),
+    ]
+
+
+KIND = ModelKind(models=models, assumptions=assumptions, follows_law=True, any_load=False)
