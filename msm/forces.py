@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel, kernel
 from msm.kinematics import gradient_of
 from msm.laws import tension
 from msm.network import Network
@@ -50,7 +50,7 @@ def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
         force[j, 2] -= pull * dz
 
 
-@kernel()
+@inner_kernel()
 def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Add the spring forces [N] of small displacements, along the springs at rest."""
     for s in range(net.ends.shape[0]):
@@ -67,14 +67,14 @@ def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -
         force[j, 2] -= pull * rz
 
 
-@kernel(inline="always")
+@inner_kernel()
 def corner_shares(x: Any, y: Any, z: Any) -> Any:
     """What corners 0 to 3 of a cell lose to a stress with row (x, y, z); 7 to 4 gain as much."""
     plus, minus = x + y, x - y
     return plus + z, plus - z, minus + z, minus - z
 
 
-@kernel(inline="always")
+@inner_kernel()
 def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> None:
     """Subtract the nodal forces along d of a stress with row (x, y, z), weights included."""
     c0, c1, c2, c3 = corner_shares(x, y, z)
@@ -88,7 +88,7 @@ def scatter(cell: Any, force: Floats, d: int, x: float, y: float, z: float) -> N
     force[cell[7], d] -= c0
 
 
-@kernel(inline="always")
+@inner_kernel()
 def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
     """J - 1 of a cell, and the rows of its cofactor matrix, J times the transposed inverse of F."""
     a, b, e = gradient_of(cell, u, 0, to_gradient)
@@ -97,7 +97,7 @@ def volume_change(cell: Any, u: Floats, to_gradient: float) -> Any:
     return cofactors(a, b, e, f, g, h, i, j, k)
 
 
-@kernel(inline="always")
+@inner_kernel()
 def cofactors(a: Any, b: Any, e: Any, f: Any, g: Any, h: Any, i: Any, j: Any, k: Any) -> Any:
     """J - 1 and the rows of the cofactor matrix of F, from the rows of F - 1."""
     # J - 1 as a difference of numbers near 1 would round to more than a small load where kappa
@@ -111,7 +111,7 @@ def cofactors(a: Any, b: Any, e: Any, f: Any, g: Any, h: Any, i: Any, j: Any, k:
     return swelling + b * x[1] + e * x[2], x, y, z
 
 
-@kernel(inline="always")
+@inner_kernel()
 def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, z: Any) -> None:
     """Subtract the nodal forces of a pressure on the cofactors of a cell, weights included."""
     scatter(cell, force, 0, pressure * x[0], pressure * x[1], pressure * x[2])
@@ -119,7 +119,7 @@ def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, 
     scatter(cell, force, 2, pressure * z[0], pressure * z[1], pressure * z[2])
 
 
-@kernel()
+@inner_kernel()
 def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
     to_gradient = 0.25 / net.spacing
@@ -128,7 +128,7 @@ def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
         scatter_pressure(net.cells[c], force, net.bulk[c] * swelling * to_gradient, x, y, z)
 
 
-@kernel()
+@inner_kernel()
 def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V div(u) B_a for each corner a of each cell."""
     to_gradient = 0.25 / net.spacing
@@ -143,7 +143,7 @@ def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
         scatter(cell, force, 2, 0.0, 0.0, pressure)
 
 
-@kernel()
+@inner_kernel()
 def add_foundation_forces(net: Network, u: Floats, force: Floats) -> None:
     """Subtract S u.
 
@@ -160,7 +160,7 @@ def add_foundation_forces(net: Network, u: Floats, force: Floats) -> None:
         force[i, 2] -= z
 
 
-@kernel(inline="always")
+@inner_kernel()
 def damping(net: Network, u: Floats, i: int) -> float:
     """Damping [N s/m] of a node, eq. (9), or eq. (2) with gamma_1 = 0."""
     away = np.sqrt(u[i, 0] ** 2 + u[i, 1] ** 2 + u[i, 2] ** 2)

@@ -29,8 +29,9 @@ MOST_COUPLINGS = 125
 class Grid(NamedTuple):
     """What the kernels of a grid read, and the motion that they work on.
 
-    With m places of the box, b blocks of l lanes and s directions: `lanes`, see `msm.simd`. `place`
-    (n,): of each node. `u` [m], `v` [m/s], `force` [N], each (3, m).
+    With m places of the box, b blocks of l lanes and s directions: `lanes`, see `msm.simd`; their
+    precision is that of all arrays of reals. `place` (n,): of each node. `u` [m], `v` [m/s],
+    `force` [N], each (3, m).
 
     Springs: first place `start` (b,) of each block; `offset` (s,), `rest` [m] (s, 3), `length` [m]
     and `per_length` [1/m], each (s,), of each direction; `weight` (b s, l), relative to k_ref.
@@ -71,10 +72,13 @@ class Grid(NamedTuple):
     linear: Literal[True] | None
 
 
-def grid_of(lattice: LatticeMesh, net: Network, width: int | None = None) -> Grid | None:
+def grid_of(
+    lattice: LatticeMesh, net: Network, width: int | None = None, *, single: bool = False
+) -> Grid | None:
     """The grid of a network on a lattice, with lanes as the processor has; None if it is no grid.
 
-    That is one on tetrahedra, or with a foundation that couples nodes far apart.
+    That is one on tetrahedra, or with a foundation that couples nodes far apart. `single`: in
+    single precision, of which the processor takes twice as many at once.
     """
     if not isinstance(lattice, CellLattice):
         return None
@@ -82,7 +86,7 @@ def grid_of(lattice: LatticeMesh, net: Network, width: int | None = None) -> Gri
     held = _couplings(net, index @ strides)
     if len(held.offset) > MOST_COUPLINGS:
         return None
-    width = width or widest()
+    width = width or (2 * widest() if single else widest())
     springs, rest = _springs(net, index, strides)
     length = np.linalg.norm(rest, axis=1)
     reach = max(np.abs(found).max(initial=0) for found in (springs.offset, held.offset))
@@ -92,8 +96,8 @@ def grid_of(lattice: LatticeMesh, net: Network, width: int | None = None) -> Gri
     cells = _Blocks(place[net.cells[:, 0]], width)
     supports = _Blocks(place[held.node], width)
     u, v, force = np.zeros((3, 3, count + 2 * margin))
-    return Grid(
-        lanes=lanes_of(width),
+    grid = Grid(
+        lanes=lanes_of(width, single=single),
         place=place,
         u=u,
         v=v,
@@ -121,6 +125,16 @@ def grid_of(lattice: LatticeMesh, net: Network, width: int | None = None) -> Gri
         beta=net.beta or None,
         linear=True if net.linear else None,
     )
+    return _rounded(grid) if single else grid
+
+
+def _rounded(grid: Grid) -> Grid:
+    """All arrays of reals in single precision."""
+    return Grid._make(_single(x) if isinstance(x, np.ndarray) else x for x in grid)
+
+
+def _single(x: NDArray[Any]) -> NDArray[Any]:
+    return x.astype(np.float32) if x.dtype == np.float64 else x
 
 
 def _numbering(lattice: CellLattice) -> tuple[Ints, Ints, int]:

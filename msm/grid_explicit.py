@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from msm.grid import Grid
 from msm.grid_forces import add_internal_forces, add_stiffness_damping, damping
-from msm.kernel import kernel
+from msm.kernel import inner_kernel, kernel
 from msm.simd import every, load, store
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ def symplectic_euler(
     set_shares(grid, dt)
     for n in range(factors.shape[0]):
         add_internal_forces(law, grid, grid.u, grid.force)
-        add_stiffness_damping(law, grid, grid.beta, grid.linear, grid.u, grid.v, grid.force)
+        add_stiffness_damping(law, grid, grid.beta, grid.u, grid.v, grid.force)
         if grid.uneven:
             set_shares(grid, dt)
         kick_and_drift(grid, factors[n, 0], dt)
@@ -75,7 +75,7 @@ def runge_kutta_4(law: Any, grid: Grid, factors: Floats, dt: float, u: Floats, v
     give_back(grid, u, v)
 
 
-@kernel()
+@inner_kernel()
 def take_in(grid: Grid, u: Floats, v: Floats) -> None:
     """Set the motion in the grid to that of the nodes, beyond them to rest, forces to zero."""
     none = every(0.0, grid.lanes)
@@ -90,7 +90,7 @@ def take_in(grid: Grid, u: Floats, v: Floats) -> None:
             grid.v[d, grid.place[n]] = v[n, d]
 
 
-@kernel()
+@inner_kernel()
 def give_back(grid: Grid, u: Floats, v: Floats) -> None:
     """Set the motion of the nodes to that in the grid."""
     for n in range(grid.place.shape[0]):
@@ -99,7 +99,7 @@ def give_back(grid: Grid, u: Floats, v: Floats) -> None:
             v[n, d] = grid.v[d, grid.place[n]]
 
 
-@kernel()
+@inner_kernel()
 def set_shares(grid: Grid, dt: float) -> None:
     """Set what of a velocity is kept after dt, and what a force adds, nodal damping implicit."""
     for b in range(grid.start.shape[0]):
@@ -109,20 +109,20 @@ def set_shares(grid: Grid, dt: float) -> None:
         store(grid.share, b, 0, dt / inertia)
 
 
-@kernel(inline="always")
+@inner_kernel()
 def pushes(grid: Grid, b: int, d: int, factor: float) -> Any:
     """Force and load [N] along d on the nodes of a block."""
     load_now = factor * load(grid.load, 3 * b + d, 0, grid.lanes)
     return load(grid.force, d, grid.start[b], grid.lanes) + load_now
 
 
-@kernel(inline="always")
+@inner_kernel()
 def add_to(grid: Grid, a: Floats, d: int, i: int, x: Any) -> None:
     """Add to component d of vectors at the nodes from i on."""
     store(a, d, i, load(a, d, i, grid.lanes) + x)
 
 
-@kernel()
+@inner_kernel()
 def kick_and_drift(grid: Grid, factor: float, dt: float) -> None:
     """Velocities by the shares set before, then displacements by dt; the forces are used up."""
     for b in range(grid.start.shape[0]):
@@ -135,7 +135,7 @@ def kick_and_drift(grid: Grid, factor: float, dt: float) -> None:
             store(grid.force, d, i, every(0.0, grid.lanes))
 
 
-@kernel()
+@inner_kernel()
 def kick_again(grid: Grid, factor: float, half: float) -> None:
     """Velocities by half a step, damping explicit; the forces are kept for the next half."""
     for b in range(grid.start.shape[0]):
@@ -147,7 +147,7 @@ def kick_again(grid: Grid, factor: float, half: float) -> None:
             add_to(grid, grid.v, d, i, share * (pushes(grid, b, d, factor) - c * moving))
 
 
-@kernel()
+@inner_kernel()
 def finish(grid: Grid, at: Floats, speed: Floats, du: Floats, dv: Floats) -> None:
     """End a step of Runge-Kutta: move on, and set the first stage of the next one."""
     none = every(0.0, grid.lanes)

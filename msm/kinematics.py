@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float, float, float]:
     """Mean gradient over a cell of component d of u; corners as in msm.lattice.CORNERS."""
     u0, u1, u2, u3 = u[cell[0], d], u[cell[1], d], u[cell[2], d], u[cell[3], d]
@@ -20,7 +20,7 @@ def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float
     return slopes(u0, u1, u2, u3, u4, u5, u6, u7, to_gradient)  # type: ignore[no-any-return] # numpy scalars
 
 
-@kernel(inline="always")
+@inner_kernel()
 def slopes(
     u0: Any, u1: Any, u2: Any, u3: Any, u4: Any, u5: Any, u6: Any, u7: Any, to_gradient: float
 ) -> Any:
@@ -32,7 +32,7 @@ def slopes(
     return to_gradient * x, to_gradient * y, to_gradient * z
 
 
-@kernel(inline="always")
+@inner_kernel()
 def deformation(cell: Any, spacing: float, u: Floats) -> Any:
     """Rows of the mean deformation gradient F of a cell."""
     to_gradient = 0.25 / spacing
@@ -42,13 +42,13 @@ def deformation(cell: Any, spacing: float, u: Floats) -> Any:
     return (xx + 1.0, xy, xz), (yx, yy + 1.0, yz), (zx, zy, zz + 1.0)
 
 
-@kernel(inline="always")
+@inner_kernel()
 def cross(a: Any, b: Any) -> Any:
     """Vector product of two rows."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def dot(a: Any, b: Any) -> Any:
     """Scalar product of two rows."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel, kernel
 from msm.kinematics import cross, deformation, dot
 from msm.laws import stiffness, tension
 from msm.network import Network
@@ -20,7 +20,7 @@ from msm.network import Network
 Floats = NDArray[np.float64]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     """Direction, stiffness along and stiffness across [N/m] of a spring at the state u."""
     i, j = net.ends[s, 0], net.ends[s, 1]
@@ -64,7 +64,7 @@ def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
         bound[i] /= net.mass[i]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def cell_growth(net: Network, c: int, u: Floats) -> Any:
     """Largest slope of a cell's stress in F over kappa: 3 at rest."""
     if net.linear:

@@ -19,7 +19,7 @@ from msm.linearised import largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, Follower, critical_time_step
 from msm.statics import static_displacement
-from msm.stepper import LatticeStepper, refuse_unfit
+from msm.stepper import LatticeStepper, grid_for, refuse_unfit
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
@@ -92,20 +92,21 @@ def run(
     *,
     integrator: str = DEFAULT,
     linear: bool = False,
+    single: bool = False,
     on_sample: OnSample = lambda *_: None,
     checkpoint: Checkpoint | None = None,
 ) -> Run:
     """Motion from rest under the load times `factor` of the time [s].
 
     An integrator without a limit takes, with an automatic step, one step per sample; `linear` takes
-    the forces of small displacements. `on_sample(sample, u, v)`, u [m] and v [m/s] (n, 3) to be
-    copied, is told each sample in turn, and where samples are undone again the one from which the
-    run goes on: the last one told is where it stands. A run with a `checkpoint` can be continued
-    from it, and then tells first the sample it continues from. ValueError if there would be too
-    many steps, if the step does not suit the samples, the integrator the springs, or the
-    checkpoint the run.
+    the forces of small displacements, `single` steps in single precision. `on_sample(sample, u,
+    v)`, u [m] and v [m/s] (n, 3) to be copied, is told each sample in turn, and where samples are
+    undone again the one from which the run goes on: the last one told is where it stands. A run
+    with a `checkpoint` can be continued from it, and then tells first the sample it continues from.
+    ValueError if there would be too many steps, if the step does not suit the samples, the
+    integrator the springs or single precision, or the checkpoint the run.
     """
-    stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear)
+    stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear, single=single)
     pace = _pace(step, observation, stepper.limit_at_rest)
     recorder, motion = _Recorder(assembly.lattice, stepper.net, observation), _Motion()
     recorder.record(0, stepper.u, stepper.v)
@@ -131,7 +132,8 @@ def _identity(
     seen = tuple(getattr(observation, field.name) for field in fields(observation))
     body = assembly.lattice.nodes, stepper.law, stepper.net
     runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
-    lanes = () if stepper.grid is None else stepper.grid.lanes  # which round differently
+    # Which round differently.
+    lanes = () if stepper.grid is None else (stepper.grid.u.dtype.name, len(stepper.grid.lanes))
     return identity(runs, lanes, body, integrator, step, seen, history)
 
 
@@ -157,10 +159,12 @@ def refuse(
     *,
     integrator: str = DEFAULT,
     linear: bool = False,
+    single: bool = False,
 ) -> None:
     """ValueError for all that `run` refuses but checkpoints, without a step taken."""
     refuse_unfit(integrator, material)
     net = arrays(assembly, material, linear=linear)
+    grid_for(assembly.lattice, net, integrator, single=single)
     follower = Follower(material.law, net, INTEGRATORS[integrator])
     _pace(step, observation, follower.limit(np.zeros_like(net.load)))
 

@@ -1,19 +1,21 @@
-"""Several numbers at once inside compiled kernels: vectors of 1, 2, 4 or 8 lanes.
+"""Several numbers at once inside compiled kernels: vectors of doubles, or of twice as many singles.
 
 Loops over the short rows of a grid are not vectorised by the compiler to any profit, so here the
 vectors are written out: `load` and `store` move neighbouring entries of an array, and what is
 loaded takes +, -, *, /, abs, min, max and mixes with plain numbers. A kernel written in these terms
-knows no width: it has that of its argument `lanes`, see `lanes_of`, and with one lane its numbers
-are plain ones. Products and sums may be fused where the processor can.
+knows neither width nor precision: it has those of its argument `lanes`, see `lanes_of`, and with
+one lane its numbers are plain doubles. Plain numbers are rounded to the precision of a vector that
+they meet. Products and sums may be fused where the processor can.
 """
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.codegen import get_host_cpu_features
@@ -27,20 +29,38 @@ from numba.extending import (
     type_callable,
 )
 
-Lanes = tuple[float, ...]
+Lanes = tuple[float | np.float32, ...]
 
 WIDTHS = (1, 2, 4, 8)
-DOUBLE, WORD, INDEX = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+"""Of doubles; vectors of singles are twice as wide."""
+WORD, INDEX = ir.IntType(64), ir.IntType(32)
 FUSED = ("contract",)
 ROOT_GUESS = 0x5FE6EB50C7B537A9
 """From which half the bits of q are taken for 1 / sqrt(q), within 3.5 %: Lomont 2003."""
 
 
-def lanes_of(width: int) -> Lanes:
-    """The argument that tells a kernel its width; its numbers mean nothing, their count does."""
-    if width not in WIDTHS:
-        raise ValueError(f"vectors have {WIDTHS} lanes, not {width}")
-    return (0.0,) * width
+class Format(NamedTuple):
+    """A floating-point format as the compiler knows it: how it calls it, and its type."""
+
+    name: str
+    number: Any
+
+
+FORMATS = {
+    types.float64: Format("f64", ir.DoubleType()),
+    types.float32: Format("f32", ir.FloatType()),
+}
+
+
+def lanes_of(width: int, *, single: bool = False) -> Lanes:
+    """The argument that tells a kernel how many numbers of which precision it takes at once.
+
+    The numbers in it mean nothing.
+    """
+    widths = tuple(2 * n for n in WIDTHS) if single else WIDTHS
+    if width not in widths:
+        raise ValueError(f"vectors have {widths} lanes, not {width}")
+    return (np.float32(0.0) if single else 0.0,) * width
 
 
 def widest() -> int:
@@ -51,21 +71,26 @@ def widest() -> int:
 
 
 class LanesType(types.Type):
-    """The compiler's type of a vector of so many numbers."""
+    """The compiler's type of a vector of so many numbers of one type."""
 
-    def __init__(self, count: int) -> None:
-        self.count = count
-        super().__init__(name=f"Lanes({count})")
+    def __init__(self, count: int, dtype: Any) -> None:
+        self.count, self.dtype = count, dtype
+        super().__init__(name=f"Lanes({count} x {dtype})")
+
+    @property
+    def format(self) -> Format:
+        """Of its numbers."""
+        return FORMATS[self.dtype]
 
 
 @register_model(LanesType)
 class _LanesModel(PrimitiveModel):  # type: ignore[misc] # numba publishes no types
     def __init__(self, dmm: Any, kind: LanesType) -> None:
-        super().__init__(dmm, kind, ir.VectorType(DOUBLE, kind.count))
+        super().__init__(dmm, kind, ir.VectorType(kind.format.number, kind.count))
 
 
 def _kind(lanes: Any) -> Any:
-    return types.float64 if lanes.count == 1 else LanesType(lanes.count)
+    return lanes.dtype if lanes.count == 1 else LanesType(lanes.count, lanes.dtype)
 
 
 # Memory ----------------------------------------------------------------------------------------
@@ -81,23 +106,27 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any, value: An
 
 @intrinsic
 def load(_: Any, array: Any, row: Any, column: Any, lanes: Any) -> Any:  # noqa: ARG001 - typed alone
-    """Entries of a matrix in a row, from a column on, as many as there are lanes."""
+    """As many entries of a matrix in a row, from a column on, as there are lanes, of their type."""
+    if array.dtype is not lanes.dtype:
+        return None
     kind = _kind(lanes)
 
     def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         place = _place(context, builder, signature.args[0], given[0], given[1:3], kind)
-        return builder.load(place, align=8)
+        return builder.load(place, align=lanes.dtype.bitwidth // 8)
 
     return kind(array, types.intp, types.intp, lanes), code
 
 
 @intrinsic
 def store(_: Any, array: Any, row: Any, column: Any, value: Any) -> Any:  # noqa: ARG001 - typed alone
-    """Set the entries of a matrix in a row, from a column on, to a vector."""
+    """Set the entries of a matrix in a row, from a column on, to a vector of their type."""
+    if array.dtype is not getattr(value, "dtype", value):
+        return None
 
     def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         place = _place(context, builder, signature.args[0], given[0], given[1:3], value)
-        builder.store(given[3], place, align=8)
+        builder.store(given[3], place, align=array.dtype.bitwidth // 8)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, types.intp, value), code
@@ -106,8 +135,10 @@ def store(_: Any, array: Any, row: Any, column: Any, value: Any) -> Any:  # noqa
 # Numbers ---------------------------------------------------------------------------------------
 
 
-def _splat(builder: Any, x: Any, count: int) -> Any:
-    nothing = ir.Constant(ir.VectorType(DOUBLE, count), ir.Undefined)
+def _splat(context: Any, builder: Any, x: Any, plain: Any, kind: LanesType) -> Any:
+    """A plain number of its type in every lane of a vector, rounded to its precision."""
+    x, count = context.cast(builder, x, plain, kind.dtype), kind.count
+    nothing = ir.Constant(ir.VectorType(kind.format.number, count), ir.Undefined)
     first = builder.insert_element(nothing, x, ir.Constant(INDEX, 0))
     return builder.shuffle_vector(
         first, nothing, ir.Constant(ir.VectorType(INDEX, count), [0] * count)
@@ -117,17 +148,23 @@ def _splat(builder: Any, x: Any, count: int) -> Any:
 @intrinsic
 def every(_: Any, x: Any, lanes: Any) -> Any:  # noqa: ARG001 - typed alone
     """The same number in every lane."""
+    kind = _kind(lanes)
 
-    def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
-        return given[0] if lanes.count == 1 else _splat(builder, given[0], lanes.count)
+    def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        if lanes.count == 1:
+            return given[0]
+        return _splat(context, builder, given[0], signature.args[0], kind)
 
-    return _kind(lanes)(types.float64, lanes), code
+    return kind(types.float64, lanes), code
 
 
-def _function(builder: Any, name: str, count: int, arity: int) -> Any:
-    vector = ir.VectorType(DOUBLE, count)
-    kind = ir.FunctionType(vector, [vector] * arity)
-    return cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{count}f64")
+def _function(builder: Any, name: str, kind: LanesType) -> Any:
+    """The compiler's own function of a vector."""
+    vector = ir.VectorType(kind.format.number, kind.count)
+    full_name = f"llvm.{name}.v{kind.count}{kind.format.name}"
+    return cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(vector, [vector]), full_name
+    )
 
 
 def _fused(name: str) -> Callable[..., Any]:
@@ -160,10 +197,10 @@ def _teach_pair(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
 
         return typer
 
-    def code(_: Any, builder: Any, signature: Any, given: Any) -> Any:
-        count = signature.return_type.count
+    def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        vector = signature.return_type
         both = [
-            x if isinstance(kind, LanesType) else _splat(builder, x, count)
+            x if isinstance(kind, LanesType) else _splat(context, builder, x, kind, vector)
             for kind, x in zip(signature.args, given, strict=True)
         ]
         return emit(builder, *both)
@@ -178,34 +215,36 @@ def _teach_single(function: Callable[..., Any], emit: Callable[..., Any]) -> Non
         return lambda a: a if isinstance(a, LanesType) else None
 
     lower_builtin(function, LanesType)(
-        lambda _, builder, signature, given: emit(builder, given[0], signature.args[0].count)
+        lambda _, builder, signature, given: emit(builder, given[0], signature.args[0])
     )
 
 
 for _two, _emit in PAIRED.items():
     _teach_pair(_two, _emit)
 _teach_single(operator.neg, lambda builder, a, _: builder.fneg(a))
-_teach_single(abs, lambda builder, a, n: builder.call(_function(builder, "fabs", n, 1), [a]))
+_teach_single(abs, lambda builder, a, kind: builder.call(_function(builder, "fabs", kind), [a]))
 
 
 @intrinsic
 def root(_: Any, x: Any) -> Any:
     """Square root of each lane."""
-    count = getattr(x, "count", 1)
 
     def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
-        if count > 1:
-            return builder.call(_function(builder, "sqrt", count, 1), given)
-        kind = ir.FunctionType(DOUBLE, [DOUBLE])
-        one = cgutils.get_or_insert_function(builder.module, kind, "llvm.sqrt.f64")
-        return builder.call(one, given)
+        if isinstance(x, LanesType):
+            return builder.call(_function(builder, "sqrt", x), given)
+        number = FORMATS[x].number
+        kind = ir.FunctionType(number, [number])
+        name = f"llvm.sqrt.{FORMATS[x].name}"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), given)
 
     return x(x), code
 
 
 @intrinsic
 def root_guess(_: Any, q: Any) -> Any:
-    """1 / sqrt(q) within 3.5 %, for positive normal numbers."""
+    """1 / sqrt(q) within 3.5 %, for positive normal doubles."""
+    if q.dtype is not types.float64:
+        return None
     count = q.count
 
     def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
@@ -237,8 +276,8 @@ def inverse_root(q: Any) -> Any:
 
 @overload(inverse_root)
 def _inverse_root(q: Any) -> Any:
-    """Two steps of high order from a guess, in a third of the time of a division and a root."""
-    if not isinstance(q, LanesType):
+    """Of doubles two steps of high order from a guess, which take a third of the time."""
+    if not isinstance(q, LanesType) or q.dtype is types.float32:
 
         def plain(q: Any) -> Any:
             return 1.0 / root(q)
@@ -259,20 +298,22 @@ def _inverse_root(q: Any) -> Any:
 
 @intrinsic
 def lane(_: Any, x: Any, n: Any) -> Any:  # noqa: ARG001 - typed alone
-    """The number in one lane."""
+    """The number in one lane, as a double."""
 
-    def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
-        return builder.extract_element(given[0], builder.trunc(given[1], INDEX))
+    def code(context: Any, builder: Any, __: Any, given: Any) -> Any:
+        found = builder.extract_element(given[0], builder.trunc(given[1], INDEX))
+        return context.cast(builder, found, x.dtype, types.float64)
 
     return types.float64(x, types.intp), code
 
 
 @intrinsic
 def with_lane(_: Any, x: Any, n: Any, value: Any) -> Any:  # noqa: ARG001 - typed alone
-    """The vector with another number in one lane."""
+    """The vector with another number in one lane, rounded to its precision."""
 
-    def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
-        return builder.insert_element(given[0], given[2], builder.trunc(given[1], INDEX))
+    def code(context: Any, builder: Any, __: Any, given: Any) -> Any:
+        number = context.cast(builder, given[2], types.float64, x.dtype)
+        return builder.insert_element(given[0], number, builder.trunc(given[1], INDEX))
 
     return x(x, types.intp, types.float64), code
 

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays
-from msm.grid import grid_of
+from msm.grid import Grid, grid_of
 from msm.integrators import INTEGRATORS
+from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
 from msm.linearised import farthest
+from msm.network import Network
 from msm.stability import DEFAULT, Follower
 from msm.timestep import LOOK
 
@@ -22,8 +24,9 @@ class LatticeStepper:
     """The motion of a lattice, from rest, under the load times `factor` of the time [s].
 
     `u` [m] and `v` [m/s] (n, 3): where it is, at the time `t` [s]; `limit_at_rest` [s]: the
-    critical step there. `linear`: forces of small displacements. Everything is compiled once it
-    exists. ValueError if the integrator does not suit the springs or their damping.
+    critical step there. `linear`: forces of small displacements; `single`: in single precision.
+    Everything is compiled once it exists. ValueError if the integrator does not suit the springs or
+    their damping, or the lattice or the integrator single precision.
     """
 
     def __init__(
@@ -34,12 +37,13 @@ class LatticeStepper:
         integrator: str = DEFAULT,
         *,
         linear: bool = False,
+        single: bool = False,
     ) -> None:
         refuse_unfit(integrator, material)
         self.method = INTEGRATORS[integrator]
         self.law, self.factor = material.law, factor
         self.net = arrays(assembly, material, linear=linear)
-        self.grid = grid_of(assembly.lattice, self.net) if self.method.on_grid else None
+        self.grid = grid_for(assembly.lattice, self.net, integrator, single=single)
         self.follower = Follower(self.law, self.net, self.method)
         self.u, self.v = np.zeros_like(self.net.load), np.zeros_like(self.net.load)
         self.t, self.unseen = 0.0, 0
@@ -77,6 +81,21 @@ class LatticeStepper:
         """Put the lattice at rest again, at the time zero."""
         self.u[:], self.v[:] = 0.0, 0.0
         self.t, self.unseen = 0.0, 0
+
+
+def grid_for(lattice: LatticeMesh, net: Network, integrator: str, *, single: bool) -> Grid | None:
+    """The grid that an integrator steps on, None if it steps over the list of springs.
+
+    ValueError for single precision where there is none.
+    """
+    on_grid = INTEGRATORS[integrator].on_grid is not None
+    grid = grid_of(lattice, net, single=single) if on_grid else None
+    if single and grid is None:
+        raise ValueError(
+            "single precision is for explicit integrators on a cubic lattice whose foundation "
+            "couples neighbouring nodes only; set lattice.precision to double"
+        )
+    return grid
 
 
 def refuse_unfit(integrator: str, material: Material) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import scatter
-from msm.kernel import kernel
-from msm.kinematics import cross, gradient_of
+from msm.kernel import inner_kernel, kernel
+from msm.kinematics import cross, dot, gradient_of
 from msm.linearised import spring_state
 from msm.network import Network
 
@@ -63,7 +63,7 @@ def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
     linearise_cells(net, u, at)
 
 
-@kernel()
+@inner_kernel()
 def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
     """Set F, its cofactors, J - 1 and the pressure of each cell."""
     for c in range(net.cells.shape[0]):
@@ -71,7 +71,7 @@ def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
         at.pressure[c] = 0.0 if net.linear else net.bulk[c] * at.swelling[c]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
     """Set F and its cofactors (3, 3) of a cell; J - 1. At rest, and div u, if the net is linear."""
     for d in range(3):
@@ -114,7 +114,7 @@ def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats)
                 out[i, d] += share * net.value[e] * p[net.column[e], d]
 
 
-@kernel()
+@inner_kernel()
 def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add that of the springs."""
     for s in range(net.ends.shape[0]):
@@ -132,17 +132,20 @@ def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: 
         out[j, 2] += fz
 
 
-@kernel()
+@inner_kernel()
 def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add that of the cells."""
     to_gradient = 0.25 / net.spacing
-    rate = np.empty((3, 3))
     for c in range(net.cells.shape[0]):
         cell, f, g = net.cells[c], at.deformation[c], at.cofactor[c]
         swelling = 0.0
+        rate = (
+            gradient_of(cell, p, 0, to_gradient),
+            gradient_of(cell, p, 1, to_gradient),
+            gradient_of(cell, p, 2, to_gradient),
+        )
         for d in range(3):
-            rate[d, 0], rate[d, 1], rate[d, 2] = gradient_of(cell, p, d, to_gradient)
-            swelling += rate[d, 0] * g[d, 0] + rate[d, 1] * g[d, 1] + rate[d, 2] * g[d, 2]
+            swelling += dot(rate[d], g[d])
         bulk = -share * to_gradient * net.bulk[c] * swelling
         turned = -share * to_gradient * at.pressure[c]
         for d in range(3):
@@ -175,7 +178,7 @@ def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
                     out[i, d] += share * net.value[e]
 
 
-@kernel(inline="always")
+@inner_kernel()
 def corner_slope(cofactor: Floats, a: int, d: int) -> Any:
     """Derivative of J by the displacement of corner a along d, times h."""
     g = cofactor[d]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 CONTENDERS = {
     "springs": "springs alone",
     "volume-springs": "springs and volume term",
+    "single-precision": "single precision",
     "step-sizes": "the same, other steps",
     "integrators": "the same, other integrators",
     "basafa": "Basafa benchmark",
@@ -33,6 +34,7 @@ WORDS: dict[str, Callable[[str], str]] = {
     "level": lambda value: f"mesh {value.replace('-', '−')}",
     "integrator": lambda value: NAMES.get(value, value.replace("-", " ")),
     "vectors": lambda value: NAMES.get(value, value),
+    "precision": lambda value: f"{value} precision",
     "count": lambda value: f"{value} vectors",
 }
 

@@ -11,6 +11,7 @@ from msm.grid import grid_of
 from msm.grid_explicit import take_in
 from msm.grid_forces import add_internal_forces
 from msm.integrators import INTEGRATORS
+from msm.kernel import kernel
 from msm.laws import Basafa, Hooke, piecewise
 from msm.simd import WIDTHS, widest
 from msm.stability import critical_time_step
@@ -34,6 +35,12 @@ FAMILIES = {
 SLOW = pytest.mark.slow
 """Of what would be compiled for one test alone."""
 EXPLICIT = [name for name, method in INTEGRATORS.items() if method.on_grid is not None]
+
+
+@kernel()
+def set_forces(law, grid, u):
+    take_in(grid, u, u)
+    add_internal_forces(law, grid, grid.u, grid.force)
 
 
 def law_of(kind, k):
@@ -203,8 +210,7 @@ def test_a_spring_pressed_to_a_point_is_not_a_number(bodies):
         u = np.zeros_like(net.load)
         i, j = net.ends[0].astype(int)
         u[j] = u[i] - net.rest[0]
-        take_in(grid, u, u)
-        add_internal_forces(made.law, grid, grid.u, grid.force)
+        set_forces(made.law, grid, u)
         assert np.isnan(grid.force[:, grid.place[[i, j]]]).any()
 
 
@@ -254,7 +260,6 @@ def test_the_forces_are_those_of_the_list_of_springs(bodies):
     wanted = np.empty_like(u)
     internal_forces(made.law, net, u, wanted)
     grid = grid_of(assembly.lattice, net)
-    take_in(grid, u, u)
-    add_internal_forces(made.law, grid, grid.u, grid.force)
+    set_forces(made.law, grid, u)
     found = grid.force[:, grid.place].T
     assert np.abs(found - wanted).max() < 1e-14 * len(grid.offset) * np.abs(wanted).max()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numba import config
+from numba.core.errors import TypingError
 
 from msm import simd
 from msm.kernel import kernel
@@ -42,15 +43,26 @@ def wanted(a, b):
     )
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_every_width_computes_what_numpy_does(width):
+@pytest.mark.parametrize(
+    ("width", "single"), [*((width, False) for width in WIDTHS), (2, True), (16, True)]
+)
+def test_every_width_computes_what_numpy_does(width, single):
     rng = np.random.default_rng(0)
-    a, b = rng.standard_normal((2, 17)), np.exp(rng.uniform(-50.0, 50.0, (3, 17)))
+    kind = np.float32 if single else np.float64
+    a, b = rng.standard_normal((2, 17)), np.exp(rng.uniform(-9.0, 9.0, (3, 17)))
     a[0, ::3] = 0.0
-    out = np.zeros((9, 17))
-    compute(lanes_of(width), a, b, out)
-    np.testing.assert_allclose(out[:, 1:], wanted(a, b)[:, 1:], rtol=1e-15, atol=1e-15)
+    a, b, out = a.astype(kind), b.astype(kind), np.zeros((9, 17), kind)
+    compute(lanes_of(width, single=single), a, b, out)
+    one = 4.0 * np.finfo(kind).eps
+    np.testing.assert_allclose(out[:, 1:], wanted(a, b)[:, 1:], rtol=one, atol=one)
     assert (out[:, 0] == 0.0).all()  # before the column that it began at
+
+
+def test_numbers_of_another_precision_than_the_lanes_are_refused():
+    """Not read as what they are not."""
+    a = np.ones((3, 17))
+    with pytest.raises(TypingError):
+        compute(lanes_of(4, single=True), a, a, a)
 
 
 @kernel()
@@ -85,3 +97,5 @@ def test_the_width_is_that_of_what_numba_compiles_for(monkeypatch, features, wid
 def test_other_widths_are_refused():
     with pytest.raises(ValueError, match=r"1, 2, 4, 8.*not 3"):
         lanes_of(3)
+    with pytest.raises(ValueError, match=r"2, 4, 8, 16.*not 1"):
+        lanes_of(1, single=True)

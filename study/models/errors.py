@@ -1,4 +1,4 @@
-"""The error of a model's steps, from the same motion by half as long ones."""
+"""The error of a model's steps, from the same motion by half as long ones or in more digits."""
 
 from __future__ import annotations
 
@@ -37,6 +37,21 @@ def time_step_errors(
     }
 
 
+def rounding_errors(
+    probes: tuple[str, ...], single: Trajectory, double: Trajectory
+) -> dict[str, CurveErrors]:
+    """Relative L2 errors of steps in single precision by control point, none if double diverged."""
+    if double.status != "finished":
+        return {}
+    return {
+        probe: CurveErrors(
+            displacement=_difference(single.displacement[:, i], double.displacement[:, i]),
+            velocity=_difference(single.velocity[:, i], double.velocity[:, i]),
+        )
+        for i, probe in enumerate(probes)
+    }
+
+
 def _difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Relative L2 difference of two motions (samples, 3)."""
     return float(np.linalg.norm(a - b) / max(float(np.linalg.norm(b)), TINY))
@@ -48,13 +63,28 @@ def step_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
         meaning = "runs with halved steps that diverged although whole steps did not"
         yield Check(name=f"{name}: halved steps", value=1.0, limit=0.0, meaning=meaning)
         return
+    yield from _curve_checks(name, errors, "time step", "the ")
+
+
+def rounding_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
+    """Whether single precision was enough for a finished model, or double diverged."""
+    if not errors:
+        meaning = "runs in double precision that diverged although single precision did not"
+        yield Check(name=f"{name}: double precision", value=1.0, limit=0.0, meaning=meaning)
+        return
+    yield from _curve_checks(name, errors, "single precision")
+
+
+def _curve_checks(
+    name: str, errors: dict[str, CurveErrors], cause: str, article: str = ""
+) -> Iterator[Check]:
     worst = largest(errors)
     for kind, value, limit in (
         ("displacement", worst.displacement, DISPLACEMENT_LIMIT),
         ("velocity", worst.velocity, VELOCITY_LIMIT),
     ):
-        meaning = f"largest relative L2 error of a {kind} curve by the time step"
-        yield Check(name=f"{name}: {kind} by time step", value=value, limit=limit, meaning=meaning)
+        meaning = f"largest relative L2 error of a {kind} curve by {article}{cause}"
+        yield Check(name=f"{name}: {kind} by {cause}", value=value, limit=limit, meaning=meaning)
 
 
 def place(trajectory: Trajectory) -> tuple[float, float, float] | None:

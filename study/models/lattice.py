@@ -18,14 +18,20 @@ from msm.laws import LAWS, force_law_of
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
-from study.models.errors import place, step_checks, time_step_errors
+from study.models.errors import (
+    place,
+    rounding_checks,
+    rounding_errors,
+    step_checks,
+    time_step_errors,
+)
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Advance
 from study.results.fields import Mesh
-from study.results.records import Check, LatticeRecord, ModelRecord
+from study.results.records import Check, CurveErrors, LatticeRecord, ModelRecord
 from study.scene import Lattice, Scene
 
 Floats = NDArray[np.float64]
@@ -65,8 +71,13 @@ class LatticeModel:
         return self.scene.lattice
 
     def varied(self, **settings: Any) -> Self:
-        """With other keys of the scene's table `lattice`; a step is left out unless it is given."""
-        free = replace(self.lattice, springs="lattice", time_step=None, step_rate=None)
+        """With other keys of the scene's table `lattice`.
+
+        A step is left out, and precision is double, unless it is given.
+        """
+        free = replace(
+            self.lattice, springs="lattice", precision="double", time_step=None, step_rate=None
+        )
         return replace(self, scene=replace(self.scene, lattice=replace(free, **settings)))
 
     def prepare(self, problem: Problem) -> PreparedLattice:
@@ -118,6 +129,11 @@ class PreparedLattice:
         """Whether forces are those of small displacements."""
         return self.model.lattice.geometry == "linear"
 
+    @property
+    def single(self) -> bool:
+        """Whether steps are taken in single precision."""
+        return self.model.lattice.precision == "single"
+
     @cached_property
     def critical_time_step(self) -> float:
         """Longest stable step [s] at rest; infinite for an integrator without a limit."""
@@ -136,6 +152,7 @@ class PreparedLattice:
                 asked_step(lattice),
                 integrator=lattice.integrator,
                 linear=self.linear,
+                single=self.single,
             )
 
     def _with(self, make: Make) -> PreparedLattice:
@@ -173,14 +190,18 @@ class PreparedLattice:
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its error by halved steps, and the motion at both bounds of its stiffness."""
         found, errors, half = self._run(watch), {}, None
+        rounding: dict[str, CurveErrors] = {}
         finished = found.trajectory.status == "finished"
         if finished:
             half = self._halved(found, watch)
             order = INTEGRATORS[self.model.lattice.integrator].order
             errors = time_step_errors(order, self.problem.probes, found.trajectory, half)
+            rounding = self._rounding(found, watch)
         sound = half if half is not None and half.status == "finished" else None
-        record = replace(self.record(found), time_step_errors=errors)
+        record = replace(self.record(found, rounding), time_step_errors=errors)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
+        if finished and self.single:
+            checks += tuple(rounding_checks(self.model.name, rounding))
         bounds = self._bounds(watch)
         return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
 
@@ -199,6 +220,7 @@ class PreparedLattice:
             self.problem.factor,
             lattice.integrator,
             linear=self.linear,
+            single=self.single,
         )
         dt = _step(lattice, motion.limit_at_rest)
         return Stepper(
@@ -226,6 +248,17 @@ class PreparedLattice:
         with watch.progress.stage(f"{name}: halved steps") as advance:
             step = Counts(2 * found.substeps)
             return self._march(step, advance, watch, f"{name}-halved").trajectory
+
+    def _rounding(self, found: Run, watch: Watch) -> dict[str, CurveErrors]:
+        """What single precision costs, by the same steps in double; empty for steps in double."""
+        if not self.single:
+            return {}
+        name, scene = f"{self.model.name}-double", self.model.scene
+        other = replace(scene, lattice=replace(scene.lattice, precision="double"))
+        double = replace(self, model=replace(self.model, scene=other))
+        with watch.progress.stage(f"{self.model.name}: double precision") as advance:
+            whole = double._march(Counts(found.substeps), advance, watch, name).trajectory
+        return rounding_errors(self.problem.probes, found.trajectory, whole)
 
     def _bounds(self, watch: Watch) -> tuple[Trajectory, Trajectory] | None:
         if self.model.bounds is None:
@@ -265,6 +298,7 @@ class PreparedLattice:
             advance,
             integrator=self.model.lattice.integrator,
             linear=self.linear,
+            single=self.single,
             checkpoint=checkpoint(watch.keeping, kept_as),
             on_sample=on_sample,
         )
@@ -278,8 +312,8 @@ class PreparedLattice:
             meaning="mass of the lattice against that of the finite-element mesh",
         )
 
-    def record(self, found: Run) -> ModelRecord:
-        """What is said of a run, without the error of its steps."""
+    def record(self, found: Run, rounding: dict[str, CurveErrors] | None = None) -> ModelRecord:
+        """What is said of a run, without the error of its steps; with that of its rounding."""
         model, trajectory, damping = self.model, found.trajectory, self.springs.material.damping
         return ModelRecord(
             name=model.name,
@@ -308,6 +342,8 @@ class PreparedLattice:
                 repeated_steps=found.repeated_steps,
                 node_mass_kg=self._node_mass(),
                 inverted_cells=found.inverted_cells,
+                precision=model.lattice.precision,
+                rounding_errors=rounding or {},
             ),
         )
 

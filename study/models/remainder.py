@@ -103,6 +103,7 @@ class PreparedRemainder:
             step,
             advance,
             integrator=one.model.lattice.integrator,
+            single=one.single,
             on_sample=keep,
         )
         return self._beyond_linear(found, nodal)

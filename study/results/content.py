@@ -144,7 +144,8 @@ def _check_model(model: ModelRecord, record: StudyRecord) -> None:
         raise ValueError(f"{where}: diverged_at_s does not go with its status")
     if model.system is not None and model.system not in record.fuzzy.systems:
         raise ValueError(f"{where}: {model.system} is none of the fuzzy systems")
-    tables: list[Mapping[str, object]] = [model.time_step_errors] if model.time_step_errors else []
+    rounding = {} if model.lattice is None else model.lattice.rounding_errors
+    tables: list[Mapping[str, object]] = [one for one in (model.time_step_errors, rounding) if one]
     error = model.mesh_error
     if error is not None:
         tables += _by_probe(error)

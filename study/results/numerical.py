@@ -10,7 +10,7 @@ from study.results.records import CurveErrors, ModelRecord
 def numerical_errors(
     reference: ModelRecord, models: Sequence[ModelRecord], probe: str, curve: str
 ) -> list[float | None]:
-    """Relative L2 errors of curves by the time steps, and by mesh and subspace of the reference.
+    """Relative L2 errors of curves by steps and rounding, and by the reference's mesh and subspace.
 
     Their sum bounds, about, how far a relative L2 score of these models moves or their difference;
     for other measures it is a yardstick. None stands for one that is not estimated. A spring
@@ -18,6 +18,11 @@ def numerical_errors(
     """
     compared = [reference, *models]
     steps = [_of_curve(curve, model.time_step_errors.get(probe)) for model in compared]
+    steps += [
+        _of_curve(curve, model.lattice.rounding_errors.get(probe))
+        for model in compared
+        if model.lattice is not None and model.lattice.precision == "single"
+    ]
     elements = reference.elements
     if elements is None:
         return steps

@@ -6,7 +6,7 @@ model has no such number.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 SCHEMA_VERSION = 3
 
@@ -108,7 +108,8 @@ class LatticeRecord:
     """What only a lattice of springs has.
 
     `smallest_step_margin`: smallest ratio of the critical step to the step taken; `poisson_ratio`:
-    None where the mesh decides it.
+    None where the mesh decides it; `rounding_errors`: of steps in single precision against the same
+    in double, by control point, empty for steps in double.
     """
 
     springs: int
@@ -119,6 +120,8 @@ class LatticeRecord:
     repeated_steps: int
     node_mass_kg: float
     inverted_cells: int
+    precision: str = "double"
+    rounding_errors: dict[str, CurveErrors] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -127,6 +127,8 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
     lattice, nu = scene.lattice, scene.tissue.poisson_ratio
     if lattice.springs == "tetrahedra":
         yield from _mesh_springs_contradictions(lattice, table)
+    if lattice.precision == "single":
+        yield from _precision_contradictions(lattice)
     if lattice.law is not None:
         yield from _law_contradictions(scene, lattice.law)
     if lattice.volume_term and nu < SPRING_POISSON_RATIO:
@@ -140,6 +142,22 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield "lattice.time_step: contradicts lattice.step_rate; give one of them"
     elif lattice.time_step is not None and not scene.is_point:
         yield from _undivided_samples(scene, lattice.time_step)
+
+
+def _precision_contradictions(lattice: Lattice) -> Iterator[str]:
+    from msm.integrators import INTEGRATORS
+
+    if lattice.springs == "tetrahedra":
+        yield (
+            "lattice.precision: springs on tetrahedra are stepped in double precision only; leave "
+            "it out or set lattice.springs to lattice"
+        )
+    able = [name for name, method in INTEGRATORS.items() if method.on_grid is not None]
+    if lattice.integrator not in able:
+        yield (
+            f"lattice.precision: {lattice.integrator} steps in double precision only; leave it out "
+            f"or set lattice.integrator to {', '.join(able[:-1])} or {able[-1]}"
+        )
 
 
 def _undivided_samples(scene: Scene, seconds: float) -> Iterator[str]:

@@ -2,11 +2,18 @@
 
 Each function is its namesake's equal to rounding and takes well under a millisecond, where that of
 a library takes several. Motions are (samples,) on the same uniform times and finite.
+
+The measures are written twice so that a score does not rest on one hand's work: there they read as
+their definitions do and Frechet's is a library's, here they are loops. Loops over plain numbers,
+for what numba puts in the place of numpy's sorting, interpolation and array arithmetic takes longer
+to compile than all that is here.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -24,6 +31,7 @@ from study.similarity.iso18571 import (
 from study.similarity.phase_plane import OFFSET_COUNT, POINT_COUNT
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 COLUMNS = (
     ("displacement", "relative-l2"),
@@ -37,7 +45,16 @@ COLUMNS = (
 """Curve and measure of each score that `scores` gives, in its order."""
 
 
-@njit(cache=True)
+GAPS = (701, 301, 132, 57, 23, 10, 4, 1)
+"""Of Shell's sort, after Ciura 2001."""
+
+
+def _compiled(*, inner: bool = True) -> Callable[[Any], Any]:
+    """Compile a function and keep it on disk; one that is `inner` has no way in from Python."""
+    return njit(cache=True, error_model="numpy", no_cpython_wrapper=inner, no_cfunc_wrapper=True)
+
+
+@_compiled(inner=False)
 def scores(
     displacement: Floats, velocity: Floats, true_displacement: Floats, true_velocity: Floats
 ) -> Floats:
@@ -47,12 +64,14 @@ def scores(
     found[1] = iso_18571(displacement, true_displacement)
     found[2] = relative_l2(velocity, true_velocity)
     found[3] = iso_18571(velocity, true_velocity)
-    x, y = np.abs(true_displacement).max(), np.abs(true_velocity).max()
-    found[4:] = plane_scores(displacement, velocity, true_displacement, true_velocity, x, y)
+    x, y = _reach(true_displacement), _reach(true_velocity)
+    plane = plane_scores(displacement, velocity, true_displacement, true_velocity, x, y)
+    for k in range(3):
+        found[4 + k] = plane[k]
     return found
 
 
-@njit(cache=True)
+@_compiled(inner=False)
 def plane_scores(
     displacement: Floats,
     velocity: Floats,
@@ -62,19 +81,20 @@ def plane_scores(
     y: float,
 ) -> Floats:
     """Scores (3,) of the phase plane, its axes divided by x [m] and y [m/s]."""
+    own, other = np.empty((POINT_COUNT, 2)), np.empty((POINT_COUNT, 2))
+    resample(displacement, velocity, x, y, own)
+    resample(true_displacement, true_velocity, x, y, other)
+    length, true_length = _arc_length(own), _arc_length(other)
     found = np.empty(3)
-    own = resampled(displacement / x, velocity / y)
-    other = resampled(true_displacement / x, true_velocity / y)
     found[0] = 1.0 / (1.0 + frechet(own, other))
     found[1] = 1.0 / (1.0 + area(own, other))
-    if _arc_length(own)[-1] <= _arc_length(other)[-1]:
-        found[2] = 1.0 / (1.0 + partial_mapping(own, other))
-    else:
-        found[2] = 1.0 / (1.0 + partial_mapping(other, own))
+    if length[-1] > true_length[-1]:
+        own, length, other, true_length = other, true_length, own, length
+    found[2] = 1.0 / (1.0 + partial_mapping(own, length, other, true_length))
     return found
 
 
-@njit(cache=True)
+@_compiled(inner=False)
 def relative_l2(c: Floats, r: Floats) -> float:
     """max(0, 1 - ||c - r|| / ||r||)."""
     apart, size = 0.0, 0.0
@@ -84,14 +104,23 @@ def relative_l2(c: Floats, r: Floats) -> float:
     return max(0.0, 1.0 - math.sqrt(apart / size))
 
 
-@njit(cache=True)
+@_compiled()
+def _reach(r: Floats) -> float:
+    """Largest size."""
+    reach = 0.0
+    for x in r:
+        reach = max(reach, abs(x))
+    return reach
+
+
+@_compiled()
 def iso_18571(c: Floats, r: Floats) -> float:
     """Overall rating, see `study.similarity.iso18571`."""
     corridor, phase, magnitude, slope = iso_18571_parts(c, r)
     return 0.4 * corridor + 0.2 * (phase + magnitude + slope)
 
 
-@njit(cache=True)
+@_compiled(inner=False)
 def iso_18571_parts(c: Floats, r: Floats) -> tuple[float, float, float, float]:
     """Corridor, phase, magnitude and slope of the rating, each in [0, 1]."""
     n, shift = len(r), _best_shift(c, r)
@@ -102,25 +131,29 @@ def iso_18571_parts(c: Floats, r: Floats) -> tuple[float, float, float, float]:
     return _corridor(c, r), phase, _magnitude(cs, rs), _part(apart, size, SLOPE_LIMIT)
 
 
-@njit(cache=True)
+@_compiled()
 def _part(error: float, size: float, limit: float) -> float:
     if error == 0.0:
         return 1.0
     return 0.0 if error >= limit * size else 1.0 - error / (limit * size)
 
 
-@njit(cache=True)
+@_compiled()
 def _corridor(c: Floats, r: Floats) -> float:
-    reach, total = np.abs(r).max(), 0.0
+    reach, total = _reach(r), 0.0
     for i in range(len(r)):
         inside = (OUTER_CORRIDOR - abs(c[i] - r[i]) / reach) / (OUTER_CORRIDOR - INNER_CORRIDOR)
         total += min(max(inside, 0.0), 1.0) ** 2
     return total / len(r)
 
 
-@njit(cache=True)
+@_compiled()
 def _correlation(x: Floats, y: Floats) -> float:
-    mx, my, raw_x, raw_y, xx, yy, xy = x.mean(), y.mean(), 0.0, 0.0, 0.0, 0.0, 0.0
+    mx, my, raw_x, raw_y, xx, yy, xy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        mx += x[i]
+        my += y[i]
+    mx, my = mx / len(x), my / len(x)
     for i in range(len(x)):
         dx, dy = x[i] - mx, y[i] - my
         raw_x += x[i] * x[i]
@@ -133,7 +166,7 @@ def _correlation(x: Floats, y: Floats) -> float:
     return xy / math.sqrt(xx * yy)
 
 
-@njit(cache=True)
+@_compiled()
 def _best_shift(c: Floats, r: Floats) -> int:
     n, best, highest = len(r), 0, _correlation(c, r)
     for m in range(1, math.floor(SHIFT_LIMIT * n) + 1):
@@ -145,13 +178,15 @@ def _best_shift(c: Floats, r: Floats) -> int:
     return best
 
 
-@njit(cache=True)
+@_compiled()
 def _magnitude(c: Floats, r: Floats) -> float:
     """Part of the magnitude after warping within a band of the length, whose steps are kept."""
     n = len(r)
     w = math.ceil(WARPING_WINDOW * n) - 1
     steps = np.empty((n, 2 * w + 1), np.uint8)  # of cell (i, j) at column j - i + w
-    before, row = np.full(n + 1, np.inf), np.full(n + 1, np.inf)
+    before, row = np.empty(n + 1), np.empty(n + 1)
+    for j in range(n + 1):
+        before[j] = row[j] = np.inf
     before[0] = 0.0
     for i in range(n):
         low, high = max(0, i - w), min(n - 1, i + w)
@@ -167,7 +202,7 @@ def _magnitude(c: Floats, r: Floats) -> float:
     return _warped(c, r, steps, w)
 
 
-@njit(cache=True)
+@_compiled()
 def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> float:
     """The part along the path of these steps, traced back from the ends."""
     i = j = len(r) - 1
@@ -180,10 +215,11 @@ def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> float:
     return _part(apart, size, MAGNITUDE_LIMIT)
 
 
-@njit(cache=True)
+@_compiled()
 def _slope(y: Floats) -> Floats:
     n = len(y)
-    total = np.zeros(n + 1)
+    total = np.empty(n + 1)
+    total[0] = 0.0
     for i in range(n):
         if i == 0:
             slope = y[1] - y[0]
@@ -199,26 +235,38 @@ def _slope(y: Floats) -> Floats:
     return smooth
 
 
-@njit(cache=True)
+@_compiled()
 def _slope_sums(c: Floats, r: Floats) -> tuple[float, float]:
     sc, sr = _slope(c), _slope(r)
-    return np.abs(sc - sr).sum(), np.abs(sr).sum()
+    apart, size = 0.0, 0.0
+    for i in range(len(r)):
+        apart += abs(sc[i] - sr[i])
+        size += abs(sr[i])
+    return apart, size
 
 
-@njit(cache=True)
-def resampled(x: Floats, y: Floats) -> Floats:
-    """Points (200, 2) at equal steps of arc length."""
+@_compiled()
+def resample(x: Floats, y: Floats, by_x: float, by_y: float, points: Floats) -> None:
+    """Set points (200, 2) at equal steps of arc length on axes divided by these."""
     n = len(x)
-    length = np.zeros(n)
+    length = np.empty(n)
+    length[0] = 0.0
     for i in range(1, n):
-        length[i] = length[i - 1] + math.hypot(x[i] - x[i - 1], y[i] - y[i - 1])
-    at = np.linspace(0.0, length[-1], POINT_COUNT)
-    points = np.empty((POINT_COUNT, 2))
-    points[:, 0], points[:, 1] = np.interp(at, length, x), np.interp(at, length, y)
-    return points
+        dx, dy = x[i] / by_x - x[i - 1] / by_x, y[i] / by_y - y[i - 1] / by_y
+        length[i] = length[i - 1] + math.hypot(dx, dy)
+    step, k = length[-1] / (len(points) - 1), 0
+    for p in range(len(points)):
+        at = step * p
+        while k < n - 2 and length[k + 1] <= at:
+            k += 1
+        width = length[k + 1] - length[k]
+        share = (at - length[k]) / width if at < length[-1] and width > 0.0 else 1.0
+        points[p, 0] = (x[k] + share * (x[k + 1] - x[k])) / by_x
+        points[p, 1] = (y[k] + share * (y[k + 1] - y[k])) / by_y
+    points[-1, 0], points[-1, 1] = x[-1] / by_x, y[-1] / by_y
 
 
-@njit(cache=True)
+@_compiled()
 def frechet(a: Floats, b: Floats) -> float:
     """Discrete Frechet distance of two curves (200, 2)."""
     n, m = len(a), len(b)
@@ -238,38 +286,51 @@ def frechet(a: Floats, b: Floats) -> float:
     return math.sqrt(row[-1])
 
 
-@njit(cache=True)
+@_compiled()
 def area(a: Floats, b: Floats) -> float:
     """Area between two curves (200, 2), see `study.similarity.enclosed_area`."""
-    edges = _edges(np.concatenate((a, b[::-1])))
-    if len(edges) == 0:
-        return 0.0
-    ends = np.concatenate((edges[:, 1], edges[:, 3]))
-    return _between(edges, np.unique(np.concatenate((ends, _crossings(edges)))))
+    edges = _edges(a, b)
+    crossings = _crossings(edges)
+    n, m = len(edges), len(crossings)
+    levels, rank = np.empty(2 * n + m), np.empty(2 * n + m, np.int64)
+    for i in range(n):
+        levels[i], levels[n + i] = edges[i, 1], edges[i, 3]
+    for i in range(m):
+        levels[2 * n + i] = crossings[i]
+    _sort(levels, rank, len(levels))
+    return _between(edges, levels)
 
 
-@njit(cache=True)
-def _edges(polygon: Floats) -> Floats:
+@_compiled()
+def _edges(a: Floats, b: Floats) -> Floats:
     """Rows x, y of the lower and of the upper end and the sense, 1 up, of each edge not level.
 
-    By their lower ends, so that the edges at some height are found without looking at all.
+    Of the way along one curve and back along the other. By their lower ends, so that the edges at
+    some height are found without looking at all.
     """
-    n, count = len(polygon), 0
-    found = np.empty((n, 5))
+    n, count = len(a) + len(b), 0
+    found, low, rank = np.empty((n, 5)), np.empty(n), np.empty(n, np.int64)
     for i in range(n):
-        p, q = polygon[i], polygon[(i + 1) % n]
+        j = (i + 1) % n
+        p = a[i] if i < len(a) else b[n - 1 - i]
+        q = a[j] if j < len(a) else b[n - 1 - j]
         if p[1] == q[1]:
             continue
-        low, high = (p, q) if p[1] < q[1] else (q, p)
-        found[count, 0], found[count, 1] = low[0], low[1]
-        found[count, 2], found[count, 3] = high[0], high[1]
-        found[count, 4] = 1.0 if p[1] < q[1] else -1.0
+        up = p[1] < q[1]
+        found[count, 0], found[count, 1] = (p[0], p[1]) if up else (q[0], q[1])
+        found[count, 2], found[count, 3] = (q[0], q[1]) if up else (p[0], p[1])
+        found[count, 4] = 1.0 if up else -1.0
+        low[count], rank[count] = found[count, 1], count
         count += 1
-    found = found[:count]
-    return found[np.argsort(found[:, 1])]
+    _sort(low, rank, count)
+    edges = np.empty((count, 5))
+    for i in range(count):
+        for k in range(5):
+            edges[i, k] = found[rank[i], k]
+    return edges
 
 
-@njit(cache=True)
+@_compiled()
 def _crossings(edges: Floats) -> Floats:
     """Ordinates at which two of the edges cross."""
     count, found = 0, np.empty(64)
@@ -287,19 +348,30 @@ def _crossings(edges: Floats) -> Floats:
             share, other = (ax * ey - ay * ex) / turn, (ax * dy - ay * dx) / turn
             if 0.0 < share < 1.0 and 0.0 < other < 1.0:
                 if count == len(found):
-                    found = np.concatenate((found, np.empty(count)))
+                    found = _enlarged(found)
                 found[count] = y + share * dy
                 count += 1
     return found[:count]
 
 
-@njit(cache=True)
+@_compiled()
+def _enlarged(a: Floats) -> Floats:
+    """The same numbers with room for as many more."""
+    made = np.empty(2 * len(a))
+    for i in range(len(a)):
+        made[i] = a[i]
+    return made
+
+
+@_compiled()
 def _between(edges: Floats, levels: Floats) -> float:
     """Integral of the winding number's size over the slabs between levels."""
     here, at = np.empty(len(edges), np.int64), np.empty(len(edges))
     total, active, waiting = 0.0, 0, 0
     for k in range(len(levels) - 1):
         low, high = levels[k], levels[k + 1]
+        if low == high:
+            continue
         kept = 0
         for i in range(active):
             if edges[here[i], 3] >= high:
@@ -322,28 +394,31 @@ def _between(edges: Floats, levels: Floats) -> float:
     return total
 
 
-@njit(cache=True)
-def _sort(at: Floats, here: NDArray[np.int64], count: int) -> None:
-    """By insertion: few edges are at one height, and their order hardly changes between slabs."""
-    for i in range(1, count):
-        x, edge, j = at[i], here[i], i
-        while j and at[j - 1] > x:
-            at[j], here[j] = at[j - 1], here[j - 1]
-            j -= 1
-        at[j], here[j] = x, edge
+@_compiled()
+def _sort(keys: Floats, with_them: Ints, count: int) -> None:
+    """Sort the first of some keys, and what goes with them, after Shell."""
+    for gap in GAPS:
+        for i in range(gap, count):
+            x, other, j = keys[i], with_them[i], i
+            while j >= gap and keys[j - gap] > x:
+                keys[j], with_them[j] = keys[j - gap], with_them[j - gap]
+                j -= gap
+            keys[j], with_them[j] = x, other
 
 
-@njit(cache=True)
-def partial_mapping(shorter: Floats, longer: Floats) -> float:
-    """Mean gap after sliding the shorter curve along the longer one, both (200, 2)."""
-    own, other = _arc_length(shorter), _arc_length(longer)
-    least = np.inf
-    for offset in np.linspace(0.0, other[-1] - own[-1], OFFSET_COUNT):
-        least = min(least, _gaps(shorter, own, longer, other, offset))
+@_compiled()
+def partial_mapping(shorter: Floats, own: Floats, longer: Floats, other: Floats) -> float:
+    """Mean gap after sliding the shorter curve along the longer one, both (200, 2).
+
+    `own`, `other` (200,): their lengths up to each point.
+    """
+    least, step = np.inf, (other[-1] - own[-1]) / (OFFSET_COUNT - 1)
+    for n in range(OFFSET_COUNT):
+        least = min(least, _gaps(shorter, own, longer, other, n * step))
     return least / other[-1]
 
 
-@njit(cache=True)
+@_compiled()
 def _gaps(shorter: Floats, own: Floats, longer: Floats, other: Floats, offset: float) -> float:
     """Integral of the gap over the longer curve, the shorter's ends held."""
     last, total, before, k = len(own) - 1, 0.0, 0.0, 0
@@ -362,9 +437,10 @@ def _gaps(shorter: Floats, own: Floats, longer: Floats, other: Floats, offset: f
     return total
 
 
-@njit(cache=True)
+@_compiled()
 def _arc_length(points: Floats) -> Floats:
-    length = np.zeros(len(points))
+    length = np.empty(len(points))
+    length[0] = 0.0
     for i in range(1, len(points)):
         step = math.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
         length[i] = length[i - 1] + step

@@ -57,6 +57,12 @@ def _volume_springs(scene: Scene) -> Iterator[Settings]:
         yield lattice_settings(scene, times, step_fraction=FRACTION)
 
 
+def _single_precision(scene: Scene) -> Iterator[Settings]:
+    """Steps in single precision, with the volume term where the tissue's ratio asks for it."""
+    for times in (1.0, 0.8, 2.0 / 3.0, 0.5):
+        yield lattice_settings(scene, times, precision="single", step_fraction=FRACTION)
+
+
 def _step_sizes(scene: Scene) -> Iterator[Settings]:
     """The default integrator at fixed rates and fractions; a fixed step too long diverges."""
     for rate in (500.0, 1000.0, 2000.0):
@@ -117,6 +123,7 @@ def _corrected(scene: Scene) -> Iterator[Settings]:
 CONTENDERS: dict[str, Contender] = {
     "springs": Contender("tissue", _springs),
     "volume-springs": Contender("tissue", _volume_springs),
+    "single-precision": Contender("tissue", _single_precision),
     "step-sizes": Contender("tissue", _step_sizes),
     "integrators": Contender("tissue", _integrators),
     "basafa": Contender("basafa", _basafa),

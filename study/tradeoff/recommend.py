@@ -1,31 +1,36 @@
 """The configuration that meets a demand on this machine: chosen by a fit, then run and timed.
 
 Chosen from is the lattice stepped explicitly, with the volume term where the tissue's Poisson ratio
-asks for it, by its spacing. Its error is run at a few coarse spacings and fitted by C h^p; its cost
-is timed at all. For a rate alone the most accurate that keeps up is recommended, for an error the
-cheapest that promises it. A promise is the fit with its spread and the reference's own error; the
-recommended configuration is then run and timed afresh, and the next coarser one taken where it does
-not keep up after all.
+asks for it, by its spacing and precision. Its error is run at a few coarse spacings and fitted by
+C h^p; what single precision adds is measured at the finest of them; its cost is timed at all. For a
+rate alone the most accurate that keeps up is recommended, for an error the cheapest that promises
+it. A promise is the fit with its spread, the reference's own error and what the precision adds; the
+recommended configuration is then run and timed afresh, and the next one taken where it does not
+keep up after all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from msm.integrators import INTEGRATORS
 from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
 from study.scene import Scene
 from study.scene.file import write_scene
-from study.sweep.runner import How
+from study.similarity.fields import relative_l2
+from study.sweep.canonical import restored
+from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import Configuration
+from study.tradeoff.observation import Observed
 from study.tradeoff.problem import Stated, arguments, stated, tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth
@@ -40,6 +45,7 @@ ELEMENTS = 0.75
 SPREAD = 2.8
 """Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
 FEWEST = 3
+SINGLE = "single"
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,7 @@ class Candidate:
     promise: Promise
     cost: Cost
     frame: Frame | None
+    precision: str = "double"
 
     @property
     def wall_per_second(self) -> float:
@@ -96,14 +103,17 @@ def recommend(
     """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified."""
     coarser = judged_by(scene)
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
-    outcomes = study.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
+    tried = [_configuration(scene, h) for h in spacings]
+    tried += [_configuration(scene, spacings[-1], SINGLE)] if _may_be_single(scene) else []
+    solved, *outcomes = study.solved(coarser, tried, store, how)
     given = stated(**arguments(coarser))
-    known = reference.truth(outcomes[0].value or {}, given)
-    found = [errors(outcome, known, given) for outcome in outcomes[1:]]
+    known = reference.truth(solved.value or {}, given)
+    found = [errors(outcome, known, given) for outcome in outcomes[: len(spacings)]]
+    added = {"double": 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
     kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
     every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
-    candidates = _candidates(given, every, curve, wanted, progress)
+    candidates = _candidates(given, every, curve, added, wanted, progress)
     return _verified(given, known, candidates, wanted, store, how, progress)
 
 
@@ -123,10 +133,10 @@ class Fit:
     spread: float
     reference_error: float
 
-    def promise(self, spacing: float) -> Promise:
-        """The error at a spacing [m]."""
+    def promise(self, spacing: float, rounding: float = 0.0) -> Promise:
+        """The error at a spacing [m], and at most so much more by rounding."""
         error = self.constant * spacing**self.order
-        return Promise(error, self.reference_error + self.spread * error)
+        return Promise(error, self.reference_error + self.spread * error + rounding)
 
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
@@ -145,26 +155,50 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
     )
 
 
-def _configuration(scene: Scene, spacing: float) -> Configuration:
+def _configuration(scene: Scene, spacing: float, precision: str = "double") -> Configuration:
     lacks = lacks_poisson_ratio(scene)
-    name = "volume-springs" if lacks else "springs"
     settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": FRACTION}
-    return Configuration(name, settings)
+    if precision == SINGLE:
+        return Configuration("single-precision", settings | {"precision": SINGLE})
+    return Configuration("volume-springs" if lacks else "springs", settings)
+
+
+def _may_be_single(scene: Scene) -> bool:
+    return INTEGRATORS[scene.lattice.integrator].on_grid is not None
+
+
+def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, float]:
+    """What single precision changes of the field, of a run in double and one in single.
+
+    Relative L2; nothing where there is no such run, or it was not whole.
+    """
+    fields = [restored(Observed, one.value).field for one in outcomes[:2] if one.value is not None]
+    whole = [np.reshape(one, (-1, 3)) for one in fields if one is not None]
+    if len(whole) < 2:
+        return {}
+    double, single = whole
+    return {SINGLE: relative_l2(single, double, given.problem.volume_rule.weights)}
 
 
 def _candidates(
-    given: Stated, spacings: Sequence[float], fit: Fit, wanted: Demand, progress: Progress
+    given: Stated,
+    spacings: Sequence[float],
+    fit: Fit,
+    added: Mapping[str, float],
+    wanted: Demand,
+    progress: Progress,
 ) -> list[Candidate]:
-    """All spacings, timed in turns."""
-    costs = _costs(given, spacings, progress)
+    """All spacings in each precision, which adds so much to the error, timed in turns."""
+    chosen = [(h, precision) for h in spacings for precision in added]
+    costs = _costs(given, chosen, progress)
     return [
-        Candidate(h, fit.promise(h), cost, _frame(cost, wanted))
-        for h, cost in zip(spacings, costs, strict=True)
+        Candidate(h, fit.promise(h, added[precision]), cost, _frame(cost, wanted), precision)
+        for (h, precision), cost in zip(chosen, costs, strict=True)
     ]
 
 
-def _costs(given: Stated, spacings: Sequence[float], progress: Progress) -> list[Cost]:
-    chosen = [_configuration(given.scene, h) for h in spacings]
+def _costs(given: Stated, settings: Sequence[tuple[float, str]], progress: Progress) -> list[Cost]:
+    chosen = [_configuration(given.scene, *one) for one in settings]
     longest = [float("inf")] * len(chosen)  # that at rest is less
     return study.costs(given, chosen, longest, QUICK_REPEATS, progress)
 
@@ -198,10 +232,10 @@ def _verified(
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     chosen = best(candidates, wanted)
-    configuration = _configuration(given.scene, chosen.spacing)
+    configuration = _configuration(given.scene, chosen.spacing, chosen.precision)
     (_, outcome) = study.solved(given.scene, [configuration], store, how)
     measured = errors(outcome, known, given)
-    (cost,) = _costs(given, [chosen.spacing], progress)
+    (cost,) = _costs(given, [(chosen.spacing, chosen.precision)], progress)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
     again = _frame(cost, wanted)
@@ -219,7 +253,8 @@ def recommended_scene(scene: Scene, found: Recommended) -> str:
 
     It names the model that was measured, springs of the tissue's own modulus, and the reference.
     """
-    chosen = _configuration(scene, found.candidate.spacing).model(scene)
+    one = found.candidate
+    chosen = _configuration(scene, one.spacing, one.precision).model(scene)
     assert isinstance(chosen, LatticeModel)  # noqa: S101 - lattices only are recommended
     models = tuple(dict.fromkeys(("fem", *scene.models, "tissue")))
     head = "".join(f"# {line}\n" for line in lines(found))
@@ -241,7 +276,8 @@ def lines(found: Recommended) -> list[str]:
     if measured.field is not None:
         verdict = ", as promised" if promise.holds(measured.field) else ", not as promised"
     text = [
-        f"lattice of {1e3 * one.spacing:.3g} mm, explicit, {FRACTION:g} of the critical step",
+        f"lattice of {1e3 * one.spacing:.3g} mm, explicit, in {one.precision} precision, "
+        f"{FRACTION:g} of the critical step",
         f"field error promised {100 * promise.error:.1f} +- {100 * promise.bar:.1f} %, measured "
         f"{error}" + verdict,
     ]
