@@ -20,12 +20,13 @@ from study.progress import Progress
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.runner import How
+from study.sweep.stated import Stated, arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import FRACTION, Configuration, lacks_poisson_ratio
-from study.tradeoff.problem import Stated, arguments, stated, tidy
+from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth
 from study.tradeoff.table import Cost
