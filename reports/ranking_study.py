@@ -23,6 +23,10 @@ NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
     "ranking_spacing",
 )
 MOST_NAMED = 4
+WIDEST = 0.6
+"""Width of the 95 % interval of a total index beyond which it is not printed: it is noise."""
+FEWEST = 64
+"""Rows of the design below which a bootstrap over them does not tell that interval either."""
 CLAIM = "interval-type-2"
 """The system that the paper finds nearest to the benchmark."""
 
@@ -60,7 +64,7 @@ def sentences(folder: Traversable | None = None) -> Iterator[str]:
     yield _winners(nearest)
     yield _apart(read(DIFFERENCES, folder))
     yield _reproduced(read(TABLE_THREE, folder))
-    yield _movers(read(INDICES, folder))
+    yield _movers(read(INDICES, folder), int(nearest[0]["draws"]))
     yield from _over_spacing(read(SPACING, folder))
 
 
@@ -75,14 +79,15 @@ def nearest_rows(lines: Sequence[Line]) -> Table:
     rows = []
     for name, group in groupby(lines, column):
         found = {line["system"]: line for line in group}
-        cells = [_share(found[system]) for system in SYSTEM_NAMES]
+        cells = [share(found[system]) for system in SYSTEM_NAMES]
         rows.append([name, *cells, percent(float(next(iter(found.values()))["tied"]))])
     return rows
 
 
-def _share(line: Line) -> str:
+def share(line: Line, of: str = "share") -> str:
+    """A share of a line, by the name of its column, with its interval."""
     low, high = (fixed(100.0 * float(line[key]), 1) for key in ("low", "high"))
-    return f"{percent(float(line['share']))} ({low}–{high})"
+    return f"{percent(float(line[of]))} ({low}–{high})"
 
 
 def difference_rows(lines: Sequence[Line]) -> Table:
@@ -155,20 +160,49 @@ def _reproduced(lines: Sequence[Line]) -> str:
     )
 
 
-def _movers(lines: Sequence[Line]) -> str:
+def _movers(lines: Sequence[Line], draws: int) -> str:
     """The unknowns with the largest total indices on the lead of the paper's best two."""
-    lead = f"mamdani - {CLAIM}"
+    return movers(
+        lines, draws, f"mamdani - {CLAIM}", f"The lead of {system_name(CLAIM)} over Mamdani"
+    )
+
+
+def movers(lines: Sequence[Line], draws: int, output: str, name: str) -> str:
+    """The unknowns with the largest total indices on an output of that name.
+
+    Those whose interval is too wide to mean anything are counted and not printed; none are of a
+    design of few rows, which has two independent `draws` each.
+    """
     found: dict[str, list[Line]] = {}
     for line in lines:
-        if line["output"] == lead:
+        if line["output"] == output:
             found.setdefault(line["unknown"], []).append(line)
-    mean = {name: _mean(of, "total") for name, of in found.items()}
-    named = sorted(mean, key=lambda unknown: -mean[unknown])[:MOST_NAMED]
-    parts = ", ".join(f"{words(name.replace('_', ' '))} {_index(found[name])}" for name in named)
+    known = {unknown: of for unknown, of in found.items() if _width(of) <= WIDEST}
+    if draws < 2 * FEWEST or not known:
+        return (
+            f"What moves {_lower(name)} is not told by so few draws: Sobol' indices need {FEWEST} "
+            f"rows of the design or more, and 95 % intervals no wider than {WIDEST:g}."
+        )
+    named = sorted(known, key=lambda unknown: -_mean(known[unknown], "total"))[:MOST_NAMED]
+    parts = ", ".join(f"{words(one.replace('_', ' '))} {_index(known[one])}" for one in named)
     return (
-        f"The lead of {system_name(CLAIM)} over Mamdani is moved most by (total Sobol' index and "
-        f"its 95 % interval, means over measures): {parts}."
+        f"{name} is moved most by (total Sobol' index and its 95 % interval, means over measures): "
+        f"{parts}{_untold(len(found) - len(known))}."
     )
+
+
+def _untold(unknowns: int) -> str:
+    if unknowns == 0:
+        return ""
+    return f"; of {count(unknowns)} more it is not told, their intervals are wider than {WIDEST:g}"
+
+
+def _lower(name: str) -> str:
+    return name[0].lower() + name[1:]
+
+
+def _width(lines: Sequence[Line]) -> float:
+    return _mean(lines, "total_high") - _mean(lines, "total_low")
 
 
 def _index(lines: Sequence[Line]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from reports.ranking_study import (
     INDICES,
     NEAREST,
     SPACING,
+    WIDEST,
     column,
     winners_over_spacing,
 )
@@ -32,6 +33,7 @@ HEIGHT = 2.5
 DRAWN = ("displacement", "relative-l2"), ("phase-plane", "pcm")
 """Curve and measure of the scores drawn over the spacing: one of a time history, one of a loop."""
 TIED = "#dddddd"
+FUZZY = {system: (system_name(system), system_colour(system)) for system in SYSTEM_NAMES}
 
 
 def write_figures(folder: Path) -> list[Path]:
@@ -59,25 +61,26 @@ def _ranking(folder: Traversable | None) -> Figure | None:
     names = list(dict.fromkeys(map(column, nearest)))
     left.set_yticks(range(len(names)), names)
     left.set_ylim(len(names) - 0.5, -0.5)
-    _bars(left, nearest, names)
-    _heat(right, [line for line in indices if line["output"] == f"mamdani - {CLAIM}"], names)
+    draw_shares(left, nearest, names)
+    draw_indices(right, [line for line in indices if line["output"] == f"mamdani - {CLAIM}"], names)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=4)
     return figure
 
 
-def _bars(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> None:
-    """Stacked shares of draws by the nearest system; a tie is nobody's."""
+def draw_shares(
+    axes: Axes,
+    lines: Sequence[Line],
+    names: Sequence[str],
+    systems: Mapping[str, tuple[str, str]] | None = None,
+) -> None:
+    """Stacked shares of draws by the nearest of systems, by name with label and colour.
+
+    A tie is nobody's. Without systems, the fuzzy ones.
+    """
     start = np.zeros(len(names))
-    for system in SYSTEM_NAMES:
+    for system, (label, colour) in (systems or FUZZY).items():
         width = np.array([float(line["share"]) for line in lines if line["system"] == system])
-        axes.barh(
-            range(len(names)),
-            width,
-            left=start,
-            height=0.8,
-            color=system_colour(system),
-            label=system_name(system),
-        )
+        axes.barh(range(len(names)), width, left=start, height=0.8, color=colour, label=label)
         start += width
     axes.barh(
         range(len(names)), 1.0 - start, left=start, height=0.8, color=TIED, label="no difference"
@@ -85,18 +88,26 @@ def _bars(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> None:
     axes.set(xlim=(0.0, 1.0), xlabel="share of draws in which it is nearest")
 
 
-def _heat(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> None:
-    """Total index of the lead on each unknown, a column each, by measure."""
+def draw_indices(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> None:
+    """Total index of the lead on each unknown, a column each, by measure.
+
+    Empty where its 95 % interval is wider than WIDEST.
+    """
     unknowns = list(dict.fromkeys(line["unknown"] for line in lines))
     values = np.full((len(names), len(unknowns)), np.nan)
     for line in lines:
-        values[names.index(column(line)), unknowns.index(line["unknown"])] = float(line["total"])
+        if float(line["total_high"]) - float(line["total_low"]) <= WIDEST:
+            values[names.index(column(line)), unknowns.index(line["unknown"])] = float(
+                line["total"]
+            )
     shown = np.clip(values, 0.0, 1.0)
     axes.imshow(shown, cmap="Greys", vmin=0.0, vmax=1.0, aspect="auto")
     for (y, x), value in np.ndenumerate(shown):
         if value >= 0.05:
             ink = "white" if value > 0.5 else "black"
             axes.text(x, y, f"{value:.1f}", ha="center", va="center", fontsize=6.0, color=ink)
+        if np.isnan(value):
+            axes.text(x, y, "?", ha="center", va="center", fontsize=6.0, color="grey")
     axes.set_xticks(range(len(unknowns)), [name.replace("_", " ") for name in unknowns])
     axes.tick_params(axis="x", rotation=60, length=0)
     for label in axes.get_xticklabels():

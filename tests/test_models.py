@@ -27,12 +27,13 @@ from study.scene.file import SceneError, read_scene, resolved, validate
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import How
+from study.sweep.stated import arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import recommend, reference
 from study.tradeoff import study as study_module
 from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration
-from study.tradeoff.problem import arguments, sampled, stated
+from study.tradeoff.problem import sampled
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import Timing
 from tests.conftest import SMALL

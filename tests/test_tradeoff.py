@@ -17,6 +17,7 @@ from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.scene.file import read_scene
 from study.sweep.runner import How, Outcome
+from study.sweep.stated import arguments
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import problem as problem_module
@@ -27,7 +28,7 @@ from study.tradeoff.demand import Demand, demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
 from study.tradeoff.observation import Observed
-from study.tradeoff.problem import SAMPLING, arguments, plain, sampled
+from study.tradeoff.problem import SAMPLING, plain, sampled
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth
 from study.tradeoff.table import Cost, Entry

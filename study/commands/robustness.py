@@ -1,48 +1,133 @@
-"""`robustness`: the paper's ranking over all that the paper leaves open."""
+"""`robustness`: the paper's ranking over all that is open of a control point, or of an organ."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from study.commands.flags import HERE, Switch, Workers
+from study.commands.flags import HERE, Overrides, Switch, Workers
+
+if TYPE_CHECKING:
+    from study.robustness.organ_request import OrganRequest
+    from study.robustness.request import RobustnessRequest
+
+POINT_SIZE, ORGAN_SIZE, AGAIN = 4096, 64, 32
 
 
 def robustness(
+    scene: str | None = None,
     *,
-    size: int = 4096,
+    set_: Overrides = None,
+    size: int | None = None,
     seed: int = 0,
+    spacing: str | None = None,
+    again: int | None = None,
     out: Path | None = None,
     dry_run: Switch = False,
     where: Workers = HERE,
 ) -> None:
-    """Draw all that the paper leaves open of its control point, and rank the systems in each draw.
+    """Draw all that is open, and rank the fuzzy systems in each draw.
+
+    Without a scene, all that the paper leaves open of its control point; with one, what is open of
+    its organ, on lattices that are coarse.
 
     Parameters
     ----------
+    scene
+        A built-in scene or a TOML file, with an organ.
+    set_
+        Override of the scene, table.key=value. May be repeated.
     size
         Rows of the design, a power of two; each has two draws of all unknowns and one more for
-        every unknown.
+        every unknown, or group of them. 4096 of the control point, 64 of an organ.
     seed
         Of the points, which are scrambled.
+    spacing
+        Of an organ's lattices, which vary about it; by default a fifth of the organ's size.
+    again
+        How many draws of an organ are repeated on lattices twice as fine, 32 by default.
     out
-        Folder to write; results/robustness by default. Finished blocks are kept beside it.
+        Folder to write; results/robustness or results/NAME-robustness by default. Finished blocks
+        are kept beside it.
     dry_run
         Say what would be run, and stop.
     """
-    from study.robustness import request as asked
-    from study.sweep.tally import on_stderr
+    from study.robustness import organ_request, request
 
-    request = asked.RobustnessRequest(
-        size=size, seed=seed, out=out, workers=where.workers, scheduler=where.scheduler
-    )
-    if dry_run:
-        print(asked.planned(request))
+    if scene is None:
+        _refuse_of_organ({"--set": set_, "--spacing": spacing, "--again": again})
+        point = request.RobustnessRequest(
+            size=POINT_SIZE if size is None else size,
+            seed=seed,
+            out=out,
+            workers=where.workers,
+            scheduler=where.scheduler,
+        )
+        _of_point(point, dry=dry_run)
         return
-    with on_stderr("robustness") as progress:
-        found = asked.study(request, progress)
+    organ = organ_request.OrganRequest(
+        scene=scene,
+        overrides=set_ or (),
+        size=ORGAN_SIZE if size is None else size,
+        seed=seed,
+        spacing=_length(spacing),
+        again=AGAIN if again is None else again,
+        out=out,
+        workers=where.workers,
+        scheduler=where.scheduler,
+    )
+    _of_organ(organ, dry=dry_run)
+
+
+def _refuse_of_organ(flags: Mapping[str, object]) -> None:
+    """ValueError for a flag that means nothing without an organ."""
+    for flag, value in flags.items():
+        if value is not None:
+            raise ValueError(f"{flag}: is of an organ; name a scene, as in robustness liver")
+
+
+def _length(text: str | None) -> float | None:
+    """In metres."""
+    from study.annotation.quantity import Quantity
+
+    if text is None:
+        return None
+    try:
+        return Quantity("m", 1e-4, 1.0).read(text)
+    except ValueError as error:
+        raise ValueError(f"--spacing: {error}") from None
+
+
+def _of_point(asked: RobustnessRequest, *, dry: bool) -> None:
     from reports.ranking_study import sentences
     from reports.ranking_study_figure import write_figures
+    from study.robustness import request
+    from study.sweep.tally import on_stderr
 
-    print("\n".join([*asked.lines(found), *sentences(request.folder)]))
-    tables = [request.folder / name for name in asked.FILES]
-    print("\n".join(map(str, [*tables, *write_figures(request.folder)])))
+    if dry:
+        print(request.planned(asked))
+        return
+    with on_stderr("robustness") as progress:
+        found = request.study(asked, progress)
+    print("\n".join([*request.lines(found), *sentences(asked.folder)]))
+    _print_paths(asked.folder, request.FILES, write_figures(asked.folder))
+
+
+def _of_organ(asked: OrganRequest, *, dry: bool) -> None:
+    from reports.organ_ranking import sentences
+    from reports.organ_ranking_figure import write_figures
+    from study.robustness import organ_request
+    from study.sweep.tally import on_stderr
+
+    if dry:
+        print(organ_request.planned(asked))
+        return
+    with on_stderr("robustness") as progress:
+        found = organ_request.study(asked, progress)
+    print("\n".join([*organ_request.lines(found, asked), *sentences(asked.folder)]))
+    _print_paths(asked.folder, organ_request.FILES, write_figures(asked.folder))
+
+
+def _print_paths(folder: Path, tables: Iterable[str], pictures: Iterable[Path]) -> None:
+    print("\n".join(map(str, [*(folder / name for name in tables), *pictures])))

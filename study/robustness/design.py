@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from study.robustness.unknowns import UNKNOWNS
+from study.robustness.unknowns import UNKNOWNS, Unknown, groups
 
 Floats = NDArray[np.float64]
 
@@ -16,19 +18,20 @@ def check_size(size: int) -> None:
         raise ValueError(f"size: {size} is no power of two; give 256, 4096 or the like")
 
 
-def shares(seed: int, size: int) -> Floats:
-    """Shares (size, unknowns + 2, unknowns) of the unknowns' ranges.
+def shares(seed: int, size: int, unknowns: Sequence[Unknown] = UNKNOWNS) -> Floats:
+    """Shares (size, groups + 2, unknowns) of the unknowns' ranges.
 
     Of each row the first two are points A and B that have nothing to do with each other; the others
-    are A with the value of one unknown taken from B. ValueError unless `size` is a power of two.
+    are A with the values of one group of unknowns taken from B. ValueError unless `size` is a power
+    of two.
     """
     from scipy.stats import qmc
 
     check_size(size)
-    count = len(UNKNOWNS)
+    count, together = len(unknowns), groups(unknowns)
     points = qmc.Sobol(2 * count, seed=seed).random(size)
-    found = np.repeat(points[:, None, :count], count + 2, axis=1)
+    found = np.repeat(points[:, None, :count], len(together) + 2, axis=1)
     found[:, 1] = points[:, count:]
-    for i in range(count):
-        found[:, i + 2, i] = points[:, count + i]
+    for i, places in enumerate(together.values()):
+        found[:, i + 2, places] = points[:, [count + place for place in places]]
     return found

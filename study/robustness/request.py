@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +10,9 @@ import numpy as np
 
 from study.results.tables import write_table
 from study.robustness import rows, summary
-from study.robustness.block import SYSTEMS
 from study.robustness.design import check_size, shares
+from study.robustness.patient import SYSTEMS
+from study.robustness.ranges import write_ranges
 from study.robustness.spacing import over_spacing
 from study.robustness.unknowns import UNKNOWNS, Draw, draws
 from study.scene.file import read_scene
@@ -98,7 +98,7 @@ def study(request: RobustnessRequest, progress: Tell = silent) -> list[rows.Near
     write_table(request.folder / INDICES, rows.Index, summary.indices(found))
     write_table(request.folder / DRAWN, rows.Drawn, _drawn(request, table_iii))
     write_table(request.folder / SPACING, rows.AtSpacing, over_spacing(read_scene(SCENE)))
-    _write_ranges(request.folder / RANGES)
+    write_ranges(request.folder / RANGES, UNKNOWNS)
     return nearest
 
 
@@ -135,13 +135,6 @@ def in_words(value: object) -> str:
     if isinstance(value, tuple):
         return " ".join(map(str, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _write_ranges(path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file)
-        table.writerow(("unknown", "range", "meaning"))
-        table.writerows((one.name, one.extent, one.why) for one in UNKNOWNS)
 
 
 def lines(found: Sequence[rows.Nearest]) -> list[str]:

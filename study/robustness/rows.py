@@ -97,3 +97,22 @@ class AtSpacing(NamedTuple):
     curve: str
     measure: str
     score: float
+
+
+class Finer(NamedTuple):
+    """What finer lattices change, by a measure, over draws repeated on them.
+
+    `changed`: share of the draws in which another contender is nearest, ties left out on either
+    side, with its 95 % interval; `lead` and `moved`: medians of the lead of the nearest, and of the
+    largest change of any contender's score.
+    """
+
+    curve: str
+    measure: str
+    times: float
+    draws: int
+    changed: float
+    low: float
+    high: float
+    lead: float
+    moved: float

@@ -9,10 +9,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from study.robustness.block import SYSTEMS
 from study.robustness.paper import TABLE_III
+from study.robustness.patient import SYSTEMS
 from study.robustness.rows import Difference, Index, Nearest, TableThree
-from study.robustness.unknowns import UNKNOWNS
+from study.robustness.unknowns import UNKNOWNS, groups
 from study.similarity.batch import COLUMNS
 
 Floats = NDArray[np.float64]
@@ -26,33 +26,45 @@ BOOTSTRAPS = 200
 
 @dataclass(frozen=True)
 class Draws:
-    """Stiffness [Pa] (size, unknowns + 2, 3) and scores (.., 3, measures) over the design."""
+    """Stiffness [Pa] (size, groups + 2, 3) and scores (.., systems, measures) over the design.
+
+    A score is NaN where a motion diverged. `groups`, `systems` and `columns` name the axes.
+    """
 
     estimates: Floats
     scores: Floats
+    groups: tuple[str, ...] = tuple(groups(UNKNOWNS))
+    systems: tuple[str, ...] = SYSTEMS
+    columns: tuple[tuple[str, str], ...] = COLUMNS
 
     def independent(self) -> Floats:
-        """Scores (draws, 3, measures) at the points A and B, without those not finite."""
+        """Scores (draws, systems, measures) at points A and B, without those not finite."""
         scores = self.scores[:, :2].reshape(-1, *self.scores.shape[2:])
         return scores[np.isfinite(scores).all(axis=(1, 2))]
+
+    @property
+    def lost(self) -> float:
+        """Share of the draws at points A and B in which a motion diverged."""
+        return 1.0 - len(self.independent()) / (2 * len(self.scores))
 
 
 def nearest(found: Draws) -> Iterator[Nearest]:
     """How often each system is nearest to the benchmark, by measure."""
     scores = found.independent()
-    for m, column in enumerate(COLUMNS):
+    for m, column in enumerate(found.columns):
         ordered = np.sort(scores[:, :, m], axis=1)
         tied = ordered[:, -1] - ordered[:, -2] < TIE
         best = scores[:, :, m].argmax(axis=1)
-        for s, system in enumerate(SYSTEMS):
+        for s, system in enumerate(found.systems):
             count = int(((best == s) & ~tied).sum())
-            low, high = _wilson(count, len(scores))
+            low, high = wilson(count, len(scores))
             yield Nearest(
                 *column, system, count / len(scores), low, high, float(tied.mean()), len(scores)
             )
 
 
-def _wilson(count: int, of: int) -> tuple[float, float]:
+def wilson(count: int, of: int) -> tuple[float, float]:
+    """The 95 % interval of a share."""
     from scipy.stats import binomtest
 
     interval = binomtest(count, of).proportion_ci(0.95, "wilson")
@@ -60,18 +72,34 @@ def _wilson(count: int, of: int) -> tuple[float, float]:
 
 
 def differences(found: Draws) -> Iterator[Difference]:
-    """Distribution of the score differences of every two systems, by measure."""
-    scores = found.independent()
-    for m, column in enumerate(COLUMNS):
-        for a, b in combinations(range(len(SYSTEMS)), 2):
+    """Distribution of the score differences of every two systems, by measure.
+
+    What has to do with the paper is NaN for one that it does not have.
+    """
+    scores, systems = found.independent(), found.systems
+    for m, column in enumerate(found.columns):
+        for a, b in combinations(range(len(systems)), 2):
             change = scores[:, a, m] - scores[:, b, m]
-            printed = TABLE_III[SYSTEMS[a]] - TABLE_III[SYSTEMS[b]]
+            printed = _printed(systems[a]) - _printed(systems[b])
             quantiles = np.percentile(change, (5, 25, 50, 75, 95))
-            within = float((np.abs(change) <= abs(printed)).mean())
-            same = float((np.sign(change) == np.sign(printed)).mean())
+            within, same = _as_printed(change, printed)
             p05, p25, p50, p75, p95 = map(float, quantiles)
-            pair = (*column, SYSTEMS[a], SYSTEMS[b])
+            pair = (*column, systems[a], systems[b])
             yield Difference(*pair, p05, p25, p50, p75, p95, printed, within, same)
+
+
+def _printed(system: str) -> float:
+    return TABLE_III.get(system, np.nan)
+
+
+def _as_printed(change: Floats, printed: float) -> tuple[float, float]:
+    """Share of differences no larger than a printed one, and of those of its sign."""
+    if np.isnan(printed):
+        return np.nan, np.nan
+    return (
+        float((np.abs(change) <= abs(printed)).mean()),
+        float((np.sign(change) == np.sign(printed)).mean()),
+    )
 
 
 def table_three(found: Draws) -> Iterator[TableThree]:
@@ -79,7 +107,7 @@ def table_three(found: Draws) -> Iterator[TableThree]:
     printed = np.array([TABLE_III[system] for system in SYSTEMS])
     scores = found.scores.reshape(-1, *found.scores.shape[2:])
     order = list(np.argsort(printed))
-    for m, column in enumerate(COLUMNS):
+    for m, column in enumerate(found.columns):
         away = np.abs(scores[:, :, m] - printed).max(axis=1)
         away = np.where(np.isfinite(away), away, np.inf)
         close = away <= 5e-3
@@ -97,15 +125,15 @@ def table_three(found: Draws) -> Iterator[TableThree]:
 
 
 def indices(found: Draws) -> Iterator[Index]:
-    """Sobol's indices of each system's score, and of each lead, on every unknown, by measure.
+    """Sobol's indices of each system's score, and of each lead, on every group, by measure.
 
     Rows of the design with a motion that did not finish are left out.
     """
     kept = found.scores[np.isfinite(found.scores).all(axis=(1, 2, 3))]
-    for m, column in enumerate(COLUMNS):
-        for name, values in _outputs(kept[..., m]):
-            for unknown, numbers in zip(UNKNOWNS, sobol(values), strict=True):
-                yield Index(*column, name, unknown.name, *map(float, numbers))
+    for m, column in enumerate(found.columns):
+        for name, values in _outputs(kept[..., m], found.systems):
+            for unknown, numbers in zip(found.groups, sobol(values), strict=True):
+                yield Index(*column, name, unknown, *map(float, numbers))
 
 
 def sobol(values: Floats) -> Floats:
@@ -130,9 +158,9 @@ def _estimated(values: Floats) -> tuple[Floats, Floats]:
     return first, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
 
 
-def _outputs(scores: Floats) -> Iterator[tuple[str, Floats]]:
-    """Each system's score, then the lead of one system over another, (size, unknowns + 2) each."""
-    for s, system in enumerate(SYSTEMS):
+def _outputs(scores: Floats, systems: tuple[str, ...]) -> Iterator[tuple[str, Floats]]:
+    """Each system's score, then the lead of one system over another, (size, groups + 2) each."""
+    for s, system in enumerate(systems):
         yield system, scores[..., s]
-    for a, b in combinations(range(len(SYSTEMS)), 2):
-        yield f"{SYSTEMS[a]} - {SYSTEMS[b]}", scores[..., a] - scores[..., b]
+    for a, b in combinations(range(len(systems)), 2):
+        yield f"{systems[a]} - {systems[b]}", scores[..., a] - scores[..., b]

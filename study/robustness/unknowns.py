@@ -1,4 +1,4 @@
-"""What the paper leaves open of its single control mass point, each with a range and a reason."""
+"""Unknowns with ranges and reasons, and those that the paper leaves open of its control point."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ STAGES = "severity"
 
 @dataclass(frozen=True)
 class Range:
-    """A number between two bounds in SI units, each share of it (or of its logarithm) as likely."""
+    """A number between two bounds in SI units, each share of it (or of its logarithm) as likely.
+
+    Unknowns of one `group` change together where indices are told; without, each is its own.
+    """
 
     name: str
     low: float
@@ -33,6 +36,7 @@ class Range:
     unit: str
     why: str
     log: bool = True
+    group: str = ""
 
     def at(self, u: Floats) -> list[float]:
         """Values at shares (n,) of the range."""
@@ -48,11 +52,12 @@ class Range:
 
 @dataclass(frozen=True)
 class OneOf:
-    """One of some values, each as likely."""
+    """One of some values, each as likely; `group` as of a Range."""
 
     name: str
     values: tuple[Any, ...]
     why: str
+    group: str = ""
 
     def at(self, u: Floats) -> list[Any]:
         """Values at shares (n,) of the list."""
@@ -70,6 +75,14 @@ class OneOf:
 
 
 Unknown = Range | OneOf
+
+
+def groups(unknowns: Sequence[Unknown]) -> dict[str, list[int]]:
+    """Places of the unknowns of each group, in the order of their first ones."""
+    found: dict[str, list[int]] = {}
+    for place, one in enumerate(unknowns):
+        found.setdefault(one.group or one.name, []).append(place)
+    return found
 
 
 class Placed(NamedTuple):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
+from study.sweep.stated import Stated
 from study.tradeoff.observation import Observed
-from study.tradeoff.problem import Stated
 from study.tradeoff.reference import Truth
 
 Floats = NDArray[np.float64]

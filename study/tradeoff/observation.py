@@ -8,8 +8,9 @@ import numpy as np
 
 from study.models.model import Simulation
 from study.sweep.canonical import Plain
+from study.sweep.stated import stated
 from study.tradeoff.lineup import Configuration
-from study.tradeoff.problem import plain, stated
+from study.tradeoff.problem import plain
 
 FUNCTION = f"{__name__}:observe"
 

@@ -25,13 +25,14 @@ from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import How, Outcome
+from study.sweep.stated import Stated, arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.observation import Observed
-from study.tradeoff.problem import Stated, arguments, stated, tidy
+from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth
 from study.tradeoff.table import Cost

@@ -11,7 +11,8 @@ from study.models.finite_elements import reference_of
 from study.models.model import SILENT
 from study.results.records import ElementsRecord, MeshLevel
 from study.sweep.canonical import Plain, restored
-from study.tradeoff.problem import Stated, plain, stated
+from study.sweep.stated import Stated, stated
+from study.tradeoff.problem import plain
 
 Floats = NDArray[np.float64]
 

@@ -16,11 +16,12 @@ from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
+from study.sweep.stated import arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
 from study.tradeoff.demand import Demand, demand
 from study.tradeoff.lineup import configurations
-from study.tradeoff.problem import arguments, sampled, stated
+from study.tradeoff.problem import sampled
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
 
 

@@ -19,13 +19,13 @@ from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.canonical import Plain, restored
 from study.sweep.runner import How, Outcome, run
+from study.sweep.stated import Stated, arguments, stated
 from study.sweep.store import Store
 from study.sweep.tally import on_stderr
 from study.sweep.task import Task
 from study.tradeoff import observation, reference, table
 from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration
-from study.tradeoff.problem import Stated, arguments, stated
 from study.tradeoff.reference import SolvedReference, Truth
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns

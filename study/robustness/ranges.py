@@ -1,0 +1,17 @@
+"""The table of unknowns: what is drawn, and from where."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+from study.robustness.unknowns import Unknown
+
+
+def write_ranges(path: Path, unknowns: Iterable[Unknown]) -> None:
+    """Write a row an unknown: its name, range and meaning."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(("unknown", "range", "meaning"))
+        table.writerows((one.name, one.extent, one.why) for one in unknowns)
