@@ -1,0 +1,208 @@
+"""What a bound of a subspace's error needs to know of the body, computed once and small.
+
+Of a Krylov space of the load, solved to rounding, and of how a given subspace lies in it. See
+`fem_reference.certified` for what is made of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import csr_array
+
+from fem_reference.definite import UNIT, StiffnessFloor, stiffness_floor
+from fem_reference.direct import Solve, factorised
+from fem_reference.elasticity import Body
+from fem_reference.subspace import Subspace, empty, extended
+
+Floats = NDArray[np.float64]
+
+VECTORS = 128
+"""Of the Krylov space: the more, the nearer the bound is to the error."""
+EXHAUSTED = 1e-9
+"""Share of a vector outside of the Krylov space, in the mass, at which the space is complete."""
+
+
+def krylov_space(body: Body, solve: Solve, count: int) -> Subspace:
+    """At most `count` vectors K^-1 f, K^-1 M K^-1 f, ..., solved as exactly as `solve` does."""
+    found = extended(body, empty(body.stiffness.size), solve(body.load))
+    while found.load.size < count:
+        vector = solve(body.mass @ found.vectors[:, -1])
+        outside = vector - found.vectors @ (found.vectors.T @ (body.mass @ vector))
+        if _norm(body, outside) <= EXHAUSTED * _norm(body, vector):
+            break
+        found = extended(body, found, vector)
+    return found
+
+
+def _norm(body: Body, vector: Floats) -> float:
+    return float(np.sqrt(vector @ (body.mass @ vector)))
+
+
+class Residual(NamedTuple):
+    """K^-1 w of the one direction w of a Krylov space's residual, and its energy norm.
+
+    `defect`: energy norm of K^-1 times all that is wrong with the other directions, and with this
+    one; `static_defect`: with the static displacement.
+    """
+
+    solution: Floats
+    norm: float
+    defect: float
+    static_defect: float
+
+
+def residual(body: Body, space: Subspace, solve: Solve, floor: StiffnessFloor) -> Residual:
+    """Of a Krylov space, with the rounding of what it is computed from.
+
+    For coordinates y the residual is s w_0 - sum_k (y_k'' + a y_k') w_k, where w_k is M v_k and w_0
+    is f, less what K V balances of it; all but the last w_k vanish.
+    """
+    V, K = space.vectors, body.stiffness
+    KV = np.column_stack([K @ v for v in V.T])
+    wanted = np.column_stack([space.load, np.eye(len(V.T))])
+    balanced = np.asarray(np.linalg.solve(space.stiffness, wanted), np.float64)
+    whole = np.column_stack([body.load, body.mass @ V]) - KV @ balanced
+    solution = solve(whole[:, -1])
+    whole[:, -1] -= K @ solution
+    wrong = np.abs(whole) + _rounding(body, V, balanced, solution)
+    sizes = np.sqrt((wrong**2 / floor.diagonal[:, None]).sum(axis=0))
+    norm = float(np.sqrt(solution @ (K @ solution)))
+    return Residual(solution, norm, float(np.linalg.norm(sizes[1:])), float(sizes[0]))
+
+
+def _rounding(body: Body, V: Floats, balanced: Floats, solution: Floats) -> Floats:
+    """Of each entry of the residual's directions: eps times entries of a row times magnitudes."""
+    matrix = body.stiffness.matrix
+    entries = int(np.diff(csr_array(matrix).indptr).max()) + len(V.T)
+    size = np.abs(V) @ np.abs(balanced)
+    size[:, -1] += np.abs(solution)
+    pushed = abs(matrix) @ size
+    pressure = body.stiffness.pressure
+    if pressure is not None:
+        nodal = pressure.lame * (abs(pressure.divergence) @ size)
+        pushed += abs(pressure.divergence).T @ (nodal / pressure.mass.diagonal()[:, None])
+    pushed[:, 0] += np.abs(body.load)
+    pushed[:, 1:] += abs(body.mass) @ np.abs(V)
+    return np.asarray(UNIT * entries * pushed)
+
+
+class Seen(NamedTuple):
+    """Control points' displacement: of the modes (p, 3, M), K^-1 w (p, 3), and left-out parts.
+
+    `outside` (p, 3, m): of what the subspace's modes have outside of the Krylov space;
+    `compliance` (p,) [m/sqrt(J)]: largest displacement of unit energy norm.
+    """
+
+    modes: Floats
+    solution: Floats
+    outside: Floats
+    compliance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What the bound needs to know of a body and a subspace, none of it of the body's size.
+
+    `squares` (M,) [1/s^2], `load` (M,): of the Krylov space's modes; `last` (M,): how much of its
+    last vector each has, by which its residual goes; `norm`, `defect`, `static_defect`: of
+    `Residual`; `lowest` [1/s^2]: proven below all eigenvalues; `inside` (M, m): the subspace's
+    modes among those of the Krylov space; `outside` (1 + m, 1 + m): products in the stiffness of
+    K^-1 w and of what of these modes is outside; `own_squares`, `own_load` (m,): of the subspace.
+    """
+
+    squares: Floats
+    load: Floats
+    last: Floats
+    norm: float
+    defect: float
+    static_defect: float
+    lowest: float
+    inside: Floats
+    outside: Floats
+    own_squares: Floats
+    own_load: Floats
+    seen: Seen
+
+    @cached_property
+    def rest(self) -> Floats:
+        """Share of each mode in the displacement under the full load at rest."""
+        return self.load / self.squares
+
+    @property
+    def rounding(self) -> float:
+        """What rounding adds to a bound at once, relative to the energy norm at rest."""
+        at_rest = float(np.sqrt(self.load @ self.rest))
+        return (self.static_defect + self.defect * float(np.linalg.norm(self.load))) / at_rest
+
+
+def certificate(
+    body: Body, subspace: Subspace, at_probes: csr_array, vectors: int = VECTORS
+) -> Certificate:
+    """Of a body in a subspace, as its control points are seen, by so many Krylov `vectors`.
+
+    There are at least as many as in the subspace, at most as many as the load reaches. The
+    stiffness is factored twice. ValueError if it is not definite beyond rounding.
+    """
+    floor = stiffness_floor(body, float(np.linalg.eigvalsh(subspace.stiffness)[0]))
+    solve = _direct(body)
+    count = min(max(vectors, subspace.load.size), body.stiffness.size)
+    space = krylov_space(body, solve, count)
+    found = residual(body, space, solve, floor)
+    squares, modes = eigh(space.stiffness)
+    own_squares, own_modes = eigh(subspace.stiffness)
+    shapes, own_shapes = space.vectors @ modes, subspace.vectors @ own_modes
+    pushed = np.column_stack([body.stiffness @ v for v in own_shapes.T])
+    inside = (shapes.T @ pushed) / squares[:, None]
+    left = np.column_stack([found.solution, own_shapes - shapes @ inside])
+    return Certificate(
+        squares,
+        modes.T @ space.load,
+        modes[-1],
+        found.norm,
+        found.defect,
+        found.static_defect,
+        floor.eigenvalue,
+        inside,
+        left.T @ np.column_stack([body.stiffness @ v for v in left.T]),
+        own_squares,
+        own_modes.T @ subspace.load,
+        _seen(body, at_probes, shapes, left, solve, floor),
+    )
+
+
+def _direct(body: Body) -> Solve:
+    """Solution by factors, without the pressures."""
+    solve, size = factorised(body.stiffness.system()), body.stiffness.size
+    padding = np.zeros(body.unknowns - size)
+    return lambda load: solve(np.concatenate([load, padding]))[:size]
+
+
+def _seen(
+    body: Body,
+    at_probes: csr_array,
+    shapes: Floats,
+    left: Floats,
+    solve: Solve,
+    floor: StiffnessFloor,
+) -> Seen:
+    def of(vectors: Floats) -> Floats:
+        count = vectors.shape[1]
+        return np.asarray(at_probes @ vectors.reshape(-1, 3 * count)).reshape(-1, 3, count)
+
+    rows = at_probes.toarray()
+    compliance = [_compliance(body, np.kron(row[:, None], np.eye(3)), solve, floor) for row in rows]
+    return Seen(of(shapes), of(left[:, :1])[..., 0], of(left[:, 1:]), np.array(compliance))
+
+
+def _compliance(body: Body, forces: Floats, solve: Solve, floor: StiffnessFloor) -> float:
+    """Largest |J u| of |u|_K = 1, `forces` (n, 3) the transpose of J, from above."""
+    answers = np.column_stack([solve(one) for one in forces.T])
+    balanced = np.column_stack([body.stiffness @ one for one in answers.T])
+    wrong = np.linalg.norm((forces - balanced) / np.sqrt(floor.diagonal)[:, None])
+    return float(np.sqrt(np.linalg.eigvalsh(answers.T @ balanced)[-1]) + wrong)
