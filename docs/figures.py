@@ -207,7 +207,8 @@ def _over_spacing(lines: list[Line]) -> list[str]:
 
 
 def real_time() -> Iterator[tuple[str, str]]:
-    """How fast the lattice with volume term steps."""
+    """How fast the lattice with volume term steps, and where."""
+    yield "real-time-on", _where(measured("real_time"))
     by_spacing: dict[str, dict[str, Line]] = {}
     for line in measured("real_time"):
         by_spacing.setdefault(line["spacing_m"], {})[line["nu"]] = line
@@ -226,6 +227,26 @@ def real_time() -> Iterator[tuple[str, str]]:
             ],
         ),
     )
+
+
+def kernels() -> Iterator[tuple[str, str]]:
+    """A step over the grid beside one over the list of springs and one in C."""
+    lines = measured("lattice_kernels")
+    grid = [one for one in lines if one["kernel"] == "grid" and one["volume_term"] == "True"]
+    most = max(int(one["lanes"]) for one in grid)
+    yield "kernels-on", _where(lines)
+    yield "kernels-lanes", str(most)
+    for name, lanes in (("", most), ("-narrow", min(int(one["lanes"]) for one in grid))):
+        found = [one for one in grid if int(one["lanes"]) == lanes]
+        yield f"grid-gain{name}", span(float(one["times_list"]) for one in found)
+        yield f"grid-over-c{name}", span((float(one["over_c"]) for one in found), "{:.2f}".format)
+
+
+def _where(lines: list[Line]) -> str:
+    """The machine of a table, and how busy it was."""
+    (machine,) = {line["machine"].partition(",")[0] for line in lines}
+    loads = [float(line["load"]) for line in lines]
+    return f"{machine}, load {max(loads):.1f}"
 
 
 def peers() -> Iterator[tuple[str, str]]:
@@ -399,7 +420,7 @@ def ranking() -> Iterator[tuple[str, str]]:
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
-    lattice = (field_error, real_time, peers, error_bar, large_strain, tradeoff)
+    lattice = (field_error, real_time, kernels, peers, error_bar, large_strain, tradeoff)
     groups = (*fuzzy, *lattice, verification, stability, ranking)
     return {name: text for group in groups for name, text in group()}
 

@@ -12,13 +12,14 @@ import pytest
 from scipy.sparse import csr_array
 
 import msm
+from msm.assembly import arrays
 from msm.explicit import symplectic_euler, velocity_verlet
-from msm.forces import add_spring_forces, internal_forces
+from msm.forces import internal_forces
 from msm.lattice import CORNERS
-from msm.simd import widest
 from study import compiled
-from tests.benchmarks import bench_lattice, field_error
-from tests.benchmarks.bench_lattice import FRACTION, LAW, cube, free, moved, numbered
+from tests.benchmarks import bench_lattice, field_error, grid_in_c
+from tests.benchmarks.bench_growth import cuthill_mckee, numbered
+from tests.benchmarks.bench_lattice import FRACTION, LAW, cube, free, moved
 
 TABLE = bench_lattice.read()
 ROUNDING = 1e-12
@@ -106,30 +107,86 @@ def test_a_step_of_velocity_verlet_is_the_written_one(net):
     assert difference(v, after) < ROUNDING
 
 
-def test_the_c_kernel_of_the_benchmark_does_the_same_work(net, tmp_path):
+@pytest.fixture(scope="module")
+def liver():
+    """The built-in liver on a coarse lattice: its network, step [s] and law."""
+    case = field_error.liver((0.02,))
+    one = bench_lattice.liver(case, field_error.lattice(case, 0.02), 0.45)
+    return one.assembly.lattice, arrays(*one[:2]), FRACTION * one.critical, one.material.law
+
+
+def steps_in_c(folder, liver, lanes, change=None):
+    """What the benchmark says of C beside the list of springs."""
     if shutil.which("cc") is None:
         pytest.skip("no C compiler")
-    u, ours, theirs = moved(net), np.zeros_like(net.load), np.zeros_like(net.load)
-    add_spring_forces(LAW, net, u, ours)
-    bench_lattice.c_kernel(tmp_path)(net, u, theirs, 1)
-    assert difference(theirs, ours) < ROUNDING
+    lattice, net, dt, law = liver
+    found = [
+        bench_lattice.on_list(law, net, dt),
+        bench_lattice.in_c(folder, law, net if change is None else change(net), dt, lattice, lanes),
+    ]
+    return bench_lattice.differences(found)
 
 
-@pytest.mark.slow
-def test_the_springs_cost_no_more_than_in_c():
-    if shutil.which("cc") is None:
-        pytest.skip("no C compiler")
-    found = bench_lattice.against_c()
-    # Measured 1.0 to 1.3 on idle and busy cores.
-    assert found["ours"].least < 1.5 * found["C"].least
+@pytest.mark.parametrize("volume", [True, False])
+@pytest.mark.parametrize("lanes", bench_lattice.WIDTHS)
+def test_the_c_of_the_benchmark_takes_the_same_steps(liver, tmp_path, lanes, volume):
+    lattice, net, dt, law = liver
+    if not volume:
+        net = net._replace(cells=net.cells[:0], bulk=net.bulk[:0])
+    assert steps_in_c(tmp_path, (lattice, net, dt, law), lanes)[1] < bench_lattice.SAME
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(widest() < 4, reason="narrow vectors gain less")
-def test_the_grid_is_more_than_twice_as_fast_as_the_list_of_springs():
-    case = field_error.liver()
-    found = bench_lattice.gain(case, field_error.lattice(case, 0.01), with_volume=True)
-    assert found.gain > 2.0  # measured 3.0 to 3.5 on busy cores
+def test_a_c_that_leads_elsewhere_is_refused(liver, tmp_path):
+    """Negative control: one spring of 2 000 by a millionth."""
+
+    def one_spring(net):
+        scale = net.scale.copy()
+        scale[700] *= 1.0 + 1e-6
+        return net._replace(scale=scale)
+
+    for lanes in bench_lattice.WIDTHS[:1]:
+        with pytest.raises(ValueError, match=f"C with {lanes} lanes leads to another state"):
+            steps_in_c(tmp_path, liver, lanes, one_spring)
+
+
+def test_c_refuses_what_it_does_not_compute(liver):
+    lattice, net, dt, law = liver
+    diagonal = net.ends.copy()
+    diagonal[0, 1] = diagonal[-1, 1]
+    for changed in (
+        net._replace(beta=1e-3),
+        net._replace(gamma_1=np.ones_like(net.gamma_1)),
+        net._replace(ends=diagonal),
+    ):
+        with pytest.raises(ValueError, match=r"grid\.c knows"):
+            grid_in_c.stepper(None, 4, lattice, changed, law, dt)
+
+
+def test_the_table_of_kernels_agrees_with_itself():
+    table = bench_lattice.read_kernels()
+    assert {k.kernel for k in table} == {"list", "grid", "C"}
+    assert {(round(k.spacing_m, 6), k.volume_term) for k in table} == {
+        (round(h, 6), term) for h in bench_lattice.KERNEL_SPACINGS for term in (True, False)
+    }
+    lists = {(k.spacing_m, k.volume_term): k for k in table if k.kernel == "list"}
+    in_c = {(k.spacing_m, k.volume_term, k.lanes): k for k in table if k.kernel == "C"}
+    for k in table:
+        # Written to six digits.
+        alone = lists[k.spacing_m, k.volume_term]
+        assert k.times_list == pytest.approx(alone.step_us / k.step_us, rel=1e-5)
+        assert k.ns_per_spring == pytest.approx(1e3 * k.step_us / k.springs, rel=1e-5)
+        assert k.real_time >= k.real_time_median
+        assert k.apart < bench_lattice.SAME
+        if k.lanes > 1:
+            c = in_c[k.spacing_m, k.volume_term, k.lanes]
+            assert k.over_c == pytest.approx(k.step_us / c.step_us, rel=1e-5)
+
+
+def test_the_committed_grid_is_more_than_twice_as_fast_as_the_list_of_springs():
+    table = [k for k in bench_lattice.read_kernels() if k.kernel == "grid"]
+    widest = [k for k in table if k.lanes == max(k.lanes for k in table)]
+    assert len(widest) == 2 * len(bench_lattice.KERNEL_SPACINGS)
+    assert min(k.times_list for k in widest) > 2.0
 
 
 def motion(lattice, start):
@@ -160,7 +217,7 @@ def test_the_lattice_is_built_in_an_order_as_near_as_that_of_reverse_cuthill_mck
     """Which is why nothing renumbers it."""
     built = cube(8000)
     shuffled = np.random.default_rng(5).permutation(len(built.nodes))
-    best = reach(numbered(built, bench_lattice.cuthill_mckee(built)))
+    best = reach(numbered(built, cuthill_mckee(built)))
     assert reach(built) < 1.5 * best
     assert reach(numbered(built, shuffled)) > 5 * best  # negative control
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import platform
 import shutil
 import statistics
 import subprocess
@@ -46,6 +45,7 @@ from study.problem.problem import NodalProblem
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from tests.benchmarks.machine import machine
 from tests.oracles.calculix import PROGRAM as CCX
 from tests.oracles.calculix import version as release
 
@@ -195,13 +195,6 @@ def row(
     """A line of the table."""
     times = min(seconds), statistics.median(seconds), len(seconds)
     return Row(task, program, release, unknowns, *times, compiled, peak, machine())
-
-
-def machine() -> str:
-    """Processor, cores and Python."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    name = next(line.partition(": ")[2] for line in lines if line.startswith("model name"))
-    return f"{name}, {os.cpu_count()} cores, shared; Python {platform.python_version()}"
 
 
 # --- whole jobs and growth -----------------------------------------------------------------------
