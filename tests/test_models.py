@@ -21,13 +21,13 @@ from study.models.model import SILENT, ModelKind, Watch
 from study.models.table import MODELS, kind, model, models_of, references
 from study.problem.history import HISTORIES
 from study.run import study as running
+from study.run.stated import arguments, stated
 from study.run.study import run_study
 from study.scene import Patient, Scene
 from study.scene.file import SceneError, read_scene, resolved, validate
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import How
-from study.sweep.stated import arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import recommend, reference
 from study.tradeoff import study as study_module

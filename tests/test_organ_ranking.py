@@ -20,9 +20,9 @@ from study.robustness.block import Block, plain
 from study.robustness.design import shares
 from study.robustness.organ_unknowns import PLACE, TABLE_II, OrganDraw, draws, unknowns
 from study.robustness.unknowns import Placed, Sampled, groups
+from study.run.stated import arguments, stated
 from study.run.study import run_study
 from study.scene.file import read_scene
-from study.sweep.stated import arguments, stated
 
 COARSE = 0.02
 SHORT = (

@@ -15,9 +15,9 @@ from study.models import lattice
 from study.models.model import Stepper
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
+from study.run.stated import arguments
 from study.scene.file import read_scene
 from study.sweep.runner import How, Outcome
-from study.sweep.stated import arguments
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import problem as problem_module

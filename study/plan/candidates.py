@@ -195,7 +195,9 @@ def corrected(
     )
     return Candidate(
         name=f"{coarse.name}, corrected by finite elements of {_mm(fine.scene)}",
-        scene=replace(fine.scene, models=("corrected",), lattice=coarse.scene.lattice),
+        scene=replace(
+            fine.scene, models=("corrected",), corrected=replace(scene.corrected, spacing=spacing)
+        ),
         prediction=Prediction(parts),
         step=coarse.step,
         step_wall=coarse.step_wall + 2.0 * fine.step_wall,

@@ -18,13 +18,13 @@ from study.robustness.block import Block, plain
 from study.robustness.design import shares
 from study.robustness.organ_unknowns import OrganDraw, as_drawn, draws, unknowns
 from study.robustness.patient import SYSTEMS, estimates, readings
+from study.run.stated import stated
 from study.scene import Place, Scene
 from study.scene.place import resolve
 from study.scene.problem import problem_of
 from study.similarity.batch import COLUMNS, scores
 from study.similarity.fields import norm, relative_l2
 from study.sweep.canonical import Plain
-from study.sweep.stated import stated
 
 Floats = NDArray[np.float64]
 

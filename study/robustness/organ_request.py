@@ -25,11 +25,11 @@ from study.robustness.organ_block import (
 from study.robustness.organ_unknowns import unknowns
 from study.robustness.ranges import write_ranges
 from study.robustness.unknowns import groups
+from study.run.stated import arguments, stated
 from study.run.suiting import read_suited
 from study.sweep.canonical import Plain
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
-from study.sweep.stated import arguments, stated
 from study.sweep.store import Store
 from study.sweep.tally import Tell, silent
 from study.sweep.task import Task

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from study.run.stated import Stated
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
-from study.sweep.stated import Stated
 from study.tradeoff.observation import Observed
 from study.tradeoff.reference import Truth
 

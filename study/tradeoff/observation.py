@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.models.model import Simulation
+from study.run.stated import stated
 from study.sweep.canonical import Plain
-from study.sweep.stated import stated
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import plain
 

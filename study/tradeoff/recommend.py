@@ -20,12 +20,12 @@ from msm.integrators import INTEGRATORS
 from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
+from study.run.stated import Stated, arguments, stated
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import How, Outcome
-from study.sweep.stated import Stated, arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import reference, study
 from study.tradeoff.demand import Demand

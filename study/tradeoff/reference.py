@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from study.models.finite_elements import reference_of
 from study.models.model import SILENT
 from study.results.records import ElementsRecord, MeshLevel
+from study.run.stated import Stated, stated
 from study.sweep.canonical import Plain, restored
-from study.sweep.stated import Stated, stated
 from study.tradeoff.problem import plain
 
 Floats = NDArray[np.float64]

@@ -12,11 +12,11 @@ from study.models.table import model
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.ready import set_up
+from study.run.stated import arguments, stated
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
-from study.sweep.stated import arguments, stated
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
 from study.tradeoff.demand import Demand, demand

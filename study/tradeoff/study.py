@@ -15,11 +15,11 @@ from study.folders import replacing
 from study.models.model import Stepper
 from study.progress import Progress
 from study.results.provenance import provenance
+from study.run.stated import Stated, arguments, stated
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.canonical import Plain, restored
 from study.sweep.runner import How, Outcome, run
-from study.sweep.stated import Stated, arguments, stated
 from study.sweep.store import Store
 from study.sweep.tally import on_stderr
 from study.sweep.task import Task
