@@ -39,7 +39,8 @@ from study.stages.lanes import lanes
 
 SUITED, FUZZY = "scene suited to the organ", "fuzzy systems"
 NO_FUZZY = (
-    *("organ", "support", "tool", "lattice", "damping", "basafa", "reference", "superposition"),
+    *("organ", "support", "tool", "lattice", "damping", "basafa", "reference"),
+    *("superposition", "corrected"),
     *("time", "control_points"),
 )
 """Tables of a scene that its fuzzy systems do not read."""
