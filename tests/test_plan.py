@@ -15,13 +15,17 @@ from msm.stepper import LatticeStepper
 from study.commands.plan import plan as plan_command
 from study.commands.run import run
 from study.models.finite_elements import PreparedElements, reference_of
+from study.models.model import ModelRun
 from study.plan import plan as planning
 from study.plan.candidates import candidates
 from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
+from study.problem.trajectory import Trajectory
 from study.progress import Silent
 from study.results.folder import read
+from study.results.records import CorrectionRecord, CurveErrors
+from study.run.requirement import requirement_checks
 from study.run.rest import rest_of
 from study.scene import Require
 from study.scene.file import SceneError, read_scene
@@ -90,7 +94,8 @@ def test_what_no_candidate_keeps_is_refused_with_the_nearest(required, said):
 
 def test_planted_error_of_the_linear_models_turns_the_choice():
     """A foresight that saw far larger displacements leaves small ones out of the question."""
-    required = Require(error=0.2)
+    linear = [one for one in offered() if one.is_linear]
+    required = Require(error=1.01 * linear[0].prediction.error)
     assert choose(offered(), required).is_linear
     worse = [
         replace(
@@ -124,7 +129,9 @@ def test_foreseen_error_of_the_mesh_is_that_against_a_much_finer_one():
         return at_points(points, solve_static(body))[tool]
 
     size = problem.geometry.level(0).size
-    assert 0.5 < foresight.mesh(size) / off_by(at(0), at(5)) < 5.0  # coarse meshes: rather too much
+    assert (
+        0.5 < foresight.mesh(size) / off_by(at(0), at(5)) < 10.0
+    )  # rather too much than too little
     assert foresight.mesh(0.5 * size) == pytest.approx(0.25 * foresight.mesh(size))
 
 
@@ -137,7 +144,7 @@ def test_foreseen_parts_of_large_displacements_are_those_of_a_finer_lattice():
     assert 0.5 < foresight.geometry / (np.linalg.norm(part) / whole) < 3.0
     last = seen.lattices[-1]
     left = part - (last.nonlinear.probes - last.linear.probes)[tool]
-    assert 0.4 < foresight.remainder(last.spacing) / (np.linalg.norm(left) / whole) < 3.0
+    assert 0.5 < foresight.remainder(last.spacing) / (np.linalg.norm(left) / whole) < 8.0
 
 
 def test_lattice_that_finds_no_rest_leaves_its_parts_unknown():
@@ -265,3 +272,60 @@ def test_wrong_wants_are_refused_by_their_key(override, said):
 def test_rate_of_what_does_not_move_is_refused():
     with pytest.raises(SceneError, match="nothing moves at rest"):
         scene_of('require.quantities=["rest"]', "require.rate=60 Hz")
+
+
+# --- whether the run keeps it ---------------------------------------------------------------------
+
+
+def moved(record, times, status="finished"):
+    """A run of so many times a ramp at both control points."""
+    curve = times * np.linspace(0.0, 1.0, 5)[:, None, None] * np.ones((5, 2, 3))
+    return ModelRun(Trajectory(curve, curve, curve, curve, status), record)
+
+
+def checked(scene, results, lattice, **required):
+    wanted = replace(scene, require=Require(**required))
+    return list(requirement_checks(wanted, results.record.probes, lattice))
+
+
+def test_lattice_is_checked_by_its_difference_from_elements_and_their_own_error(
+    small_scene, small_results
+):
+    elements, springs = (small_results.model(name) for name in ("fem", "msm-mamdani"))
+    runs = {"fem": moved(elements, 1.0), "msm-mamdani": moved(springs, 1.1)}
+    (found,) = checked(small_scene, small_results, runs, error=0.5, at=("tool",))
+    own = elements.mesh_error.by_probe["tool"].displacement
+    own += elements.time_step_errors["tool"].displacement
+    assert found.name == "msm-mamdani: require.error"
+    assert found.value == pytest.approx(0.1 + own)
+    assert found.passed
+    worse = runs | {"msm-mamdani": moved(springs, 1.6)}
+    assert not checked(small_scene, small_results, worse, error=0.5)[0].passed
+    lost = runs | {"msm-mamdani": moved(springs, 1.0, "diverged")}
+    assert not checked(small_scene, small_results, lost, error=0.5)[0].passed
+
+
+def test_corrected_lattice_is_checked_by_all_parts_that_it_states(small_scene, small_results):
+    part = CurveErrors(displacement=0.03, velocity=1.0)
+    correction = CorrectionRecord(
+        spacing_m=0.02,
+        compared_spacing_m=0.01,
+        remainder={},
+        remainder_errors={"tool": part},
+        vectors=9,
+        truncation_error=0.0,
+    )
+    elements = small_results.model("fem")
+    runs = {"corrected": moved(replace(elements, name="corrected", correction=correction), 1.0)}
+    (found,) = checked(small_scene, small_results, runs, error=0.5, at=("tool",))
+    parts = (elements.mesh_error.by_probe, elements.time_step_errors)
+    assert found.value == pytest.approx(0.03 + sum(one["tool"].displacement for one in parts))
+    unknown = replace(correction, remainder_errors={})
+    lost = {"corrected": moved(replace(elements, correction=unknown), 1.0)}
+    assert not checked(small_scene, small_results, lost, error=0.5)
+
+
+def test_nothing_is_checked_where_no_error_is_required(small_scene, small_results):
+    runs = {"fem": moved(small_results.model("fem"), 1.0)}
+    assert not checked(small_scene, small_results, runs)
+    assert not list(requirement_checks(small_scene, ("tool",), runs))

@@ -23,6 +23,7 @@ from study.models.lattice import PreparedLattice
 from study.problem.trajectory import Trajectory
 from study.progress import Advance
 from study.results.records import CurveErrors
+from study.similarity.fields import relative_l2_of_curves
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,7 +39,6 @@ tell (`tests.benchmarks.corrected_places`).
 """
 KEPT = 0.75
 """Share of the vectors that is left when their last ones are left out to see what they do."""
-TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class PreparedRemainder:
             np.einsum("pdm,tm->tpd", _at(weights, one), at)
             for one, at in zip((linear, fewer), coordinates, strict=True)
         )
-        return float(_relative(whole - part, whole).max())
+        return float(relative_l2_of_curves(whole - part, whole).max())
 
 
 def _at(weights: csr_array, linear: ReducedLattice) -> Floats:
@@ -175,8 +175,8 @@ def relative_sizes(
     probes: tuple[str, ...], part: Trajectory, whole: Trajectory, share: float = 1.0
 ) -> dict[str, CurveErrors]:
     """A share of the L2 norm of a part's curves over that of the whole's, by control point."""
-    u = share * _relative(part.displacement, whole.displacement)
-    v = share * _relative(part.velocity, whole.velocity)
+    u = share * relative_l2_of_curves(part.displacement, whole.displacement)
+    v = share * relative_l2_of_curves(part.velocity, whole.velocity)
     return {
         probe: CurveErrors(displacement=float(a), velocity=float(b))
         for probe, a, b in zip(probes, u, v, strict=True)
@@ -193,9 +193,3 @@ def remainder_errors(
     """
     share = 1.0 / (1.0 - FINER**ORDER)
     return relative_sizes(probes, plus(coarse, fine, -1.0), whole, share)
-
-
-def _relative(difference: Floats, of: Floats) -> Floats:
-    """L2 norm of curves (samples, probes, 3) over that of others, (probes,)."""
-    norms = [np.sqrt((x**2).sum(axis=(0, 2))) for x in (difference, of)]
-    return np.asarray(norms[0] / np.maximum(norms[1], TINY))

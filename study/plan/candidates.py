@@ -13,6 +13,8 @@ from study.models.finite_elements import FRAME_RATE
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.plan.look import LatticeLook, Look
 from study.plan.prediction import (
+    CAUTION,
+    COMPARED,
     GEOMETRY,
     MESH,
     REMAINDER,
@@ -143,7 +145,9 @@ def _lattices(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candid
     for times in SPACINGS:
         spacing = times * scene.lattice.spacing
         found = lattice(scene, look, spacing)
-        yield replace(found, prediction=Prediction((Part(SPACING, foresight.spacing(spacing)),)))
+        compared = foresight.mesh(look.elements[-1].size)
+        parts = (Part(SPACING, foresight.spacing(spacing)), Part(COMPARED, compared / CAUTION))
+        yield replace(found, prediction=Prediction(parts))
 
 
 def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:

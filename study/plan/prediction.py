@@ -19,15 +19,18 @@ from study.similarity.fields import norm
 
 Floats = NDArray[np.float64]
 
-GEOMETRY, MESH, SPACING, REMAINDER, TRUNCATION = (
+GEOMETRY, MESH, SPACING, COMPARED, REMAINDER, TRUNCATION = (
     "large displacements left out",
     "elements' mesh",
     "lattice spacing",
+    "elements compared with",
     "large displacements on a coarse lattice",
     "subspace",
 )
 NONLINEAR_ORDER = 1.5
 """Of the lattice's part by large displacements, observed between 20, 10 and 5 mm on the liver."""
+CAUTION = 2.0
+"""On what two coarse meshes or lattices tell: the errors that a run states have factors too."""
 SUBSPACE = 1e-3
 """Error of displacement that so many Ritz vectors leave, which the run tells itself."""
 
@@ -105,20 +108,21 @@ class Foresight:
         if parts[0] is None or parts[1] is None:
             return math.inf
         gain = (first.spacing**NONLINEAR_ORDER - last.spacing**NONLINEAR_ORDER) ** -1.0
-        return float(self._size(parts[1].plus(parts[0], -1.0)) * gain * spacing**NONLINEAR_ORDER)
+        change = self._size(parts[1].plus(parts[0], -1.0))
+        return float(CAUTION * change * gain * spacing**NONLINEAR_ORDER)
 
     def mesh(self, size: float) -> float:
         """Discretisation error of elements of a size [m]; infinite where one mesh is all there is.
 
         By Richardson from the two finest meshes looked at, with the order of curved organs and
-        edges of supports. It has no factor of safety: the run states an error that has.
+        edges of supports.
         """
         if len(self.look.elements) < 2:
             return math.inf
         before, last = self.look.elements[-2:]
         gain = (before.size / last.size) ** ASSUMED_ORDER - 1.0
         change = self._size(last.rest.plus(before.rest, -1.0))
-        return float(change / gain * (size / last.size) ** ASSUMED_ORDER)
+        return float(CAUTION * change / gain * (size / last.size) ** ASSUMED_ORDER)
 
     def spacing(self, spacing: float) -> float:
         """Error of a lattice of a spacing [m], by a fit of C h^p to those looked at."""

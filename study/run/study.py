@@ -26,6 +26,7 @@ from study.results.records import (
 from study.run.assumptions import assumptions
 from study.run.posed import Posed
 from study.run.ready import ReadyPoint, ready
+from study.run.requirement import requirement_checks
 from study.run.score_errors import error_rows, rating_rows
 from study.run.stages import ALONE, Means, Stage, Stages
 from study.run.suiting import suited
@@ -158,6 +159,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
     models = tuple(run.record for run in runs.values())
     # A lattice's mass is checked for each model on it, and is told once.
     checks = tuple(dict.fromkeys(check for run in runs.values() for check in run.checks))
+    checks += tuple(requirement_checks(scene, response.probes, runs))
     compared_with = references(scene)
     # One that diverged leaves a note in place of its scores.
     sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}

@@ -1,4 +1,4 @@
-"""How far apart two displacement fields are, over the volume of the organ."""
+"""How far apart two displacements are, over the volume of the organ or of a motion."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+TINY = 1e-300
+"""In place of the size of curves that do not move."""
 
 
 def norm(field: Floats, volumes: Floats) -> float:
@@ -26,3 +29,9 @@ def best_factor(field: Floats, reference: Floats, volumes: Floats) -> float:
     """
     product = volumes @ (field * reference).sum(axis=1)
     return float(product / norm(field, volumes) ** 2)
+
+
+def relative_l2_of_curves(difference: Floats, of: Floats) -> Floats:
+    """L2 norm over the samples of curves (samples, probes, 3) over that of others, (probes,)."""
+    sizes = [np.sqrt((x**2).sum(axis=(0, 2))) for x in (difference, of)]
+    return np.asarray(sizes[0] / np.maximum(sizes[1], TINY))

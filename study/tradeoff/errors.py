@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.run.stated import Stated
-from study.similarity.fields import relative_l2
+from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
 from study.tradeoff.observation import Observed
@@ -54,7 +54,8 @@ def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
 def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> Errors:
     volumes = given.problem.volume_rule.weights
     field = relative_l2(found, reference.field, volumes)
-    curves = curve_errors(moved.reshape(reference.curves.shape), reference.curves)
+    moved = moved.reshape(reference.curves.shape)
+    curves = relative_l2_of_curves(moved - reference.curves, reference.curves)
     known = [resolved(c, bar) for c, bar in zip(curves, reference.curve_errors, strict=True)]
     kept = resolved(field, reference.field_error)
     return Errors(
@@ -68,12 +69,3 @@ def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> 
 def resolved(error: float, bar: float) -> float | None:
     """The error, or None where it does not exceed that of the reference."""
     return float(error) if error > bar else None
-
-
-def curve_errors(curves: Floats, reference: Floats) -> Floats:
-    """Relative L2 difference (probes,) of curves (samples, probes, 3)."""
-
-    def size(x: Floats) -> Floats:
-        return np.asarray(np.sqrt((x**2).sum(axis=(0, 2))))
-
-    return size(curves - reference) / size(reference)

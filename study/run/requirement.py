@@ -1,0 +1,70 @@
+"""Whether a run keeps the error that its scene requires, by the errors that the run states itself.
+
+These are estimates, with their factors of safety, and no bounds. A model that does not know its own
+error, a lattice, is told by its difference from finite elements that do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from study.models.model import ModelRun
+from study.results.records import Check, CurveErrors, ModelRecord
+from study.scene import Require, Scene
+from study.similarity.fields import relative_l2_of_curves
+
+
+def requirement_checks(
+    scene: Scene, probes: tuple[str, ...], runs: Mapping[str, ModelRun]
+) -> Iterator[Check]:
+    """A check of each model whose error at the control points is known, if one is required."""
+    required = scene.require
+    if required is None or required.error is None:
+        return
+    reference = runs.get("fem")
+    for name, run in runs.items():
+        if run is reference and len(runs) > 1:
+            continue
+        found = _errors(run, reference, probes)
+        chosen = [found[probe] for probe in required.at or probes if probe in found]
+        if chosen:
+            yield _check(name, max(chosen), required)
+
+
+def _check(name: str, error: float, required: Require) -> Check:
+    where = ", ".join(required.at) or "any control point"
+    return Check(
+        name=f"{name}: require.error",
+        value=error,
+        limit=float(required.error or 0.0),
+        meaning=f"the run's own estimate of its displacement's error at {where}, relative L2",
+    )
+
+
+def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) -> dict[str, float]:
+    """Sum of the estimated errors of displacement by control point; empty where it is unknown."""
+    if run.trajectory.status != "finished":
+        return dict.fromkeys(probes, float("inf"))
+    record = run.record
+    if record.correction is not None:
+        return _stated(record, record.correction.remainder_errors, probes)
+    if record.lattice is not None and reference is not None and reference is not run:
+        own = _stated(reference.record, None, probes)
+        curves, truth = run.trajectory.displacement, reference.trajectory.displacement
+        apart = relative_l2_of_curves(curves - truth, truth)
+        return {p: own[p] + float(apart[i]) for i, p in enumerate(probes) if p in own}
+    return {}  # linear elements alone do not know what large displacements would change
+
+
+def _stated(
+    record: ModelRecord, remainder: dict[str, CurveErrors] | None, probes: tuple[str, ...]
+) -> dict[str, float]:
+    """Errors by mesh, by steps and, of a corrected lattice, by its spacing, where all are known."""
+    mesh = record.mesh_error
+    parts = [None if mesh is None else mesh.by_probe, record.time_step_errors]
+    parts += [] if remainder is None else [remainder]
+    return {
+        probe: sum(part[probe].displacement for part in parts if part is not None)
+        for probe in probes
+        if all(part is not None and probe in part for part in parts)
+    }
