@@ -65,7 +65,8 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
     """
     started = time.perf_counter()
-    with lanes(means.workers, watch.progress) as side_by_side:
+    workers = 1 if scene.is_point else means.workers  # a point is moved before a process is there
+    with lanes(workers, watch.progress) as side_by_side:
         stages = Stages(means, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.
@@ -78,7 +79,7 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     with watch.progress.stage("similarity"):
         results = _results(scene, fuzzy, found, made_by)
     wall = time.perf_counter() - started
-    record = replace(results.record, stages=stages.records(), study_wall_s=wall)
+    record = replace(results.record, stages=stages.records(), workers=workers, study_wall_s=wall)
     return replace(results, record=record)
 
 
