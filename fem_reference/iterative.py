@@ -8,6 +8,8 @@ with the six rigid motions as near-null space.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -59,16 +61,31 @@ def _linear_level(matrix: csr_array, points: Floats) -> Solve:
     from pyamg import smoothed_aggregation_solver
 
     smoother = ("block_gauss_seidel", {"sweep": "symmetric"})
-    levels = smoothed_aggregation_solver(
-        csr_matrix(matrix).tobsr(blocksize=(3, 3)),
-        B=rigid_motions(points),
-        strength=("symmetric", {"theta": 0.0}),
-        smooth="jacobi",
-        presmoother=smoother,
-        postsmoother=smoother,
-    )
+    with _drawing_alike():
+        levels = smoothed_aggregation_solver(
+            csr_matrix(matrix).tobsr(blocksize=(3, 3)),
+            B=rigid_motions(points),
+            strength=("symmetric", {"theta": 0.0}),
+            smooth="jacobi",
+            presmoother=smoother,
+            postsmoother=smoother,
+        )
     cycle = levels.aspreconditioner()
     return lambda residual: np.asarray(cycle @ residual)
+
+
+@contextmanager
+def _drawing_alike() -> Iterator[None]:
+    """Let pyamg begin its estimates of eigenvalues alike, so that a solution is the same each time.
+
+    It draws from numpy's global generator, which is left as it was.
+    """
+    before = np.random.get_state()  # noqa: NPY002 - the one that pyamg draws from
+    np.random.seed(0)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(before)  # noqa: NPY002
 
 
 def rigid_motions(points: Floats) -> Floats:

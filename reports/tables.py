@@ -368,4 +368,17 @@ def provenance_rows(results: Results) -> Table:
     for key in keys:
         value = getattr(found, key)
         rows.append([key.replace("_", " "), DASH if value is None else words(str(value))])
-    return [*rows, ["whole study", DASH if wall is None else f"{significant(wall)} s"]]
+    rows.append(["whole study", DASH if wall is None else f"{significant(wall)} s"])
+    return [*rows, *_stage_rows(results)]
+
+
+def _stage_rows(results: Results) -> Table:
+    """How the stages ran, and which were kept from an earlier run, with when they were timed."""
+    record = results.record
+    kept = [
+        f"{one.name} ({significant(one.wall_s, 2)} s, {one.measured_at})"
+        for one in record.stages
+        if one.kept
+    ]
+    rows = [["processes side by side", str(record.workers)]] if record.stages else []
+    return [*rows, *([["stages kept", ", ".join(kept)]] if kept else [])]

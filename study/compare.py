@@ -43,8 +43,11 @@ Series = dict[str, dict[str, float]]
 
 WALL = "wall_s"
 ONLY = "only in the {}"
-WORDS = ("schema_version", "provenance", "title", "assumptions", "notes", "warnings")
-"""Of results.json, told elsewhere or no numbers."""
+WORDS = (
+    *("schema_version", "provenance", "title", "assumptions", "notes", "warnings"),
+    *("stages", "workers"),
+)
+"""Of results.json, told elsewhere, or no numbers of the study."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,6 +101,61 @@ def test_a_run_of_the_resolved_scene_gives_the_same_scores(paper_folder, tmp_pat
         first = (paper_folder / f"{table}.csv").read_text()
         assert (tmp_path / "again" / f"{table}.csv").read_text() == first
     assert not (tmp_path / "again" / "report.pdf").exists()
+
+
+def test_an_unchanged_run_has_nothing_to_compute(paper_folder):
+    files = [paper_folder / name for name in ("results.json", "curves.csv", "report.pdf")]
+    before = [(file.read_bytes(), file.stat().st_mtime_ns) for file in files]
+    run = ("run", "paper", "--out", str(paper_folder))
+    done = study(*run)
+    assert done.returncode == 0, done.stderr
+    assert f"nothing to compute: {paper_folder} holds this run" in done.stderr
+    assert "mamdani: " in done.stdout
+    assert [(file.read_bytes(), file.stat().st_mtime_ns) for file in files] == before
+    files[2].unlink()
+    done = study(*run)
+    assert "nothing to compute" in done.stderr
+    assert "similarity" not in done.stderr
+    assert files[2].read_bytes() == before[2][0]
+
+
+QUICK = ("--no-report", "--set", "models=['basafa']", "--set", "time.samples=16")
+
+
+def test_a_folder_that_was_touched_is_written_again_from_what_is_kept(tmp_path):
+    run = ("run", "block", *QUICK, "--out", str(tmp_path / "out"))
+    for words in (run, run):
+        done = study(*words)
+        assert done.returncode == 0, done.stderr
+    assert "nothing to compute" in done.stderr
+    curves = tmp_path / "out" / "curves.csv"
+    before = curves.read_text()
+    curves.write_text(before + "\n")
+    done = study(*run)
+    assert done.returncode == 0, done.stderr
+    assert "kept from earlier runs" in done.stderr
+    assert curves.read_text() == before
+    code = (
+        f"import sys; sys.argv[1:] = {run}; from study.commands.application import main; main();"
+        "print('LOADED', *sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert "nothing to compute" in done.stderr
+    loaded = done.stdout.rpartition("LOADED")[2].split()
+    heavy = ("numba", "skfem", "pyamg", "vtk", "matplotlib", "typst", "rich", "study.run.study")
+    assert not set(heavy) & set(loaded)
+
+
+def test_flags_that_contradict_each_other_are_refused(typed):
+    for words, said in (
+        (("--resume", "--fresh"), "--resume and --fresh: give one"),
+        (("--workers", "0"), "--workers 0: give 1 or more"),
+    ):
+        done = typed("run", "paper", *words)
+        assert done.returncode == 2
+        assert said in done.stderr
 
 
 def test_the_report_is_made_again_byte_for_byte(paper_folder):
@@ -205,23 +261,47 @@ def test_quick_commands_import_nothing_heavy(arguments, forbidden):
     assert not set(forbidden) & set(loaded)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_leaves_nothing_behind(number, tmp_path):
+def begun(*arguments, until):
+    """A run that has ended a stage; in a group of its own, as a terminal would start it."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "study", "run", "block", "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "study", "run", *arguments],
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
+        start_new_session=True,
     )
     assert process.stderr is not None
-    for line in process.stderr:  # once the first stage is done the run is under way
-        if line.startswith("organ"):
+    for line in process.stderr:
+        if line.startswith(until):
             break
-    time.sleep(0.2)
-    process.send_signal(number)
-    process.communicate(timeout=60)
+    return process
+
+
+def is_gone(group):
+    """Whether no process of a group is left."""
+    with suppress(ProcessLookupError):
+        os.killpg(group, 0)
+        return False
+    return True
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_interrupted_run_leaves_nothing_behind(number, workers, tmp_path):
+    out = ("--out", str(tmp_path / "out"))
+    process = begun("block", *out, "--fresh", "--workers", str(workers), until="fem: set up")
+    time.sleep(0.3)
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)  # as Ctrl-C
+    else:
+        process.send_signal(number)
+    said = process.communicate(timeout=60)[1]
     assert process.returncode == EXIT_MACHINE
+    assert next(line for line in said.splitlines() if "liver-study" in line).startswith(
+        f"liver-study: {signals.told(number)}"
+    )
+    assert is_gone(process.pid)
     assert not [path for path in tmp_path.iterdir() if path.name != ".out.state"]
 
 
@@ -231,27 +311,23 @@ def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path):
         "fuzzy.systems=['mamdani', 'sugeno']",
         "fuzzy.sensitivity_readings=0",
     )
-    arguments = ["run", "block", "--no-report", *(w for c in changes for w in ("--set", c))]
-    whole = study(*arguments, "--out", str(tmp_path / "whole"))
+    arguments = ["block", "--no-report", *(w for c in changes for w in ("--set", c))]
+    whole = study("run", *arguments, "--out", str(tmp_path / "whole"), "--fresh")
     assert whole.returncode == 0, whole.stderr
-    process = subprocess.Popen(
-        [sys.executable, "-m", "study", *arguments, "--out", str(tmp_path / "out")],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
-    for line in process.stderr:  # one model has run
-        if line.startswith("msm-mamdani: halved"):
-            break
+    out, alone = ("--out", str(tmp_path / "out")), ("--workers", "1")
+    process = begun(*arguments, *out, *alone, "--fresh", until="msm-mamdani: halved")
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)
     assert (tmp_path / ".out.state" / "msm-mamdani.npz").exists()
-    done = study(*arguments, "--out", str(tmp_path / "out"), "--resume", "--fields")
+    done = study("run", *arguments, *out, "--resume", "--set", "tool.force=0.1 N")
+    assert done.returncode == 2
+    assert "another scene (it differs in tool); run without --resume" in done.stderr
+    done = study("run", *arguments, *out, "--resume", "--fields")
     assert done.returncode == 2  # no fields were kept before the interruption
     assert "run without --resume" in done.stderr
-    done = study(*arguments, "--out", str(tmp_path / "out"), "--resume")
+    done = study("run", *arguments, *out, "--resume")
     assert done.returncode == 0, done.stderr
+    assert "kept from earlier runs" in done.stderr
     assert not (tmp_path / ".out.state").exists()
     curves = [(tmp_path / name / "curves.csv").read_text() for name in ("whole", "out")]
     assert curves[0] == curves[1]

@@ -1,5 +1,6 @@
 """Places to write: checked beforehand, claimed while they are written, whole afterwards."""
 
+import dataclasses
 import errno
 import os
 import subprocess
@@ -11,8 +12,10 @@ import pytest
 
 from study import folders, lock
 from study.folders import FolderError, claimed, replacing, write_text
-from study.results.folder import continuing
+from study.results.folder import ResultsError, continuing
+from study.scene import Scene
 
+SCENE = Scene()
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -190,7 +193,7 @@ def test_what_is_no_file_is_written_as_it_is():
 
 def test_an_interruption_says_what_is_kept_and_how_to_go_on(tmp_path, capsys):
     def interrupted(kept):
-        with continuing(tmp_path / "out", resume=False) as state:
+        with continuing(tmp_path / "out", SCENE, resume=False) as state:
             if kept:
                 (state / "msm-mamdani.npz").touch()
             (state / "msm-sugeno.frames").touch()
@@ -204,14 +207,31 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(tmp_path, capsys):
         interrupted(kept=True)
     assert "kept msm-mamdani" in ended.value.__notes__[0]
     assert "--resume goes on" in ended.value.__notes__[0]
-    with continuing(tmp_path / "out", resume=True) as state:
+    with continuing(tmp_path / "out", SCENE, resume=True) as state:
         assert (state / "msm-mamdani.npz").exists()
         (state / "msm-mamdani.npz").rename(tmp_path / "kept")
     (tmp_path / ".out.state").mkdir()
-    with continuing(tmp_path / "out", resume=False):
+    with continuing(tmp_path / "out", SCENE, resume=False):
         pass
     assert ".out.state: left by an interrupted run" in capsys.readouterr().err
     assert names(tmp_path) == ["kept"]
+
+
+def test_a_run_of_another_scene_is_not_resumed(tmp_path):
+    def go_on(scene, resume):
+        with continuing(tmp_path / "out", scene, resume=resume) as state:
+            (state / "msm-mamdani.npz").touch()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        go_on(SCENE, resume=False)
+    other = dataclasses.replace(SCENE, title="Other", models=("msm",))
+    with pytest.raises(ResultsError, match=r"another scene \(it differs in models\)"):
+        go_on(other, resume=True)
+    with pytest.raises(KeyboardInterrupt):
+        go_on(SCENE, resume=True)
+    with pytest.raises(KeyboardInterrupt):
+        go_on(other, resume=False)
 
 
 def test_what_is_put_into_a_folder_meanwhile_stays(tmp_path, capsys):

@@ -12,6 +12,8 @@ from study.mesh.kinds import MeshError, SurfaceMesh
 from study.mesh.surface import enclosed_volume
 from study.mesh.tetrahedra import boundary, volumes
 from study.mesh.tetrahedralise import tetrahedralise
+from study.stages.once import keeping_in
+from study.stages.store import Store
 from tests.mesh_samples import cube, cube_surface, ellipsoid_surface
 
 ELLIPSOID = SurfaceMesh(*ellipsoid_surface())
@@ -89,3 +91,22 @@ def test_a_missing_mesher_is_named_with_its_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "pytetwild", None)  # hidden: importing it fails
     with pytest.raises(MeshError, match=r'pytetwild.*pip install -e "\.\[surface\]"'):
         tetrahedralise(ELLIPSOID, 0.05)
+
+
+def test_a_surface_is_filled_once_for_all_runs(mesher, tmp_path):
+    """Another filling is another mesh, on which no stage of a run could be kept."""
+    surface, store = SurfaceMesh(*cube_surface()), Store(tmp_path / "store")
+    store.prepare()
+
+    def filled(width, size=0.05, **how):
+        points, tetrahedra = cube()
+        mesher((points * [1, 1, width], tetrahedra))
+        with keeping_in(store, **how):
+            return float(np.ptp(tetrahedralise(surface, size)[0].points[:, 2]))
+
+    first = filled(1.0)
+    assert filled(1.01) == first
+    assert filled(1.01, size=0.04) == pytest.approx(1.01 * first)
+    assert filled(1.015, readable=False) == pytest.approx(1.015 * first)
+    assert filled(1.0) == pytest.approx(1.015 * first)
+    assert tetrahedralise(surface, 0.05)[0].points[:, 2].max() == first

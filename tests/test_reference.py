@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import re
+from contextlib import nullcontext
 from itertools import pairwise
 
 import numpy as np
@@ -118,6 +119,16 @@ def test_many_linear_unknowns_go_through_multigrid(body, monkeypatch):
     direct = solve_static(body)
     monkeypatch.setattr(module, "FACTORED_BELOW", 0)
     assert relative(iterative(body, 1e-10)(body.load), direct) < 1e-8
+
+
+def test_multigrid_gives_the_same_bits_each_time_and_leaves_the_generator_alone(body, monkeypatch):
+    monkeypatch.setattr(module, "FACTORED_BELOW", 0)
+    before = np.random.get_state()  # noqa: NPY002 - what pyamg draws from
+    first, again = (iterative(body, 1e-3)(body.load) for _ in range(2))
+    assert first.tobytes() == again.tobytes()
+    np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # noqa: NPY002
+    monkeypatch.setattr(module, "_drawing_alike", nullcontext)  # negative control
+    assert iterative(body, 1e-3)(body.load).tobytes() != first.tobytes()
 
 
 def test_rigid_motions_cost_no_energy(body):

@@ -85,6 +85,11 @@ def numbers(count=5):
 
 def test_what_is_put_into_the_store_comes_back_bit_by_bit(store):
     arrays = {"array0": np.array([0.1, np.nan, -0.0, np.inf]), "array1": np.zeros((0, 3), np.int32)}
+    arrays |= {
+        "array2": np.array("text"),
+        "array3": np.asfortranarray(np.eye(3, 2)),
+        "a": np.eye(3)[1],
+    }
     store.put(KEY, {"a": [1, None, "text", 0.1]}, arrays, wall=2.5)
     found = store.get(KEY)
     assert (found.value, found.wall) == ({"a": [1, None, "text", 0.1]}, 2.5)
@@ -92,6 +97,7 @@ def test_what_is_put_into_the_store_comes_back_bit_by_bit(store):
     for name, array in arrays.items():
         assert found.arrays[name].dtype == array.dtype
         assert found.arrays[name].shape == array.shape
+        assert found.arrays[name].flags.f_contiguous == array.flags.f_contiguous
         assert found.arrays[name].tobytes() == array.tobytes()
     assert store.get("1" * 64) is None
 
@@ -496,7 +502,9 @@ def bits(thing):
         return [[k, bits(v)] for k, v in thing.items()]
     if isinstance(thing, tuple | list):
         return [bits(one) for one in thing]
-    return thing.tobytes() if isinstance(thing, np.ndarray) else repr(thing)
+    if isinstance(thing, np.ndarray):
+        return thing.dtype.str, thing.shape, thing.tobytes()
+    return repr(thing)
 
 
 # What is kept is what would be computed

@@ -99,7 +99,7 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
     from study.progress import on_stderr
     from study.run import unchanged
 
-    key = "" if store is None else unchanged.run_key(scene, fields=how.fields)
+    key = "" if store is None else unchanged.run_key(scene, how.folder, fields=how.fields)
     left = None if store is None or how.fresh else unchanged.left_by(store, key, how.folder, scene)
     if left is not None:
         tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")

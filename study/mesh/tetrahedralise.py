@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import chdir
 from dataclasses import replace
+from functools import partial
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -14,6 +15,8 @@ from study.mesh.kinds import MeshError, SurfaceMesh, TetrahedralMesh
 from study.mesh.quality import sliver_notes, tetrahedron_quality
 from study.mesh.surface import enclosed_volume
 from study.mesh.tetrahedra import mean_edge, volumes
+from study.stages.flat import Arrays
+from study.stages.once import made_once
 
 VOLUME_TOLERANCE = 0.02
 """Largest relative change of volume accepted from the mesher."""
@@ -29,7 +32,8 @@ def tetrahedralise(
     """Tetrahedra inside a checked surface, with edges up to about `element_size` [m]; also notes.
 
     Edges come out shorter where the surface asks for it. The mesher gives a slightly different
-    mesh every time: keep the mesh, not the surface, if a run has to be repeated exactly.
+    mesh every time; a run takes that of an earlier one from its store. Keep the mesh, not the
+    surface, if a run has to be repeated exactly elsewhere.
 
     Raises
     ------
@@ -76,6 +80,15 @@ def _diagonal(surface: SurfaceMesh) -> float:
 
 
 def _filled(surface: SurfaceMesh, element_size: float) -> Draft:
+    """As the mesher filled it before, if a run keeps that: another time it fills it otherwise."""
+    given = (surface.points, surface.triangles, element_size)
+    found = made_once("filled", partial(_fill, surface, element_size), *given, modules=(__name__,))
+    started = start_draft(found["points"], found["tetrahedra"], np.inf)
+    return replace(started, notes=())
+
+
+def _fill(surface: SurfaceMesh, element_size: float) -> Arrays:
+    """Points [m] (n, 3) and tetrahedra (m, 4) as the mesher gives them."""
     try:
         import pytetwild
     except ImportError as error:
@@ -95,8 +108,7 @@ def _filled(surface: SurfaceMesh, element_size: float) -> Draft:
         raise MeshError(f"fTetWild could not fill the surface: {error}") from error
     if not len(tetrahedra):
         raise MeshError("fTetWild found nothing inside the surface: is it closed?")
-    started = start_draft(np.asarray(points, dtype=float), tetrahedra.astype(np.int64), np.inf)
-    return replace(started, notes=())
+    return {"points": np.asarray(points, dtype=float), "tetrahedra": tetrahedra.astype(np.int64)}
 
 
 def _missing(error: ImportError) -> str:

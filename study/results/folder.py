@@ -338,7 +338,8 @@ def _check_same(state: Path, scene: Scene) -> None:
     except (OSError, ValueError):  # there is none, or a kill left half of it: each state tells
         return
     now = tomllib.loads(write_scene(scene))
-    changed = [key for key in sorted(before.keys() | now.keys()) if before.get(key) != now.get(key)]
+    moving = sorted((before.keys() | now.keys()) - {"title", "renders", "remarks"})
+    changed = [key for key in moving if before.get(key) != now.get(key)]
     if changed:
         raise ResultsError(
             f"{state}: is of a run of another scene (it differs in {', '.join(changed)}); run "

@@ -360,7 +360,8 @@ class StageRecord:
 class StudyRecord:
     """The whole of results.json but for the checksums of the other files.
 
-    `references`: names of the models that the others are compared with, in order.
+    `references`: names of the models that the others are compared with, in order; `workers`: how
+    many processes its stages ran in side by side, which their wall times bear.
     """
 
     title: str
@@ -380,4 +381,5 @@ class StudyRecord:
     control_point: ControlPoint | None = None
     budgets: tuple[ErrorBudget, ...] = ()
     stages: tuple[StageRecord, ...] = ()
+    workers: int = 1
     schema_version: int = SCHEMA_VERSION

@@ -37,6 +37,7 @@ from study.scene.file import validate, write_scene
 from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.lanes import lanes
+from study.stages.once import keeping_in
 
 SUITED, FUZZY = "scene suited to the organ", "fuzzy systems"
 NO_FUZZY = (
@@ -67,7 +68,9 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
     """
     started = time.perf_counter()
-    with lanes(means.workers, watch.progress) as side_by_side:
+    workers = 1 if scene.is_point else means.workers  # a point is moved before a process is there
+    keeping = keeping_in(means.store, readable=not means.fresh)
+    with lanes(workers, watch.progress) as side_by_side, keeping:
         stages = Stages(means, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.
@@ -80,7 +83,7 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     with watch.progress.stage("similarity"):
         results = _results(scene, fuzzy, found, made_by)
     wall = time.perf_counter() - started
-    record = replace(results.record, stages=stages.records(), study_wall_s=wall)
+    record = replace(results.record, stages=stages.records(), workers=workers, study_wall_s=wall)
     return replace(results, record=record)
 
 

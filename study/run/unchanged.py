@@ -31,10 +31,14 @@ class Left:
     has_report: bool
 
 
-def run_key(scene: Scene, *, fields: bool) -> str:
-    """SHA-256 of all that the files of a run depend on. ValueError for a file that is missing."""
+def run_key(scene: Scene, folder: Path, *, fields: bool) -> str:
+    """SHA-256 of all that the files of a run into a folder depend on, and of where that is.
+
+    ValueError for a file of the scene that is missing.
+    """
     files = [mesh_sha256(scene.organ.mesh), rule_base_sha256(scene.fuzzy.rule_base)]
-    return digest(["run", resolved(scene), files, fields, everything("reports"), machine()])
+    given = [resolved(scene), str(folder.absolute()), files, fields]
+    return digest(["run", *given, everything("reports"), machine()])
 
 
 def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:

@@ -19,6 +19,9 @@ from typing import Any
 from study.sweep.canonical import digest
 from study.sweep.program import program
 
+KEEPING = ("study.stages.flat", "study.stages.store")
+"""Modules that what is kept passes through."""
+
 
 class NotToldError(TypeError):
     """A value that has no text of its own."""
@@ -29,7 +32,7 @@ def key(stage: str, *things: object, modules: tuple[str, ...] = ()) -> str | Non
 
     `modules`: names of those that the stage runs beside the classes and functions in its values.
     """
-    found: set[str] = set(modules)
+    found: set[str] = {*modules, *KEEPING}
     try:
         told = [_told(thing, found) for thing in things]
         programs = {name: program(name) for name in sorted(found)}

@@ -195,7 +195,7 @@ def _write(path: Path, key: str, entry: Entry) -> None:
     import numpy as np
 
     text = canonical({"key": key, "value": entry.value, "wall": entry.wall, "at": entry.measured})
-    arrays = {name: np.ascontiguousarray(array) for name, array in entry.arrays.items()}
+    arrays = entry.arrays
     marks = {RECORD: np.array(text), SEAL: np.array(_seal(text, arrays))}
     with path.open("xb") as file:
         np.savez(file, allow_pickle=False, **marks, **arrays)

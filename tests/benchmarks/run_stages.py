@@ -1,0 +1,84 @@
+"""What a run takes, stage by stage: one after another, side by side, and with what was kept.
+
+    python -m tests.benchmarks.run_stages [SCENE] > reports/data/run_stages.csv
+
+takes some five minutes on two quiet cores for the built-in liver. Each case is a process of its own
+with its report, on a store that is empty at first. A stage has the wall time that its record has; a
+whole run also the processor time of all its processes, which other work on the machine touches
+least, and the largest memory of any. `load` is what the machine had to do as the case ended.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+CASES = {
+    "one after another": ("--fresh", "--workers", "1"),
+    "side by side": ("--fresh", "--workers", "2"),
+    "unchanged": (),
+    "other title": ("--set", "title=Another"),
+    "no renders": ("--set", "renders=false"),
+    "other reading": ("--set", "patient.hcv=14 kPa"),
+    "other spacing": ("--set", "lattice.spacing=9 mm"),
+}
+"""Flags by case; each of the last four is a change of the second, whose stages are kept."""
+COLUMNS = ("case", "stage", "kept", "wall_s", "processor_s", "memory_mb", "load")
+
+
+def main(scene: str) -> None:
+    """Measure all cases and write them as a table."""
+    table = csv.writer(sys.stdout, lineterminator="\n")
+    table.writerow(COLUMNS)
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["LIVER_STUDY_STORE"] = str(Path(folder) / "store")
+        for case, flags in CASES.items():
+            table.writerows(measured(case, scene, flags, Path(folder)))
+            sys.stdout.flush()
+
+
+def measured(
+    case: str, scene: str, flags: tuple[str, ...], folder: Path
+) -> Iterator[tuple[object, ...]]:
+    """Rows of a case: the whole run, then its stages but for those of a run that was not made."""
+    out = folder / ("changed" if "--set" in flags else "out")
+    command = [sys.executable, "-m", "study", "run", scene, "--out", str(out), *flags]
+    started = time.perf_counter()
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    said = process.stderr.read() if process.stderr else ""
+    _, status, used = os.wait4(process.pid, 0)
+    wall = time.perf_counter() - started
+    if status:
+        sys.exit(said)
+    spent, load = used.ru_utime + used.ru_stime, os.getloadavg()[0]
+    yield (
+        case,
+        "whole",
+        "",
+        f"{wall:.2f}",
+        f"{spent:.2f}",
+        f"{used.ru_maxrss / 1e3:.0f}",
+        f"{load:.1f}",
+    )
+    if "nothing to compute" in said:
+        return
+    record = json.loads((out / "results.json").read_text())
+    for stage in record["stages"]:
+        yield case, stage["name"], stage["kept"], f"{stage['wall_s']:.2f}", "", "", ""
+    for line in said.splitlines():
+        name, _, seconds = line.partition(": ")
+        if name in {"similarity", "results", "report"}:
+            yield case, name, False, seconds.removesuffix(" s"), "", "", ""
+
+
+if __name__ == "__main__":
+    main(*(sys.argv[1:] or ["liver"]))
