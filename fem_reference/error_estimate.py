@@ -5,6 +5,10 @@ extrapolation; three give the order too. As a grid convergence index, the estima
 a safety factor, larger where the order is assumed: Roache (1994), J. Fluids Eng. 116:405; Celik et
 al. (2008), J. Fluids Eng. 130:078001. Where three results alternate, half their range takes the
 place of the extrapolation: Stern et al. (2001), J. Fluids Eng. 123:793.
+
+Meshes that are refined where the error is are not similar, and show no order. Of them the error is
+taken to fall at least with an order that is half of what they reach, the saturation assumption:
+Bank and Smith (1993), SIAM J. Numer. Anal. 30:921.
 """
 
 from __future__ import annotations
@@ -23,6 +27,8 @@ Floats = NDArray[np.float64]
 SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
 """Where the order is assumed: of two meshes, and of three that do not converge at one in reach."""
+SAFETY_GRADED = 1.5
+"""Of graded meshes, whose order is assumed but is half of what they reach."""
 ASSUMED_ORDER = 2.0
 """Of two meshes: that of flat facets, of edges of a support, and of most user's meshes."""
 LEAST_ORDER = 1.0
@@ -66,6 +72,27 @@ def discretisation_error(
     order = min(max(shown, LEAST_ORDER), formal)
     safety = SAFETY if abs(shown - order) <= BEYOND else SAFETY_ASSUMED
     return ErrorEstimate(safety * norms[-1] / (ratio**order - 1.0), observed)
+
+
+def graded_error(
+    results: Sequence[Floats], sizes: Sequence[float], order: float, weights: Floats | None = None
+) -> ErrorEstimate:
+    """The same of meshes refined where the error is, with an `order` at which they converge.
+
+    The last change is no less than the one before leaves at that order: a change may be small by
+    chance.
+    """
+    w = np.ones(len(results[-1])) if weights is None else weights
+    whole = max(_product(results[-1], results[-1], w), TINY)
+    changes = [
+        math.sqrt(_product(fine - coarse, fine - coarse, w) / whole)
+        for coarse, fine in pairwise(results[-3:])
+    ]
+    shrunk = [(h / sizes[-1]) ** order for h in sizes[-len(changes) - 1 :]]
+    # Between meshes of errors e r and e, the results change by e (r - 1) at most.
+    left = [c / (a - b) for c, (a, b) in zip(changes, pairwise(shrunk), strict=True)]
+    safety = SAFETY_GRADED if len(left) > 1 else SAFETY_ASSUMED
+    return ErrorEstimate(safety * max(left), None)
 
 
 def _product(a: Floats, b: Floats, weights: Floats) -> float:

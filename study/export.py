@@ -23,7 +23,7 @@ from fem_reference.model import Method
 from fem_reference.solvers import solve_static
 from study.folders import replacing
 from study.mesh.kinds import TetrahedralMesh
-from study.models.finite_elements import FINER, reference_of
+from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -114,7 +114,8 @@ def _write_mesh(to: str, target: _Target, folder: Path, progress: Progress) -> N
     import meshio
 
     with progress.stage("organ"):
-        mesh = _level(problem_of(target.scene), target.elements).mesh
+        prepared = reference_of(target.scene).prepare(problem_of(target.scene))
+    mesh = _level(prepared, target.elements, progress).mesh
     file, format_ = MESHES[to]
     meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)]).write(folder / file, format_)
     _write(folder, {MARK: _about_mesh(target.scene, file, mesh)})
@@ -177,25 +178,26 @@ def _discretised(
     """The body and its problem; ValueError before it is assembled, for `steps` in time too."""
     with progress.stage("organ"):
         problem = problem_of(target.scene)
-        level = _level(problem, target.elements)
         prepared = reference_of(target.scene).prepare(problem)
         prepared.refuse()
-        if steps:
-            _check_memory(level, target.scene)
+    level = _level(prepared, target.elements, progress)
+    if steps:
+        _check_memory(level, target.scene)
     with progress.stage("assembly"):
         return prepared.body(level), problem
 
 
-def _level(problem: Problem, elements: int | None) -> Level:
+def _level(prepared: PreparedElements, elements: int | None, progress: Progress) -> Level:
     """The mesh of the scene, or the finer one that its results took for their accuracy."""
-    for k in range(FINER + 1):
-        level = problem.geometry.level(k)
-        if level is not None and elements in {None, len(level.mesh.tetrahedra)}:
-            return level
-    raise ValueError(
-        f"the results have {elements} finite elements, which this version does not make of their "
-        "scene; run it again"
-    )
+    if elements is None:
+        return prepared.own_level()
+    found = prepared.level_of(elements, progress)
+    if found is None:
+        raise ValueError(
+            f"the results have {elements} finite elements, which this version does not make of "
+            "their scene; run it again"
+        )
+    return found
 
 
 def motion_of(scene: Scene, problem: Problem) -> Transient:

@@ -19,10 +19,18 @@ from fem_reference.solvers import solve_static
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors
+from study.models.grading import is_graded, next_graded
 from study.models.keeping import recorded
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large
-from study.models.mesh_error import MeshSolution, is_too_coarse, mesh_error, next_size, why_unknown
+from study.models.mesh_error import (
+    MeshSolution,
+    is_too_coarse,
+    locks,
+    mesh_error,
+    next_size,
+    why_unknown,
+)
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
 from study.problem.contact import Foundation, ToolPatch
@@ -46,6 +54,8 @@ Floats = NDArray[np.float64]
 
 COARSER = 2
 """Meshes below that of the scene, as many as there are: three show the order of convergence."""
+GRADED = 3
+"""Graded meshes at least, for the same reason."""
 FINER = 12
 """Levels above it that an accuracy may take, if they are not too large."""
 TRUNCATION_LIMIT = 0.01
@@ -106,7 +116,7 @@ class PreparedElements:
 
     def refuse(self) -> None:
         """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
-        self._refuse(self._level())
+        self._refuse(self.own_level())
 
     def _refuse(self, level: Level) -> None:
         fem.refuse(level.mesh, *self._on(), self.model.reference.method)
@@ -117,7 +127,7 @@ class PreparedElements:
         geometry = problem.geometry
         return problem.tissue, problem.foundation, problem.tool, element, geometry.project
 
-    def _level(self) -> Level:
+    def own_level(self) -> Level:
         """That of the model. ValueError if the organ has no such."""
         found = self.problem.geometry.level(self.model.level)
         if found is None:
@@ -128,7 +138,7 @@ class PreparedElements:
 
     def body(self, level: Level | None = None) -> Body:
         """The body on a level, that of the model by default. ValueError if there is no such."""
-        found = level or self._level()
+        found = level or self.own_level()
         return fem.build(found.mesh, *self._on(), self.model.reference.method)
 
     def simulate(self, longest: float | None = None) -> Simulation:
@@ -186,8 +196,7 @@ class PreparedElements:
 
         Own steps that hold several samples are halved until it is small enough.
         """
-        levels = (*self._usable(range(-COARSER, 0)), self.problem.geometry.level(0))
-        coarsest = self.solved_on(next(filter(None, levels)), progress)
+        coarsest = self.solved_on(self.coarsest, progress)
         while True:
             half = self._halved(coarsest, progress)
             whole = coarsest.found.trajectory
@@ -203,6 +212,68 @@ class PreparedElements:
         return self.model.method(self._times).pace(problem.factor, problem.observation.times)
 
     def _solve(
+        self, coarsest: MeshSolution, progress: Progress
+    ) -> tuple[list[MeshSolution], DiscretisationError | None]:
+        """On meshes that show the error, until it is small enough."""
+        return (self._solve_graded if self._graded else self._solve_alike)(coarsest, progress)
+
+    @property
+    def _graded(self) -> bool:
+        return is_graded(self.model.reference, self.problem.geometry)
+
+    def _solve_graded(
+        self, coarsest: MeshSolution, progress: Progress
+    ) -> tuple[list[MeshSolution], DiscretisationError | None]:
+        """On meshes refined where the error is: as many elements as the scene's has, or more."""
+        asked, solved = self.model.reference.accuracy, [coarsest]
+        error: DiscretisationError | None = None
+        fewest = len(self.problem.geometry.mesh.tetrahedra)
+        while (
+            len(solved) < GRADED
+            or solved[-1].found.elements < fewest
+            or (is_too_coarse(asked, error) and not locks(self.problem, solved[-1]))
+        ):
+            with progress.stage(f"{self.model.name}: where the error is"):
+                finer = self.refined(solved[-1].level, solved[-1].body)
+            if finer is None:
+                break
+            solved.append(self.solved_on(finer, progress))
+            error = mesh_error(self.problem, solved, graded=True)
+        return solved, error
+
+    def refined(self, level: Level, body: Body) -> Level | None:
+        """The next of the graded meshes, None if it is too large; by the body on a level alone."""
+        found = next_graded(self.problem, level, body)
+        try:
+            if found is not None:
+                self._refuse(found)
+        except ValueError:  # too fine for the memory
+            return None
+        return found
+
+    def level_of(self, elements: int, progress: Progress) -> Level | None:
+        """The mesh of so many elements that a run took, found without a motion; None of others."""
+        if not self._graded:
+            levels = filter(None, map(self.problem.geometry.level, range(FINER + 1)))
+            return next((one for one in levels if len(one.mesh.tetrahedra) == elements), None)
+        level: Level | None = self.coarsest
+        while level is not None and len(level.mesh.tetrahedra) < elements:
+            with progress.stage(f"{self.model.name}: where the error is"):
+                level = self.refined(level, self.body(level))
+        return level if level is not None and len(level.mesh.tetrahedra) == elements else None
+
+    @property
+    def coarsest(self) -> Level:
+        """The first mesh that a run takes."""
+        return next(self._usable(range(-COARSER, 0)), self._level_zero)
+
+    @property
+    def _level_zero(self) -> Level:
+        found = self.problem.geometry.level(0)
+        assert found is not None  # noqa: S101 - an organ has one
+        return found
+
+    def _solve_alike(
         self, coarsest: MeshSolution, progress: Progress
     ) -> tuple[list[MeshSolution], DiscretisationError | None]:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
@@ -258,11 +329,12 @@ class PreparedElements:
     def _at_large_strain(
         self, solved: Sequence[MeshSolution], progress: Progress
     ) -> tuple[LargeStrain | None, str]:
-        """Linear beside hyperelastic rest on the scene's own mesh, where strains are large."""
+        """Linear beside hyperelastic rest, where strains are large, on a mesh like the scene's."""
         law, found = self.model.reference.large_strain, solved[-1].found
         if law == "none" or not is_large(found.largest_strain, found.largest_rotation):
             return None, ""
-        own = next(one.body for one in solved if one.level.mesh is self.problem.geometry.mesh)
+        count = len(self.problem.geometry.mesh.tetrahedra)
+        own = min(solved, key=lambda one: abs(one.found.elements - count)).body
         with progress.stage(f"{self.model.name}: {law}"):
             compared = compare(self.problem, own, law)
         if isinstance(compared, str):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_reference import model as fem
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
-from fem_reference.error_estimate import ErrorEstimate, discretisation_error
+from fem_reference.error_estimate import ErrorEstimate, discretisation_error, graded_error
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.results.records import CurveErrors, CurveOrders, DiscretisationError
@@ -34,20 +34,24 @@ class MeshSolution:
     found: fem.Solution
 
 
-def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> DiscretisationError | None:
+def mesh_error(
+    problem: Problem, solved: Sequence[MeshSolution], *, graded: bool = False
+) -> DiscretisationError | None:
     """Errors of the finest mesh by those before it; none of one mesh, or of elements that lock.
 
-    Locked elements approach a wrong solution for long, and seem to have converged. A subspace's
-    truncation is added in squares to the errors of curves.
+    `graded`: the meshes are refined where the error is, not everywhere alike. Locked elements
+    approach a wrong solution for long, and seem to have converged. A subspace's truncation is added
+    in squares to the errors of curves.
     """
     if len(solved) < 2 or locks(problem, solved[-1]):
         return None
     runs = [one.found.trajectory for one in solved]
-    field = _estimate(solved, [run.volume_field[0] for run in runs], problem.volume_rule.weights)
+    weights = problem.volume_rule.weights
+    field = _estimate(solved, [run.volume_field[0] for run in runs], graded, weights)
     by_probe, orders = {}, {}
     for i, probe in enumerate(problem.probes):
-        u = _estimate(solved, [run.displacement[:, i] for run in runs])
-        v = _estimate(solved, [run.velocity[:, i] for run in runs])
+        u = _estimate(solved, [run.displacement[:, i] for run in runs], graded)
+        v = _estimate(solved, [run.velocity[:, i] for run in runs], graded)
         errors = (math.hypot(one.error, _truncation(solved[-1])) for one in (u, v))
         by_probe[probe] = CurveErrors(
             **dict(zip(("displacement", "velocity"), errors, strict=True))
@@ -63,10 +67,15 @@ def mesh_error(problem: Problem, solved: Sequence[MeshSolution]) -> Discretisati
 
 
 def _estimate(
-    solved: Sequence[MeshSolution], results: Sequence[Floats], weights: Floats | None = None
+    solved: Sequence[MeshSolution],
+    results: Sequence[Floats],
+    graded: bool,
+    weights: Floats | None = None,
 ) -> ErrorEstimate:
-    sizes = [one.level.size for one in solved]
-    return discretisation_error(results, sizes, _formal_order(solved[-1]), weights)
+    sizes, order = [one.level.size for one in solved], _formal_order(solved[-1])
+    if graded:  # which quadratic elements make converge with twice the order of their strain
+        return graded_error(results, sizes, order - 1.0, weights)
+    return discretisation_error(results, sizes, order, weights)
 
 
 def _formal_order(solved: MeshSolution) -> float:

@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
-from study.mesh.tetrahedra import boundary, mean_edge, refined, volumes
+from study.mesh.kinds import MeshError, SurfaceMesh, TetrahedralMesh
+from study.mesh.signed_distance import SignedDistance
+from study.mesh.surface import enclosed_volume
+from study.mesh.tetrahedra import (
+    boundary,
+    mean_edge,
+    refined,
+    smallest_dihedral_angle,
+    volumes,
+)
 from study.organ import liver
 from study.organ.block import block_of_cells, cell_counts
-from study.organ.isosurface_stuffing import stuff
-from study.organ.occupancy import ImplicitBody, MeshBody, SolidShape
+from study.organ.isosurface_stuffing import SignedFunction, Stuffed, lattice_round, stuffed
+from study.organ.occupancy import ImplicitBody, MeshBody, SolidShape, SurfaceBody
 from study.organ.projection import onto_surface
 
-Projection = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Floats = NDArray[np.float64]
+Projection = Callable[[Floats], Floats]
+Levels = Callable[[int], "Level | None"]
+Cut = Callable[[TetrahedralMesh], Stuffed]
 
 FINER = 4.0 / 3.0
 """Ratio of the element sizes of a level and the next finer one, where it is free."""
@@ -28,6 +39,10 @@ REFINE_ABOVE = 1.3
 MAX_TETRAHEDRA = 60_000
 TETRAHEDRA_PER_CUBE = 12
 """Of the body-centred lattice; a block has six."""
+LOST = 0.03
+"""Share of a surface's volume that its mesh may lack or exceed; curved elements lack far less."""
+LOST_AT_MOST = 0.15
+"""The same of its coarser meshes, which only show how results converge."""
 COARSEST = 0.5
 """Largest element size over the cube root of the built-in liver's volume. There a mesh has about a
 hundred tetrahedra and four fifths of the volume; a little above, its lobes are lost, then all."""
@@ -35,10 +50,22 @@ hundred tetrahedra and four fifths of the volume; a little above, its lobes are 
 
 @dataclass(frozen=True)
 class Level:
-    """A mesh of the organ, and the size of its elements up to a factor that all levels share."""
+    """A mesh of the organ, and the size of its elements up to a factor that all levels share.
+
+    `background`: what the mesh was cut from along the surface, None where it is not cut.
+    """
 
     mesh: TetrahedralMesh
     size: float
+    background: Background | None = None
+
+
+@dataclass(frozen=True)
+class Background:
+    """A mesh round the organ, and the tetrahedron of it that each of the organ is a piece of."""
+
+    mesh: TetrahedralMesh
+    origins: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -46,8 +73,10 @@ class Geometry:
     """`mesh` for all integrals, level 0 of the finite elements; `surface`: its boundary.
 
     `level`: meshes of the same organ, finer as the number grows, or None where there is none;
-    `body`: the exact shape if it is known, else the mesh; `project`: onto its surface, if it is
-    known and curved; `volume` [m^3] of `mesh`; `notes`: what was found, repaired or assumed.
+    `cut`: cuts a background along its
+    surface, None where the meshes have none; `body`: the exact shape if it is known, else the mesh;
+    `project`: onto its surface, if it is known and curved; `volume` [m^3] of `mesh`; `notes`: what
+    was found, repaired or assumed; `is_file`: of a user's file.
     """
 
     mesh: TetrahedralMesh
@@ -57,6 +86,8 @@ class Geometry:
     volume: float
     notes: tuple[str, ...] = ()
     project: Projection | None = None
+    cut: Cut | None = None
+    is_file: bool = False
 
 
 def block(size: tuple[float, float, float], element_size: float) -> Geometry:
@@ -108,19 +139,81 @@ def built_in_liver(volume: float, element_size: float) -> Geometry:
     _check_coarseness(volume, element_size, largest)
     body = ImplicitBody(lambda points: liver.signed_function(points, volume))
     box = liver.bounding_box(volume)
-
-    @cache
-    def level(k: int) -> Level | None:
-        size = element_size / FINER**k
-        if size > largest or TETRAHEDRA_PER_CUBE * volume / size**3 > MAX_TETRAHEDRA:
-            return None
-        return Level(stuff(body.signed, *box, size), size)
-
     note = (
         f"The built-in liver ({volume * 1e3:.2f} L) is a smooth test shape with two lobes, not an "
         "anatomy; its quadratic finite elements are curved along the surface."
     )
-    return _geometry(level, body, (note,), partial(onto_surface, body.signed))
+    level = _levels(body.signed, box, volume, element_size, largest)
+    return _geometry(level, body, (note,), partial(onto_surface, body.signed), body.signed)
+
+
+def _levels(
+    signed: SignedFunction, box: tuple[Floats, Floats], volume: float, size: float, largest: float
+) -> Levels:
+    """Meshes cut from lattices of a size [m], 0, and coarser and finer ones within the limits."""
+
+    @cache
+    def level(k: int) -> Level | None:
+        edge = size / FINER**k
+        if edge > largest or TETRAHEDRA_PER_CUBE * volume / edge**3 > MAX_TETRAHEDRA:
+            return None
+        lattice = lattice_round(signed, *box, edge)
+        found = stuffed(signed, lattice)
+        return Level(found.mesh, edge, Background(lattice, found.origins))
+
+    return level
+
+
+def enclosed(surface: SurfaceMesh, element_size: float, notes: tuple[str, ...] = ()) -> Geometry:
+    """What a closed surface encloses, in elements of about `element_size` [m].
+
+    They are smaller where the organ is too thin for them. The meshes depend on the arguments alone.
+    MeshError for a surface that takes too many.
+    """
+    volume = enclosed_volume(surface.points, surface.triangles)
+    box = surface.points.min(axis=0), surface.points.max(axis=0)
+    signed, size = SignedDistance(surface), element_size
+    while True:
+        if TETRAHEDRA_PER_CUBE * volume / size**3 > MAX_TETRAHEDRA:
+            raise MeshError(_too_thin(element_size, size))
+        level = _levels(signed, box, volume, size, np.inf)
+        base = level(0)
+        if base is not None and abs(_lost(base, volume)) <= LOST:
+            break
+        size /= FINER
+
+    @cache
+    def usable(k: int) -> Level | None:
+        found = level(k)
+        return None if found is None or abs(_lost(found, volume)) > LOST_AT_MOST else found
+
+    found = _filled_note(base, size, element_size, volume)
+    body = SurfaceBody(surface)
+    return _geometry(usable, body, (*notes, found), signed.nearest, signed)
+
+
+def _lost(level: Level, volume: float) -> float:
+    """Share of a volume [m^3] that a mesh does not have."""
+    return 1.0 - float(volumes(level.mesh).sum()) / volume
+
+
+def _too_thin(asked: float, reached: float) -> str:
+    return (
+        f"organ.mesh: tetrahedra of {1e3 * asked:.3g} mm, and of {1e3 * reached:.2g} mm, change "
+        f"the volume by more than {100 * LOST:.0f} %: the surface is too thin, or crosses itself; "
+        "repair it, reduce reference.element_size, or give the organ as tetrahedra"
+    )
+
+
+def _filled_note(base: Level, size: float, asked: float, volume: float) -> str:
+    mesh = base.mesh
+    smaller = f" as {1e3 * asked:.3g} mm would change the volume more" if size < asked else ""
+    return (
+        f"{len(mesh.tetrahedra)} tetrahedra inside the surface, cut from a lattice of "
+        f"{1e3 * size:.3g} mm{smaller}: volume {-100 * _lost(base, volume):+.1f} %, smallest "
+        f"dihedral angle {smallest_dihedral_angle(mesh).min():.1f} degrees; quadratic finite "
+        "elements are curved along it."
+    )
 
 
 def from_file(
@@ -132,14 +225,15 @@ def from_file(
 ) -> Geometry:
     """The organ of a mesh file in its unit and axes, in elements of about `element_size` [m].
 
-    `pieces` "largest" drops all others. The last organs are kept, as filling a surface takes long.
+    `pieces` "largest" drops all others. The last organs are kept, as commands ask several times.
     Raises MeshError, a ValueError, for a file that cannot be used.
     """
     try:
         state = path.stat()
     except OSError:
         return _from_file(path, unit, element_size, axes, pieces, (0, 0))
-    return _from_file(path, unit, element_size, axes, pieces, (state.st_mtime_ns, state.st_size))
+    key = (state.st_mtime_ns, state.st_size)
+    return _from_file(path, unit, element_size, axes, pieces, key)
 
 
 @lru_cache(maxsize=2)
@@ -153,18 +247,13 @@ def _from_file(
 ) -> Geometry:
     from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
-    from study.mesh.tetrahedralise import tetrahedralise
 
     del state  # a file that was written anew is another key
     loaded, report = load_mesh(path, unit, axes, pieces)
     notes = (*report.notes, axes_note(axes))
     if isinstance(loaded, SurfaceMesh):
-        filled, more = tetrahedralise(loaded, element_size)
-        coarsely, _ = tetrahedralise(loaded, FINER * element_size)
-        # Each filling takes half a minute, so there are no more levels.
-        levels = {0: Level(filled, element_size), -1: Level(coarsely, FINER * element_size)}
-        return _geometry(levels.get, MeshBody(filled), (*notes, *more))
-    return _refined(loaded, element_size, notes)
+        return replace(enclosed(loaded, element_size, notes), is_file=True)
+    return replace(_refined(loaded, element_size, notes), is_file=True)
 
 
 def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]) -> Geometry:
@@ -193,14 +282,17 @@ def _can_refine(mesh: TetrahedralMesh) -> bool:
 
 
 def _geometry(
-    level: Callable[[int], Level | None],
+    level: Levels,
     body: SolidShape | None = None,
     notes: tuple[str, ...] = (),
     project: Projection | None = None,
+    signed: SignedFunction | None = None,
 ) -> Geometry:
     base = level(0)
     if base is None:
         raise ValueError("the organ has no mesh")
     mesh = base.mesh
     volume = float(volumes(mesh).sum())
-    return Geometry(mesh, level, boundary(mesh), body or MeshBody(mesh), volume, notes, project)
+    cut = None if signed is None else partial(stuffed, signed)
+    solid = body or MeshBody(mesh)
+    return Geometry(mesh, level, boundary(mesh), solid, volume, notes, project, cut)

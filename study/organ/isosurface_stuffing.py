@@ -9,12 +9,15 @@ smallest dihedral angle instead.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import TetrahedralMesh
+from study.mesh.tetrahedra import edges
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,7 +26,23 @@ SignedFunction = Callable[[Floats], Floats]
 # A node moves to a crossing nearer than this fraction of the edge (Labelle and Shewchuk, table 2).
 SNAP_LONG = 0.24999
 SNAP_SHORT = 0.41189
+TO_NEAREST = 2.0 / math.sqrt(3.0)
+"""Long edge over short edge of the lattice; a node has both."""
+LONG = 0.95
+"""Share of the long edge beyond which an edge is not short."""
 BISECTIONS = 40
+CLOSE = 1.5
+"""Lattice cubes from the shape within which a finer lattice may find more of it."""
+
+
+class Stuffed(NamedTuple):
+    """The part of a background mesh in which a shape's function is negative.
+
+    `origins` (t,): tetrahedron of the background that each one is a piece of.
+    """
+
+    mesh: TetrahedralMesh
+    origins: Ints
 
 
 def stuff(
@@ -34,12 +53,27 @@ def stuff(
     `lower`, `upper`: corners [m] of a box that holds the shape; `element_size`: cube edge [m] of
     the lattice, the longest edge of interior elements.
     """
+    return stuffed(signed, lattice_round(signed, lower, upper, element_size)).mesh
+
+
+def lattice_round(
+    signed: SignedFunction, lower: Floats, upper: Floats, element_size: float
+) -> TetrahedralMesh:
+    """The tetrahedra of a lattice over a box that hold some of the shape, or lie close to it."""
     nodes, tetrahedra = body_centred_lattice(lower, upper, element_size)
-    value = signed(nodes)
-    tetrahedra = tetrahedra[(value[tetrahedra] < 0).any(axis=1)]
-    nodes, value = _snap(signed, nodes, value, tetrahedra, element_size)
-    points, pieces = _cut(signed, nodes, value, tetrahedra)
-    return _compact(points, _largest_component(len(points), _orient(points, pieces)))
+    close = (signed(nodes)[tetrahedra] < CLOSE * element_size).any(axis=1)
+    return _compact(nodes, tetrahedra[close])
+
+
+def stuffed(signed: SignedFunction, background: TetrahedralMesh) -> Stuffed:
+    """Tetrahedra of `signed(points) < 0` in a mesh that is cut along the surface."""
+    value = signed(background.points)
+    inner = np.flatnonzero((value[background.tetrahedra] < 0).any(axis=1))
+    tetrahedra = background.tetrahedra[inner]
+    nodes, value = _snap(signed, background.points, value, tetrahedra)
+    points, pieces, origins = _cut(signed, nodes, value, tetrahedra)
+    kept = _largest_component(len(points), pieces)
+    return Stuffed(_compact(points, _orient(points, pieces)[kept]), inner[origins[kept]])
 
 
 def body_centred_lattice(lower: Floats, upper: Floats, size: float) -> tuple[Floats, Ints]:
@@ -63,11 +97,6 @@ def _tetrahedra_across(corner: Ints, centre: Ints, axis: int) -> Ints:
     return np.concatenate([np.stack([a, b, ring[i], ring[(i + 1) % 4]], axis=1) for i in range(4)])
 
 
-def _edges(tetrahedra: Ints) -> Ints:
-    pairs = tetrahedra[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]].reshape(-1, 2)
-    return np.unique(np.sort(pairs, axis=1), axis=0)
-
-
 def _crossing(signed: SignedFunction, inside: Floats, outside: Floats) -> Floats:
     """Point where each segment meets the surface, by bisection."""
     low, high = np.zeros(len(inside)), np.ones(len(inside))
@@ -80,39 +109,54 @@ def _crossing(signed: SignedFunction, inside: Floats, outside: Floats) -> Floats
 
 def _cut_edges(value: Floats, tetrahedra: Ints) -> Ints:
     """Edges that cross the surface, the inner node first."""
-    edges = _edges(tetrahedra)
-    sign = np.sign(value[edges])
-    edges = edges[sign[:, 0] * sign[:, 1] < 0]
-    return np.where(value[edges[:, :1]] < 0, edges, edges[:, ::-1])
+    crossed = edges(tetrahedra)
+    sign = np.sign(value[crossed])
+    crossed = crossed[sign[:, 0] * sign[:, 1] < 0]
+    return np.where(value[crossed[:, :1]] < 0, crossed, crossed[:, ::-1])
 
 
 def _snap(
-    signed: SignedFunction, nodes: Floats, value: Floats, tetrahedra: Ints, size: float
+    signed: SignedFunction, nodes: Floats, value: Floats, tetrahedra: Ints
 ) -> tuple[Floats, Floats]:
     """Move each node that lies close to a crossing onto the nearest one; its value becomes zero."""
-    edges = _cut_edges(value, tetrahedra)
-    ends = nodes[edges]
+    crossed = _cut_edges(value, tetrahedra)
+    ends = nodes[crossed]
     points = _crossing(signed, ends[:, 0], ends[:, 1])
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    limit = np.where(length > 0.95 * size, SNAP_LONG, SNAP_SHORT) * length
+    limit = _snapping_distance(nodes, tetrahedra, crossed)
     distance = np.linalg.norm(ends - points[:, None], axis=2)
-    near, side = np.nonzero(distance < limit[:, None])
+    near, side = np.nonzero(distance < limit)
     order = np.argsort(-distance[near, side], kind="stable")  # the nearest crossing writes last
     near, side = near[order], side[order]
     moved, zeroed = nodes.copy(), value.copy()
-    moved[edges[near, side]] = points[near]
-    zeroed[edges[near, side]] = 0.0
+    moved[crossed[near, side]] = points[near]
+    zeroed[crossed[near, side]] = 0.0
     return moved, zeroed
+
+
+def _snapping_distance(nodes: Floats, tetrahedra: Ints, some: Ints) -> Floats:
+    """How far [m] either end (e, 2) of some edges may move along it.
+
+    Where the lattice is graded, no farther than along an edge to the node's nearest neighbour.
+    """
+    every = edges(tetrahedra)
+    length = np.linalg.norm(nodes[every[:, 1]] - nodes[every[:, 0]], axis=1)
+    nearest = np.full(len(nodes), np.inf)
+    np.minimum.at(nearest, every, length[:, None])
+    own = np.linalg.norm(nodes[some[:, 1]] - nodes[some[:, 0]], axis=1)[:, None]
+    short = own < LONG * TO_NEAREST * nearest[some]
+    reach = np.minimum(own, np.where(short, 1.0, TO_NEAREST) * nearest[some])
+    return np.asarray(np.where(short, SNAP_SHORT, SNAP_LONG) * reach)
 
 
 def _cut(
     signed: SignedFunction, nodes: Floats, value: Floats, tetrahedra: Ints
-) -> tuple[Floats, Ints]:
-    """Points with the crossings appended, and the inner parts of all tetrahedra."""
-    tetrahedra = tetrahedra[(value[tetrahedra] < 0).any(axis=1)]
-    edges = _cut_edges(value, tetrahedra)
-    crossings = _crossing(signed, nodes[edges[:, 0]], nodes[edges[:, 1]])
-    key = np.sort(edges, axis=1) @ np.array([len(nodes), 1])
+) -> tuple[Floats, Ints, Ints]:
+    """Points with the crossings appended, the inner parts of all tetrahedra, and of which each."""
+    held = np.flatnonzero((value[tetrahedra] < 0).any(axis=1))
+    tetrahedra = tetrahedra[held]
+    crossed = _cut_edges(value, tetrahedra)
+    crossings = _crossing(signed, nodes[crossed[:, 0]], nodes[crossed[:, 1]])
+    key = np.sort(crossed, axis=1) @ np.array([len(nodes), 1])
     order = np.argsort(key)
 
     def cut(a: Ints, b: Ints) -> Ints:
@@ -125,8 +169,13 @@ def _cut(
     inside = (value[vertex] < 0).sum(axis=1)
     outside = (value[vertex] > 0).sum(axis=1)
 
-    def group(n_inside: int, n_outside: int) -> Ints:
-        return np.asarray(vertex[(inside == n_inside) & (outside == n_outside)].T)
+    origins = [held[outside == 0]]
+
+    def group(n_inside: int, n_outside: int, count: int = 1) -> Ints:
+        """Vertices of the tetrahedra so cut, each of which leaves `count` pieces."""
+        chosen = (inside == n_inside) & (outside == n_outside)
+        origins.append(np.tile(held[chosen], count))
+        return np.asarray(vertex[chosen].T)
 
     pieces = [vertex[outside == 0]]
     a, b, c, d = group(1, 3)
@@ -135,14 +184,14 @@ def _cut(
     pieces.append(np.stack([a, z, cut(a, c), cut(a, d)], axis=1))
     a, z, y, d = group(1, 1)
     pieces.append(np.stack([a, z, y, cut(a, d)], axis=1))
-    a, b, z, d = group(2, 1)
+    a, b, z, d = group(2, 1, 2)
     pieces.append(_split_pyramids(np.stack([a, b, cut(b, d), cut(a, d)], axis=1), z))
-    a, b, c, d = group(2, 2)
+    a, b, c, d = group(2, 2, 3)
     wedge = np.stack([a, cut(a, c), cut(a, d), b, cut(b, c), cut(b, d)], axis=1)
     pieces.append(_split_prisms(wedge))
-    a, b, c, d = group(3, 1)
+    a, b, c, d = group(3, 1, 3)
     pieces.append(_split_prisms(np.stack([a, b, c, cut(a, d), cut(b, d), cut(c, d)], axis=1)))
-    return np.concatenate([nodes, crossings]), np.concatenate(pieces)
+    return np.concatenate([nodes, crossings]), np.concatenate(pieces), np.concatenate(origins)
 
 
 def _split_pyramids(base: Ints, apex: Ints) -> Ints:
@@ -187,7 +236,7 @@ def _orient(points: Floats, tetrahedra: Ints) -> Ints:
 
 
 def _largest_component(node_count: int, tetrahedra: Ints) -> Ints:
-    """Drop crumbs that the lattice cuts off where the shape is thinner than an element."""
+    """Numbers of all tetrahedra but the crumbs of a shape thinner than an element."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -195,7 +244,7 @@ def _largest_component(node_count: int, tetrahedra: Ints) -> Ints:
     links = (np.ones(first.size), (first, tetrahedra[:, 1:].ravel()))
     graph = coo_array(links, shape=(node_count, node_count))
     label = connected_components(graph, directed=False)[1][tetrahedra[:, 0]]
-    return np.asarray(tetrahedra[label == np.bincount(label).argmax()])
+    return np.flatnonzero(label == np.bincount(label, minlength=1).argmax())
 
 
 def _compact(points: Floats, tetrahedra: Ints) -> TetrahedralMesh:

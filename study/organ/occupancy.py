@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from study.mesh.kinds import TetrahedralMesh
+from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -52,6 +52,52 @@ class MeshBody:
         step = np.array([axis[1] - axis[0] if axis.size > 1 else 1.0 for axis in (x, y, z)])
         _rasterise(self.mesh.points, self.mesh.tetrahedra, origin, step, inside)
         return inside
+
+
+@dataclass(frozen=True)
+class SurfaceBody:
+    """What a closed surface encloses whose triangles face outwards, by the turns round a point.
+
+    Counted along z: a triangle met from outside counts one, from inside less one.
+    """
+
+    surface: SurfaceMesh
+
+    def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
+        """See SolidShape."""
+        turns = np.zeros((x.size, y.size, z.size + 1), dtype=np.int32)
+        _count_crossings(self.surface.points[self.surface.triangles], x, y, z, turns)
+        return np.asarray(turns.cumsum(axis=2)[:, :, :-1] > 0)
+
+
+@numba.njit(cache=True)
+def _count_crossings(
+    triangles: Floats, x: Floats, y: Floats, z: Floats, turns: NDArray[np.int32]
+) -> None:
+    """Add the turn of each triangle to the first grid point beyond it on every line along z.
+
+    A line through an edge meets one of its two triangles, as both cross the edge at the same place
+    in floating point and it counts at its lower end only.
+    """
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if area == 0.0:
+            continue
+        first, last = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        for j in range(np.searchsorted(y, first), np.searchsorted(y, last)):
+            from_, to = np.inf, -np.inf
+            for p, q in ((a, b), (b, c), (c, a)):
+                low, high = (p, q) if p[1] < q[1] else (q, p)
+                if low[1] <= y[j] < high[1]:
+                    share = (y[j] - low[1]) / (high[1] - low[1])
+                    at = low[0] + share * (high[0] - low[0])
+                    from_, to = min(from_, at), max(to, at)
+            for i in range(np.searchsorted(x, from_), np.searchsorted(x, to)):
+                u = ((x[i] - a[0]) * (c[1] - a[1]) - (y[j] - a[1]) * (c[0] - a[0])) / area
+                v = ((b[0] - a[0]) * (y[j] - a[1]) - (b[1] - a[1]) * (x[i] - a[0])) / area
+                height = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2])
+                turns[i, j, np.searchsorted(z, height)] += 1 if area < 0.0 else -1
 
 
 @numba.njit(cache=True)

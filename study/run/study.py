@@ -37,7 +37,6 @@ from study.scene.file import validate, write_scene
 from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.lanes import lanes
-from study.stages.once import keeping_in
 
 SUITED, FUZZY = "scene suited to the organ", "fuzzy systems"
 NO_FUZZY = (
@@ -69,8 +68,7 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     """
     started = time.perf_counter()
     workers = 1 if scene.is_point else means.workers  # a point is moved before a process is there
-    keeping = keeping_in(means.store, readable=not means.fresh)
-    with lanes(workers, watch.progress) as side_by_side, keeping:
+    with lanes(workers, watch.progress) as side_by_side:
         stages = Stages(means, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.

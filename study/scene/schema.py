@@ -216,6 +216,7 @@ class Reference:
     element: ElementName = "auto"
     element_size: Length = 0.017
     accuracy: Annotated[float, Quantity("", 1e-4, 1.0)] | None = None
+    refinement: Literal["auto", "uniform", "graded"] = "auto"
     method: MethodName = "ritz-vectors"
     modes: Annotated[int, Quantity("", 1, 1000)] = 100
     steps_per_sample: Annotated[int, Quantity("", 1, 100)] | None = None

@@ -1,0 +1,117 @@
+"""Where a solution is wrong: its strain beside a smoother one recovered from it.
+
+The strain of finite elements jumps between them; its projection on the continuous shape functions
+is nearer to the exact one, and the difference of the two stands for the error: Zienkiewicz and Zhu
+(1987), Int. J. Numer. Methods Eng. 24:337. The error of a goal, a linear functional of the
+displacement, is the product in energy of the errors of the solution and of that under the
+functional as a load: Becker and Rannacher (2001), Acta Numerica 10:1. Estimates, no bounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import skfem
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import cg
+from skfem.models.elasticity import lame_parameters
+
+from fem_reference.elasticity import Body, rows
+from fem_reference.grid import Projection
+from fem_reference.solvers import solver
+from study.problem.tissue import Tissue
+
+Floats = NDArray[np.float64]
+
+PROJECTED = 1e-4
+"""Residual of the projection, which stands for an error that is itself known to some per cent."""
+LOOSE = 1e-4
+"""Residual of dual solutions, likewise."""
+GAP_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """Strain of a displacement (3, 3, cells, q), and what a smoother one has more than it."""
+
+    strain: Floats
+    error: Floats
+
+
+def recovered(body: Body, u: Floats) -> Recovered:
+    """Strain of a displacement u [m] (n,) and its error, at the integration points."""
+    basis = body.nodes
+    gradient = np.stack([np.asarray(basis.interpolate(u[d::3]).grad) for d in range(3)])
+    strain = 0.5 * (gradient + gradient.swapaxes(0, 1))
+    project, error = _projection(body), np.empty_like(strain)
+    for i, j in zip(*np.triu_indices(3), strict=True):
+        smooth = np.asarray(basis.interpolate(project(strain[i, j])))
+        error[i, j] = error[j, i] = smooth - strain[i, j]
+    return Recovered(strain, error)
+
+
+def goal_errors(
+    body: Body, tissue: Tissue, u: Floats, goal: Floats, project: Projection | None = None
+) -> Floats:
+    """Share of each cell (cells,) in the error of goal @ u, relative to it; its sum exceeds it.
+
+    `u` [m] (n,): at rest under the body's load; `goal` (n,). With `project`, onto the surface, also
+    by the gap that the cells leave to it: its volume times the mean density of energy of solution
+    and dual one, as where the surface of a body is moved.
+    """
+    dual = solver(body, LOOSE)(goal)
+    a, b = recovered(body, u), recovered(body, dual)
+    by_strain = _mixed_energy(body, tissue, a.error, b.error)
+    by_shape = _gaps(body, project) * _mixed_energy(body, tissue, a.strain, b.strain)
+    return (by_strain + by_shape) / abs(float(goal @ u))
+
+
+def _mixed_energy(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
+    """Bound of the energy product [J] of two strains in each cell, by those of each."""
+    both = (energy_products(body, tissue, one, one) for one in (a, b))
+    return np.asarray(np.sqrt(np.prod(list(both), axis=0)))
+
+
+def _gaps(body: Body, project: Projection | None) -> Floats:
+    """Volume between each cell's facets and the surface, over that of the cell (cells,)."""
+    basis = body.nodes
+    gaps = np.zeros(basis.mesh.nelements)
+    if project is None:
+        return gaps
+    facets = skfem.FacetBasis(basis.mesh, basis.elem, basis.mapping, intorder=GAP_ORDER)
+    points = np.ascontiguousarray(rows(facets.global_coordinates())).reshape(-1, 3)
+    off = np.linalg.norm(project(points) - points, axis=1).reshape(facets.dx.shape)
+    np.add.at(gaps, basis.mesh.f2t[0, facets.find], (off * facets.dx).sum(axis=1))
+    return np.asarray(gaps / basis.dx.sum(axis=1))
+
+
+def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
+    """Integral of stress times strain [J] over each cell (cells,), of two strains (3, 3, cells, q).
+
+    With a pressure of its own the volume's part is left out: it is found as well as the shear, and
+    would drown in rounding.
+    """
+    lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
+    density = 2.0 * mu * np.einsum("ijcq,ijcq->cq", a, b)
+    if body.stiffness.pressure is None:
+        density += lame * np.einsum("iicq,jjcq->cq", a, b)
+    return np.asarray((density * body.nodes.dx).sum(axis=1))
+
+
+def _projection(body: Body) -> Any:
+    """From values (cells, q) at the integration points to nodal values, least squares in volume."""
+    basis, mass = body.nodes, csr_array(body.mass[::3, ::3])
+    weights = basis.dx * (mass.sum() / basis.dx.sum())
+    shapes = [np.asarray(basis.basis[k][0]) for k in range(basis.Nbfun)]
+    scale = diags_array(1.0 / mass.diagonal())
+
+    def project(values: Floats) -> Floats:
+        right = np.zeros(basis.N)
+        for dofs, shape in zip(basis.element_dofs, shapes, strict=True):
+            right += np.bincount(dofs, (values * shape * weights).sum(axis=1), basis.N)
+        return np.asarray(cg(mass, right, M=scale, rtol=PROJECTED)[0])
+
+    return project

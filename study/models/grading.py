@@ -1,0 +1,54 @@
+"""Meshes of the reference that are finer where the error of the control points comes from."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.elasticity import Body
+from fem_reference.elements import ELEMENTS
+from fem_reference.observation import at_points, evaluation
+from fem_reference.recovery import goal_errors
+from fem_reference.solvers import solve_static
+from study.organ.geometry import MAX_TETRAHEDRA, Geometry, Level
+from study.organ.grading import graded
+from study.problem.problem import Problem
+from study.scene import Reference
+
+Floats = NDArray[np.float64]
+
+GROWTH = 4.0
+"""Elements of a mesh over those of the one before."""
+LEAST_GROWTH = 1.4
+"""By less, two meshes are too alike to show the error."""
+
+
+def is_graded(reference: Reference, geometry: Geometry) -> bool:
+    """Whether meshes are finer where the error is: `auto` grades those of a mesh file."""
+    if reference.refinement == "auto":
+        return geometry.is_file
+    return reference.refinement == "graded"
+
+
+def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
+    """A mesh of more elements, where the control points at rest need them; None if too large."""
+    count = len(level.mesh.tetrahedra)
+    growth = min(GROWTH, 0.9 * MAX_TETRAHEDRA / count)
+    if growth < LEAST_GROWTH:
+        return None
+    errors = probe_errors(problem, body)
+    order = 2.0 * (ELEMENTS[body.element].formal_order - 1.0)
+    return graded(problem.geometry, level, errors, order, growth)
+
+
+def probe_errors(problem: Problem, body: Body) -> Floats:
+    """Share of each cell (cells,) in the relative errors of all control points at rest."""
+    u = solve_static(body)
+    at_probes = evaluation(body, problem.observation.probes)
+    found = np.zeros(len(body.mesh.tetrahedra))
+    for row, moved in zip(at_probes, at_points(at_probes, u), strict=True):
+        if moved.any():
+            goal = np.outer(row.toarray().ravel(), moved / np.linalg.norm(moved)).ravel()
+            where = (body, problem.tissue, u, goal, problem.geometry.project)
+            found += goal_errors(*where)
+    return found
