@@ -3,8 +3,8 @@
 The difference of a lattice and the same lattice linear about rest, both by the same steps of the
 same integrator. What the two have in common cancels: the error of the steps, of the cells that cut
 the surface, of the load spread over few nodes. What is left is small and smooth, so that a coarse
-lattice shows it: its error falls about with the spacing to the power ORDER, and a somewhat finer
-lattice tells how large it is.
+lattice shows it: its error falls about with the spacing to the power ORDER, and a lattice
+of half the spacing tells how large it is.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ Ints = NDArray[np.int64]
 
 ORDER = 1.5
 """Assumed of the remainder's error in the spacing; cells that are cut keep it from 2."""
-FINER = 2.0 / 3.0
+FINER = 0.5
 """Spacing of the lattice that tells the error, times that of the one whose error it tells.
 
 A coarser one would be cheaper, but where neither shows the strain under the tool both miss the same
-and seem to agree: at 40 and 20 mm under a tool of 15 or 25 mm the error is up to 14 times what they
-tell (`tests.benchmarks.corrected_places`).
+and seem to agree; one of two thirds differs too little beside the chance of how cells lie
+(`reports/data/corrected_places.csv` has both).
 """
 KEPT = 0.75
 """Share of the vectors that is left when their last ones are left out to see what they do."""
@@ -47,7 +47,7 @@ class Remainder:
 
     `trajectory` is the difference, not a number from where the lattice diverged. `lattice`: run of
     the lattice; `nodal` (samples, 2, n, 3): difference of displacement [m] and velocity [m/s] at
-    its nodes, in single precision.
+    its nodes, in single precision, of no samples where it was not kept.
     """
 
     trajectory: Trajectory
@@ -86,14 +86,17 @@ class PreparedRemainder:
         damping, integrator = one.springs.material.damping, one.model.lattice.integrator
         return ReducedMotion(lattice, damping, one.problem.factor, integrator)
 
-    def run(self, step: Step, advance: Advance = lambda _: None) -> Remainder:
+    def run(
+        self, step: Step, advance: Advance = lambda _: None, *, keep_nodes: bool = False
+    ) -> Remainder:
         """The motion of the lattice by steps of its own choice, less that of the linear one."""
         one, problem = self.lattice, self.lattice.problem
-        samples, size = len(problem.observation.times), one.assembly.load.shape
+        samples, size = len(problem.observation.times) * keep_nodes, one.assembly.load.shape
         nodal = np.full((samples, 2, *size), np.nan, np.float32)
 
         def keep(sample: int, u: Floats, v: Floats) -> None:
-            nodal[sample] = u, v
+            if keep_nodes:
+                nodal[sample] = u, v
 
         found = msm.run(
             one.assembly,
@@ -111,7 +114,7 @@ class PreparedRemainder:
     def _beyond_linear(self, found: msm.Run, nodal: NDArray[np.float32]) -> Remainder:
         linear = self.linear()
         moved = self._moved(linear, found.substeps)
-        for sample, both in enumerate(zip(*moved, strict=True)):
+        for sample, both in zip(range(len(nodal)), zip(*moved, strict=True), strict=False):
             nodal[sample] -= [linear.displacement(y) for y in both]
         trajectory = plus(found.trajectory, self._seen(linear, *moved), -1.0)
         truncation = self._truncation(linear, moved[0], found)

@@ -7,6 +7,9 @@ rate alone the most accurate that keeps up is recommended, for an error the chea
 it. A promise is the fit with its spread, the reference's own error and what the precision adds; the
 recommended configuration is then run and timed afresh, and the next one taken where it does not
 keep up after all.
+
+Where the place of the load is known beforehand, corrected lattices are chosen from too. There are
+few, and each promises what a run of it was off by, or the reference's own error if that is more.
 """
 
 from __future__ import annotations
@@ -46,7 +49,10 @@ ELEMENTS = 0.75
 SPREAD = 2.8
 """Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
 FEWEST = 3
-SINGLE = "single"
+DOUBLE, SINGLE = "double", "single"
+BESIDE = (2.0, 1.5, 1.0)
+"""Spacings of corrected lattices, times that of the scene."""
+CORRECTED = "corrected"
 
 
 @dataclass(frozen=True)
@@ -68,13 +74,22 @@ class Promise:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A spacing [m] with what it is expected to give; `frame`: at the rate, if one is demanded."""
+    """A configuration, and what it is expected to give; `frame`: at the rate, if one is demanded."""
 
-    spacing: float
+    configuration: Configuration
     promise: Promise
     cost: Cost
     frame: Frame | None
-    precision: str = "double"
+
+    @property
+    def spacing(self) -> float:
+        """Of its lattice [m]."""
+        return float(self.configuration.settings["spacing"])
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether it follows one place of the load only."""
+        return self.configuration.contender == CORRECTED
 
     @property
     def wall_per_second(self) -> float:
@@ -99,9 +114,18 @@ class Recommended:
 
 
 def recommend(
-    scene: Scene, wanted: Demand, store: Store, how: How, progress: Progress
+    scene: Scene,
+    wanted: Demand,
+    store: Store,
+    how: How,
+    progress: Progress,
+    *,
+    known_place: bool = False,
 ) -> Recommended:
-    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified."""
+    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified.
+
+    With `known_place` also among the lattices that follow one place of the load.
+    """
     coarser = judged_by(scene)
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
     tried = [_configuration(scene, h) for h in spacings]
@@ -110,11 +134,13 @@ def recommend(
     given = stated(**arguments(coarser))
     known = reference.truth(solved.value or {}, given)
     found = [errors(outcome, known, given) for outcome in outcomes[: len(spacings)]]
-    added = {"double": 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
+    added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
     kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
     every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
     candidates = _candidates(given, every, curve, added, wanted, progress)
+    if known_place:
+        candidates += _corrected(given, known, wanted, store, how, progress)
     return _verified(given, known, candidates, wanted, store, how, progress)
 
 
@@ -156,7 +182,7 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
     )
 
 
-def _configuration(scene: Scene, spacing: float, precision: str = "double") -> Configuration:
+def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Configuration:
     lacks = lacks_poisson_ratio(scene)
     settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": FRACTION}
     if precision == SINGLE:
@@ -190,16 +216,37 @@ def _candidates(
     progress: Progress,
 ) -> list[Candidate]:
     """All spacings in each precision, which adds so much to the error, timed in turns."""
-    chosen = [(h, precision) for h in spacings for precision in added]
-    costs = _costs(given, chosen, progress)
+    pairs = [(h, precision) for h in spacings for precision in added]
+    chosen = [_configuration(given.scene, *pair) for pair in pairs]
     return [
-        Candidate(h, fit.promise(h, added[precision]), cost, _frame(cost, wanted), precision)
-        for (h, precision), cost in zip(chosen, costs, strict=True)
+        Candidate(one, fit.promise(h, added[precision]), cost, _frame(cost, wanted))
+        for one, (h, precision), cost in zip(
+            chosen, pairs, _costs(given, chosen, progress), strict=True
+        )
     ]
 
 
-def _costs(given: Stated, settings: Sequence[tuple[float, str]], progress: Progress) -> list[Cost]:
-    chosen = [_configuration(given.scene, *one) for one in settings]
+def _corrected(
+    given: Stated, known: Truth, wanted: Demand, store: Store, how: How, progress: Progress
+) -> list[Candidate]:
+    """Corrected lattices on the mesh of the scene that is judged by, run and timed in turns."""
+    spacings = [tidy(times * given.scene.lattice.spacing) for times in BESIDE]
+    chosen = [Configuration(CORRECTED, {"spacing": h, "step_fraction": FRACTION}) for h in spacings]
+    _, *outcomes = study.solved(given.scene, chosen, store, how)
+    found = [errors(one, known, given) for one in outcomes]
+    return [
+        Candidate(one, _as_measured(error, known.field_error), cost, _frame(cost, wanted))
+        for one, error, cost in zip(chosen, found, _costs(given, chosen, progress), strict=True)
+        if error.status in {"resolved", "not resolved"}
+    ]
+
+
+def _as_measured(found: Errors, own: float) -> Promise:
+    """What a run was off by, with the reference's own error; that alone if it hides the other."""
+    return Promise(found.field or 0.0, own)
+
+
+def _costs(given: Stated, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
     longest = [float("inf")] * len(chosen)  # that at rest is less
     return study.costs(given, chosen, longest, QUICK_REPEATS, progress)
 
@@ -233,10 +280,9 @@ def _verified(
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     chosen = best(candidates, wanted)
-    configuration = _configuration(given.scene, chosen.spacing, chosen.precision)
-    (_, outcome) = study.solved(given.scene, [configuration], store, how)
+    (_, outcome) = study.solved(given.scene, [chosen.configuration], store, how)
     measured = errors(outcome, known, given)
-    (cost,) = _costs(given, [(chosen.spacing, chosen.precision)], progress)
+    (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
     again = _frame(cost, wanted)
@@ -254,12 +300,21 @@ def recommended_scene(scene: Scene, found: Recommended) -> str:
 
     It names the model that was measured, springs of the tissue's own modulus, and the reference.
     """
-    one = found.candidate
-    chosen = _configuration(scene, one.spacing, one.precision).model(scene)
-    assert isinstance(chosen, LatticeModel)  # noqa: S101 - lattices only are recommended
+    head, one = "".join(f"# {line}\n" for line in lines(found)), found.candidate
+    if one.is_corrected:
+        return head + "\n" + write_scene(_with_corrected(scene, one.spacing))
+    chosen = one.configuration.model(scene)
+    assert isinstance(chosen, LatticeModel)  # noqa: S101 - what is not corrected is a lattice
     models = tuple(dict.fromkeys(("fem", *scene.models, "tissue")))
-    head = "".join(f"# {line}\n" for line in lines(found))
     return head + "\n" + write_scene(replace(scene, models=models, lattice=chosen.lattice))
+
+
+def _with_corrected(scene: Scene, spacing: float) -> Scene:
+    """The scene with a corrected lattice of a spacing [m]; the elements are its reference's."""
+    own = replace(scene.lattice, step_fraction=FRACTION, time_step=None, step_rate=None)
+    models = tuple(dict.fromkeys(("fem", *scene.models, "corrected")))
+    corrected = replace(scene.corrected, spacing=spacing)
+    return replace(scene, models=models, lattice=own, corrected=corrected)
 
 
 def lines(found: Recommended) -> list[str]:
@@ -277,8 +332,9 @@ def lines(found: Recommended) -> list[str]:
     if measured.field is not None:
         verdict = ", as promised" if promise.holds(measured.field) else ", not as promised"
     text = [
-        f"lattice of {1e3 * one.spacing:.3g} mm, explicit, in {one.precision} precision, "
-        f"{FRACTION:g} of the critical step",
+        f"{'corrected ' * one.is_corrected}lattice of {1e3 * one.spacing:.3g} mm, explicit, in "
+        f"{one.configuration.settings.get('precision', DOUBLE)} precision, {FRACTION:g} of the "
+        "critical step",
         f"field error promised {100 * promise.error:.1f} +- {100 * promise.bar:.1f} %, measured "
         f"{error}" + verdict,
     ]
@@ -289,6 +345,11 @@ def lines(found: Recommended) -> list[str]:
             + ("" if slow is None else f", 95 % of them within {1e3 * slow:.3g} ms")
         )
     text.append(f"{found.wall_per_second:.3g} s of wall per simulated second on this machine")
+    if one.is_corrected:
+        text.append(
+            "It follows this place of the load only. The error is that against linear elements: "
+            "what geometry changes, which the model has, counts as error."
+        )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
         "fuzzy estimate have its error on top."
