@@ -7,10 +7,11 @@ compiler for the first part. Each figure is the least of several repeats, which 
 machine disturb least, and their median. What is compared is measured in turns. Steps are those of a
 run, over the grid; springs alone and the orders of nodes are measured over the list of springs.
 
-A step on two threads, each with its half of the nodes, was tried and left out. It starts threads
-three times a step, each 7 us with OpenMP and 50 us with numba's own queue, of 150 us at 2500 nodes;
-with another process on the second core a step took 1.2 to 1.3 times as long as on one thread. An
-idle second core was not to be had. It is put to better use by another run.
+A step on two threads, each with its half of the nodes, was tried over the list of springs and left
+out. It starts threads three times a step, each 7 us with OpenMP and 50 us with numba's own queue,
+of 150 us at 2500 nodes, and of 56 us over the grid; with another process on the second core a step
+took 1.2 to 1.3 times as long as on one thread. An idle second core was not to be had. It is put to
+better use by another run.
 """
 
 from __future__ import annotations
