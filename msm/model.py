@@ -164,7 +164,8 @@ def refuse(
     """ValueError for all that `run` refuses but checkpoints, without a step taken."""
     refuse_unfit(integrator, material)
     net = arrays(assembly, material, linear=linear)
-    grid_for(assembly.lattice, net, integrator, single=single)
+    if single:  # else there is nothing to refuse, and a grid takes a while
+        grid_for(assembly.lattice, net, integrator, single=True)
     follower = Follower(material.law, net, INTEGRATORS[integrator])
     _pace(step, observation, follower.limit(np.zeros_like(net.load)))
 

@@ -309,7 +309,7 @@ class PreparedElements:
 
     def solved_on(self, level: Level | None, progress: Progress) -> MeshSolution:
         """Body and motion on one of the organ's meshes, None for that of the model."""
-        level = level or self._level()
+        level = level or self.own_level()
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
             body = self.body(level)

@@ -100,26 +100,36 @@ def _count_crossings(
                 turns[i, j, np.searchsorted(z, height)] += 1 if area < 0.0 else -1
 
 
-@numba.njit(cache=True)
 def _rasterise(
     points: Floats, tetrahedra: NDArray[np.int64], origin: Floats, step: Floats, inside: Booleans
 ) -> None:
     """Mark the grid points of each tetrahedron by their barycentric coordinates."""
+    corners = points[tetrahedra]
+    low = np.ceil((corners.min(axis=1) - origin) / step)
+    high = np.floor((corners.max(axis=1) - origin) / step)
+    first = np.maximum(low, 0).astype(np.int64)
+    end = np.minimum(high, np.array(inside.shape) - 1).astype(np.int64) + 1
+    _mark(corners, first, end, origin, step, inside)
+
+
+@numba.njit(cache=True)
+def _mark(
+    corners: Floats,
+    first: NDArray[np.int64],
+    end: NDArray[np.int64],
+    origin: Floats,
+    step: Floats,
+    inside: Booleans,
+) -> None:
+    """Mark those from the first to before the end (t, 3) that are in tetrahedra (t, 4, 3)."""
     tolerance = -1e-12
-    first = np.empty(3, np.int64)
-    last = np.empty(3, np.int64)
     rows = np.empty((3, 3))
-    for t in range(tetrahedra.shape[0]):
-        corner = points[tetrahedra[t]]
+    for t in range(corners.shape[0]):
+        corner = corners[t]
         _barycentric_rows(corner, rows)
-        for axis in range(3):
-            low = (corner[:, axis].min() - origin[axis]) / step[axis]
-            high = (corner[:, axis].max() - origin[axis]) / step[axis]
-            first[axis] = max(0, int(np.ceil(low)))
-            last[axis] = min(inside.shape[axis] - 1, int(np.floor(high)))
-        for i in range(first[0], last[0] + 1):
-            for j in range(first[1], last[1] + 1):
-                for k in range(first[2], last[2] + 1):
+        for i in range(first[t, 0], end[t, 0]):
+            for j in range(first[t, 1], end[t, 1]):
+                for k in range(first[t, 2], end[t, 2]):
                     dx = origin[0] + i * step[0] - corner[0, 0]
                     dy = origin[1] + j * step[1] - corner[0, 1]
                     dz = origin[2] + k * step[2] - corner[0, 2]
@@ -130,7 +140,7 @@ def _rasterise(
                         inside[i, j, k] = True
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _barycentric_rows(corner: Floats, rows: Floats) -> None:
     """Rows of the inverse of the edge matrix, written out: LAPACK would take seconds to compile."""
     for r in range(3):

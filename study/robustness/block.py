@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from msm.oscillators import RAMP, SINUSOID, STEP, Load, Oscillator, move
@@ -86,24 +85,14 @@ def _tuned(draw: Draw, modulus: float) -> Oscillator:
 
 
 def _scores(draw: Draw, moduli: Floats) -> Floats:
-    oscillators = np.array([_benchmark(draw), *(_tuned(draw, float(e)) for e in moduli)])
-    return np.asarray(_compared(oscillators, _load(draw), draw.span, SAMPLES))
-
-
-@njit  # not kept on disk: it calls into two packages, and numba would not see them change
-def _compared(oscillators: Floats, load: Load, span: float, samples: int) -> Floats:
-    """Scores (3, measures) of the motions after the first against the first."""
-    truth = move(_oscillator(oscillators[0]), load, span, samples)
-    found = np.full((len(oscillators) - 1, len(COLUMNS)), np.nan)
+    """Scores (3, measures) of the tuned motions against the benchmark's."""
+    load = _load(draw)
+    truth = move(_benchmark(draw), load, draw.span, SAMPLES)
+    found = np.full((len(moduli), len(COLUMNS)), np.nan)
     if not np.isfinite(truth).all() or np.ptp(truth[0]) == 0.0:
         return found
-    for i in range(1, len(oscillators)):
-        motion = move(_oscillator(oscillators[i]), load, span, samples)
+    for row, modulus in zip(found, moduli, strict=True):
+        motion = move(_tuned(draw, float(modulus)), load, draw.span, SAMPLES)
         if np.isfinite(motion).all():
-            found[i - 1] = scores(motion[0], motion[1], truth[0], truth[1])
+            row[:] = scores(motion[0], motion[1], truth[0], truth[1])
     return found
-
-
-@njit
-def _oscillator(row: Floats) -> Oscillator:
-    return Oscillator(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])

@@ -54,21 +54,18 @@ def _compiled(*, inner: bool = True) -> Callable[[Any], Any]:
     return njit(cache=True, error_model="numpy", no_cpython_wrapper=inner, no_cfunc_wrapper=True)
 
 
-@_compiled(inner=False)
 def scores(
     displacement: Floats, velocity: Floats, true_displacement: Floats, true_velocity: Floats
 ) -> Floats:
-    """Scores (7,) of a motion against a reference that moves, in the order of COLUMNS."""
-    found = np.empty(7)
-    found[0] = relative_l2(displacement, true_displacement)
-    found[1] = iso_18571(displacement, true_displacement)
-    found[2] = relative_l2(velocity, true_velocity)
-    found[3] = iso_18571(velocity, true_velocity)
-    x, y = _reach(true_displacement), _reach(true_velocity)
+    """Scores (7,) of a motion against a reference that moves, in the order of COLUMNS.
+
+    Put together in Python: each level of compiled functions compiles those below once more.
+    """
+    pairs = (displacement, true_displacement), (velocity, true_velocity)
+    found = [measure(*pair) for pair in pairs for measure in (relative_l2, iso_18571)]
+    x, y = (float(np.abs(true).max()) for _, true in pairs)
     plane = plane_scores(displacement, velocity, true_displacement, true_velocity, x, y)
-    for k in range(3):
-        found[4 + k] = plane[k]
-    return found
+    return np.concatenate((found, plane))
 
 
 @_compiled(inner=False)
@@ -113,7 +110,6 @@ def _reach(r: Floats) -> float:
     return reach
 
 
-@_compiled()
 def iso_18571(c: Floats, r: Floats) -> float:
     """Overall rating, see `study.similarity.iso18571`."""
     corridor, phase, magnitude, slope = iso_18571_parts(c, r)

@@ -74,7 +74,7 @@ class Promise:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A configuration, and what it is expected to give; `frame`: at the rate, if one is demanded."""
+    """A configuration and what it is expected to give; `frame`: at the rate, if one is demanded."""
 
     configuration: Configuration
     promise: Promise

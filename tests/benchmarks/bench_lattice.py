@@ -12,10 +12,11 @@ with the lattice.
 The C is no transliteration of ours but the best formulation that we know (grid.c), compiled for the
 same number of lanes. All kernels take the same steps to the same state, or no row is written.
 
-A step on two threads, each with its half of the nodes, was tried and left out. It starts threads
-three times a step, each 7 us with OpenMP and 50 us with numba's own queue, of 150 us at 2500 nodes;
-with another process on the second core a step took 1.2 to 1.3 times as long as on one thread. An
-idle second core was not to be had. It is put to better use by another run.
+A step on two threads, each with its half of the nodes, was tried over the list of springs and left
+out. It starts threads three times a step, each 7 us with OpenMP and 50 us with numba's own queue,
+of 150 us at 2500 nodes, and of 56 us over the grid; with another process on the second core a step
+took 1.2 to 1.3 times as long as on one thread. An idle second core was not to be had. It is put to
+better use by another run.
 """
 
 from __future__ import annotations
