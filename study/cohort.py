@@ -15,6 +15,9 @@ from pathlib import Path
 
 from fuzzy.liver.bases import KNOWLEDGE
 from fuzzy.liver.cohort import NOMINAL, CohortRow, CohortStudy, Comparison, cohort_study
+from fuzzy.liver.monotony import falls
+from fuzzy.liver.settings import LiverSettings
+from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.sets import Array
 
 PA_PER_KPA = 1e3
@@ -67,6 +70,7 @@ def cohort_lines(study: CohortStudy) -> Iterator[str]:
     yield from map(_sentence, study.comparisons)
     yield from _bands(study.rows)
     yield from _falls(study.rows)
+    yield from map(_with_several, (name for name, base in KNOWLEDGE.items() if base.follows))
 
 
 def _cells(whole: CohortRow, one: CohortRow, more: CohortRow) -> tuple[str, ...]:
@@ -113,6 +117,25 @@ def _bands(rows: Iterable[CohortRow]) -> Iterator[str]:
                 f"{row.contender}: its interval, nominally of {100 * NOMINAL:.0f} %, holds "
                 f"{100 * row.coverage:.1f} % of the patients"
             )
+
+
+def _with_several(knowledge: str) -> str:
+    """How far estimates of a base fall where one of several readings rises, by their number."""
+    settings = LiverSettings(knowledge=knowledge)
+    by_number = zip(*(falls(kind, settings) for kind in SYSTEMS), strict=True)
+    parts = [
+        f"{found[0].readings}: {_fall(one.anywhere for one in found)} "
+        f"({_fall(one.of_one_liver for one in found)})"
+        for found in by_number
+    ]
+    return (
+        f"{knowledge}: largest fall of any system where one of so many readings rises, over the "
+        f"whole scale (of one liver): {', '.join(parts)}"
+    )
+
+
+def _fall(shares: Iterable[float]) -> str:
+    return f"{100 * max(shares):.2g} %"
 
 
 def _falls(rows: Iterable[CohortRow]) -> Iterator[str]:

@@ -57,7 +57,7 @@ def test_velocity_is_the_rate_of_displacement(curve, small_scene):
 def test_results_name_every_model_and_number(small_results):
     found = small_results.record
     assert [model.name for model in found.models] == MODELS
-    assert found.fuzzy.rule_count == 11158
+    assert found.fuzzy.rule_count == 32767
     for model in found.models:
         for key in ("nodes", "time_step_s", "steps", "wall_s"):
             assert getattr(model, key) > 0

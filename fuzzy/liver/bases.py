@@ -6,6 +6,9 @@ from typing import NamedTuple
 class KnowledgeBase(NamedTuple):
     """One knowledge base: how it treats a missing reading unless told, what it is, in words.
 
+    `completed`: combinations of diseases that Table I has no cell for are cells too, as else a
+    patient with just these readings is answered by several cells that know a part of them each, and
+    which of them fires more changes with every reading: one raised may then lower the estimate.
     `follows`: its sets partition the scale of readings and stand in `partition.csv` under its name,
     so that the estimate follows the reading, on the cells of the `reading` of Table I. Otherwise
     sets are those of stages of fibrosis, and `reading`, `consequent` and `placement` of the
@@ -16,6 +19,7 @@ class KnowledgeBase(NamedTuple):
     absent: str
     words: str
     reading: str = "R1"
+    completed: bool = False
 
 
 KNOWLEDGE: dict[str, KnowledgeBase] = {
@@ -34,9 +38,11 @@ KNOWLEDGE: dict[str, KnowledgeBase] = {
     "freed": KnowledgeBase(
         True,
         "silent",
-        "seven sets an aetiology partition the instrument's scale on Table I's cells, whatever "
-        "the number of rules, and a rule concludes the stiffness expected of its readings",
+        "seven sets an aetiology partition the instrument's scale on Table I's cells and the three "
+        "combinations that it lacks, whatever the number of rules, and a rule concludes the "
+        "stiffness expected of its readings",
         reading="R1-no-duplicates",
+        completed=True,
     ),
 }
 

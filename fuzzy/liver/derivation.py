@@ -15,8 +15,10 @@ noise of reading: the stiffness expected of a reading.
 crossings and consequents are what the least squares choose, started from several places, over
 readings of virtual patients of that aetiology and readings even in ln kPa, half each.
 
-Both: with the sets in place, shift and power of the combinations of two to four diseases are
-fitted, on readings that agree.
+Both: with the sets in place, shift and power of the combinations of several diseases are fitted, on
+readings that agree. With four readings and more, sets of *freed* have a core: of 0, 0.1, 0.2 and
+0.3 of the way to the crossing, 0.2 leaves the estimate the least to fall where one of the readings
+rises, and it does not err more for it.
 """
 
 import csv
@@ -28,6 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
+from fuzzy.liver.bases import KNOWLEDGE
 from fuzzy.liver.knowledge import parameters
 from fuzzy.liver.partition import (
     Combination,
@@ -55,7 +58,7 @@ NAMES = {
     7: ("lowest", "very-low", "low", "medium", "high", "very-high", "highest"),
 }
 PARTITION = ("knowledge", "aetiology", "set", "centre_kpa", "crossing_kpa", "consequent_kpa")
-COMBINATION = ("knowledge", "diseases", "shift", "power")
+COMBINATION = ("knowledge", "diseases", "shift", "power", "core")
 JUDGED = np.geomspace(4.0, 40.0, 60)
 """Readings [kPa] over which a base is to follow, and two sets can."""
 TAUGHT = 600
@@ -63,9 +66,11 @@ TAUGHT = 600
 STARTS = 6
 POLISHED = 800
 """Steps of the simplex that ends the search of *paper-count*."""
-UNCOMBINED = {size: Combination(0.0, 1.0) for size in (1, 2, 3, 4)}
-CELLS = {2: AETIOLOGIES[:2], 3: AETIOLOGIES[:3], 4: AETIOLOGIES[:4]}
+UNCOMBINED = {size: Combination(0.0, 1.0) for size in (1, 2, 3, 4, 5)}
+CELLS = {size: AETIOLOGIES[:size] for size in (2, 3, 4, 5)}
 """Cells on which combinations are fitted."""
+CORES = {"freed": {4: 0.2, 5: 0.2}}
+"""Cores by the number of readings; the others have none."""
 
 
 class Judged(NamedTuple):
@@ -212,20 +217,28 @@ def _placed_sets(centres: Array, crossings: Array, consequents: Array) -> tuple[
 
 
 def with_combinations(
-    placed: Placement, knowledge: str, sizes: Sequence[int] = tuple(CELLS)
+    placed: Placement, knowledge: str, sizes: Sequence[int] | None = None
 ) -> Placement:
-    """The sets with shift and power of their combinations of so many diseases fitted."""
+    """The sets with shift and power of their combinations of so many diseases fitted.
+
+    Of all that the knowledge base has cells for, if no sizes are given.
+    """
     judged = Judged(JUDGED[::2], JUDGED[::2])
+    cores = CORES.get(knowledge, {})
+    wanted = sizes or [size for size in CELLS if size < 5 or KNOWLEDGE[knowledge].completed]
 
     def fitted(size: int) -> Combination:
+        def combined(x: Array) -> Combination:
+            return Combination(float(x[0]), float(x[1]), cores.get(size, 0.0))
+
         def misfit(x: Array) -> Array:
-            tried = Placement(placed.sets, {**UNCOMBINED, size: Combination(x[0], x[1])})
+            tried = Placement(placed.sets, {**UNCOMBINED, size: combined(x)})
             return residuals(tried, CELLS[size], judged, knowledge)
 
         found = _fitted(misfit, np.array([0.0, 1.0]), (np.array([-2.0, 0.5]), np.array([2.0, 2.0])))
-        return Combination(float(found[0]), float(found[1]))
+        return combined(found)
 
-    return Placement(placed.sets, {**UNCOMBINED, **{size: fitted(size) for size in sizes}})
+    return Placement(placed.sets, {**UNCOMBINED, **{size: fitted(size) for size in wanted}})
 
 
 def _fitted(misfit: Callable[[Array], Array], start: Array, bounds: tuple[Array, Array]) -> Array:
@@ -264,7 +277,7 @@ def write(bases: Mapping[str, Placement], folder: Path) -> None:
         for one in placed.sets[name]
     ]
     combination = [
-        (knowledge, str(size), f"{one.shift:.4f}", f"{one.power:.4f}")
+        (knowledge, str(size), f"{one.shift:.4f}", f"{one.power:.4f}", f"{one.core:g}")
         for knowledge, placed in bases.items()
         for size, one in placed.combinations.items()
     ]

@@ -5,12 +5,14 @@ readings spread alike at every stiffness. A set is a Gaussian with a width for e
 outermost ones stay at 1. A rule concludes the stiffness expected of a liver whose readings stand at
 the centres of its sets: exp(shift + power * mean of ln consequent), over the sets of its
 antecedent. Shift and power, by the number of diseases, take back what the centroid of several
-clipped sets adds. All in kPa.
+clipped sets adds. With many readings a set stays at 1 over a core about its centre: AND by min lets
+every rule of neighbouring sets fire as strongly as the least of its degrees, there are hundreds of
+them, and without a core they outvote the rule at whose centres the readings stand. All in kPa.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache, partial
-from itertools import groupby, product
+from itertools import combinations, groupby, product
 from math import exp, hypot, inf, log, sqrt
 from typing import NamedTuple
 
@@ -43,10 +45,15 @@ class PlacedSet(NamedTuple):
 
 
 class Combination(NamedTuple):
-    """How the consequents of the sets of so many diseases make that of their rule."""
+    """How the consequents of the sets of so many diseases make that of their rule.
+
+    `core`: share of the way to the next crossing over which a set of a patient with so many
+    readings stays at 1.
+    """
 
     shift: float
     power: float
+    core: float = 0.0
 
     def consequent(self, members: Sequence[float]) -> float:
         """Stiffness [kPa] concluded, within what the output's universe can show undisturbed."""
@@ -80,7 +87,9 @@ def placement(knowledge: str) -> Placement:
             for name, found in groupby(placed, lambda row: row["aetiology"])
         },
         {
-            int(row["diseases"]): Combination(float(row["shift"]), float(row["power"]))
+            int(row["diseases"]): Combination(
+                float(row["shift"]), float(row["power"]), float(row["core"])
+            )
             for row in rows("combination.csv")
             if row["knowledge"] == knowledge
         },
@@ -110,12 +119,17 @@ def following_system(
     """
     reading = settings.base.reading
     own = placed is placement(settings.knowledge)
-    made = _kept(settings.knowledge, present) if own else _concluded(placed, present, reading)
+    completed = settings.base.completed
+    made = (
+        _kept(settings.knowledge, present)
+        if own
+        else _concluded(placed, antecedents(present, reading, completed=completed))
+    )
     rules, levels = made
-    p = parameters()
+    p, core = parameters(), placed.combinations[_most(rules)].core
     return FuzzySystem(
         inputs=tuple(
-            _input(name, placed.sets[name], partial(_footprint, settings, len(present)))
+            _input(name, placed.sets[name], core, partial(_footprint, settings, len(present)))
             for name in AETIOLOGIES
         ),
         output=Variable(OUTPUT, p["output_low"], p["output_high"], tuple(map(_output_set, levels))),
@@ -126,15 +140,21 @@ def following_system(
 
 @lru_cache(maxsize=64)
 def _kept(knowledge: str, present: tuple[str, ...]) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
-    """Rules of a knowledge base, up to some ten thousand, which no other setting changes."""
-    return _concluded(placement(knowledge), present, KNOWLEDGE[knowledge].reading)
+    """Rules of a knowledge base, tens of thousands for all five, which no other setting changes."""
+    base = KNOWLEDGE[knowledge]
+    cells = antecedents(present, base.reading, completed=base.completed)
+    return _concluded(placement(knowledge), cells)
+
+
+def _most(rules: Sequence[Rule]) -> int:
+    """Diseases of the rules that outweigh the others."""
+    return max(len(rule.antecedents) for rule in rules)
 
 
 def _concluded(
-    placed: Placement, present: Sequence[str], reading: str
+    placed: Placement, cells: Sequence[Cell]
 ) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
-    """Rules of a placement, and the levels of the output sets that they conclude."""
-    cells = antecedents(present, reading)
+    """Rules of a placement on some cells, and the levels of the output sets that they conclude."""
     concluded = list(_rules(placed, cells, max(map(len, cells))))
     levels = sorted({level for _, level, _ in concluded})
     index = {level: k for k, level in enumerate(levels)}
@@ -143,9 +163,15 @@ def _concluded(
     )
 
 
-def antecedents(present: Sequence[str], reading: str) -> list[Cell]:
-    """Cells of Table I all of whose diseases are present. ValueError if there is none."""
+def antecedents(present: Sequence[str], reading: str, *, completed: bool = False) -> list[Cell]:
+    """Cells of Table I all of whose diseases are present, or `completed` every combination of them.
+
+    ValueError if there is none.
+    """
     found = [cell for cell in disease_sets(READINGS[reading]) if {*cell} <= {*present}]
+    if completed:
+        every = (c for size in range(1, len(present) + 1) for c in combinations(present, size))
+        found = list(dict.fromkeys([*found, *every]))
     if not found:
         raise ValueError(
             f"no rule on {' and '.join(present) or 'no aetiology'} alone: give a reading, or set "
@@ -186,25 +212,30 @@ def _footprint(settings: LiverSettings, readings: int, centre: float) -> Footpri
 
 
 def _input(
-    name: str, placed: Sequence[PlacedSet], footprint: Callable[[float], Footprint]
+    name: str, placed: Sequence[PlacedSet], core: float, footprint: Callable[[float], Footprint]
 ) -> Variable:
     p = parameters()
     crossings = [one.crossing for one in placed[:-1]]
     sets = tuple(
-        _set(one, below, above, footprint(one.centre))
+        _set(one, below, above, core, footprint(one.centre))
         for one, below, above in zip(placed, [None, *crossings], [*crossings, None], strict=True)
     )
     return Variable(name, p["input_low"], p["input_high"], sets)
 
 
 def _set(
-    one: PlacedSet, below: float | None, above: float | None, footprint: Footprint
+    one: PlacedSet,
+    below: float | None,
+    above: float | None,
+    core: float,
+    footprint: Footprint,
 ) -> FuzzySet:
     # The flat sides end so far out that no footprint moves their ends into the universe.
     far = parameters()["plausible_high"]
-    left, right = flanks(one, below, above)
-    core = (-far if below is None else one.centre, far if above is None else one.centre)
-    return FuzzySet(one.name, "gauss2mf", (left, core[0], right, core[1]), footprint)
+    left, right = ((1.0 - core) * width for width in flanks(one, below, above))
+    first = -far if below is None else one.centre - core * (one.centre - below)
+    last = far if above is None else one.centre + core * (above - one.centre)
+    return FuzzySet(one.name, "gauss2mf", (left, first, right, last), footprint)
 
 
 def flanks(one: PlacedSet, below: float | None, above: float | None) -> tuple[float, float]:
