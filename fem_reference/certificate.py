@@ -135,6 +135,18 @@ class Certificate:
         return self.load / self.squares
 
     @property
+    def error_at_rest(self) -> float:
+        """Bound of the energy norm's error of the subspace at rest, over the energy norm there.
+
+        Free of constants: the residual at rest is known, and so is its dual norm.
+        """
+        own = self.own_load / self.own_squares
+        inside = self.squares @ (self.rest - self.inside @ own) ** 2
+        outside = own @ self.outside[1:, 1:] @ own
+        known = float(np.sqrt(np.maximum(inside + outside, 0.0)))
+        return (known + self.static_defect) / float(np.sqrt(self.load @ self.rest))
+
+    @property
     def rounding(self) -> float:
         """What rounding adds to a bound at once, relative to the energy norm at rest."""
         at_rest = float(np.sqrt(self.load @ self.rest))
@@ -150,7 +162,7 @@ def certificate(
     stiffness is factored twice. ValueError if it is not definite beyond rounding.
     """
     floor = stiffness_floor(body, float(np.linalg.eigvalsh(subspace.stiffness)[0]))
-    solve = _direct(body)
+    solve = direct(body)
     count = min(max(vectors, subspace.load.size), body.stiffness.size)
     space = krylov_space(body, solve, count)
     found = residual(body, space, solve, floor)
@@ -176,8 +188,8 @@ def certificate(
     )
 
 
-def _direct(body: Body) -> Solve:
-    """Solution by factors, without the pressures."""
+def direct(body: Body) -> Solve:
+    """Solution of K u = f by factors, to rounding; the pressures are left out."""
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
     return lambda load: solve(np.concatenate([load, padding]))[:size]

@@ -18,7 +18,13 @@ from fem_reference.direct import factorised, pivots
 from fem_reference.elasticity import discretise
 from fem_reference.free_motion import decay, free_products
 from fem_reference.observation import evaluation
-from fem_reference.subspace import modal_subspace, ritz_subspace, superposition, transitions
+from fem_reference.subspace import (
+    Subspace,
+    modal_subspace,
+    ritz_subspace,
+    superposition,
+    transitions,
+)
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
@@ -245,6 +251,24 @@ def test_a_subspace_of_all_that_the_load_reaches_is_as_exact_as_rounding(bodies)
     energy, _ = bounds(given, RayleighDamping(20.0), np.ones(20), 0.01)
     assert energy.max() < 1e-3 * np.sqrt(given.load @ given.rest)
     assert given.rounding < 1e-7
+
+
+def test_a_rest_is_bounded_free_of_constants(bodies):
+    """Of vectors that hold it, of some that do not, and of one that is wrong by a known share."""
+    for one in bodies[::3]:
+        squares, shapes = one.modes
+        whole = shapes @ ((shapes.T @ one.body.load) / squares)
+        at_rest = np.sqrt(one.body.load @ whole)
+        modes = Subspace(shapes[:, :5], np.diag(squares[:5]), shapes[:, :5].T @ one.body.load)
+        for subspace in (ritz_subspace(one.body, 3), modes):
+            off = shapes.T @ (one.body.mass @ (whole - subspace.rest()))
+            true = np.sqrt(squares @ off**2) / at_rest
+            found = certificate(one.body, subspace, one.probes, 12).error_at_rest
+            assert true <= found < 1.001 * true + 1e-7
+            short = replace(subspace, load=0.99 * subspace.load)  # 1 % too small
+            found = certificate(one.body, short, one.probes, 12).error_at_rest
+            share = np.sqrt(subspace.load @ np.linalg.solve(subspace.stiffness, subspace.load))
+            assert found == pytest.approx(np.hypot(true, 0.01 * share / at_rest), rel=1e-4)
 
 
 def test_nothing_is_not_known_of_a_body_at_rest_without_a_load(certified_bodies):

@@ -28,7 +28,7 @@ from study.run.dimensionless import dimensionless
 from study.run.ready import Ready, ReadyPoint, ready
 from study.run.score_errors import error_rows, rating_rows
 from study.run.suiting import suited
-from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
+from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
 from study.scene.file import write_scene
@@ -168,6 +168,12 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             for name, run in runs.items()
             if run.bounds is not None
             for row in band_rows(response, name, run.bounds)
+        ),
+        tuple(
+            row
+            for name, run in runs.items()
+            if run.certified is not None
+            for row in certified_rows(response, name, run.certified)
         ),
         scores,
         tuple(rating_rows(response, sound, scores)),
