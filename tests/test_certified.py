@@ -207,7 +207,9 @@ def test_what_drives_the_head_is_no_less_than_its_integral(cases):
         assert (found >= whole - 1e-9 * whole.max()).all()
 
 
-@pytest.mark.parametrize("term", ["_tail_by_kink", "_tail_by_load", "_square_heads", "_distance"])
+@pytest.mark.parametrize(
+    "term", ["_tail_by_kink", "_tail_by_load", "_leading_products", "_distance"]
+)
 def test_a_term_that_is_left_out_is_found_out(term, cases, monkeypatch):
     whole = getattr(certified, term)
     monkeypatch.setattr(certified, term, lambda *given: 0.0 * whole(*given))
