@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from fem_reference.definite import UNIT, StiffnessFloor, stiffness_floor
-from fem_reference.direct import Solve, factorised
+from fem_reference.definite import StiffnessFloor, stiffness_floor
+from fem_reference.direct import EPSILON, Solve, factorised
 from fem_reference.elasticity import Body
 from fem_reference.subspace import Subspace, empty, extended
 
@@ -89,7 +89,7 @@ def _rounding(body: Body, V: Floats, balanced: Floats, solution: Floats) -> Floa
         pushed += abs(pressure.divergence).T @ (nodal / pressure.mass.diagonal()[:, None])
     pushed[:, 0] += np.abs(body.load)
     pushed[:, 1:] += abs(body.mass) @ np.abs(V)
-    return np.asarray(UNIT * entries * pushed)
+    return np.asarray(EPSILON * entries * pushed)
 
 
 class Seen(NamedTuple):

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.certificate import Certificate
-from fem_reference.definite import UNIT
+from fem_reference.direct import EPSILON
 from fem_reference.free_motion import Decay, decay, free_products
 from fem_reference.subspace import transitions
 from study.problem.damping import RayleighDamping
@@ -119,7 +119,7 @@ class CertifiedMotion:
         own = np.maximum(np.einsum("ia,iab,ib->i", rates, self._own_products, rates), 0.0)
         part = (given.last[:, None] * rates).ravel()
         products = (part * (self._leading @ part)).reshape(-1, 2).sum(axis=1)
-        rounding = UNIT * len(own) * _heads(given.last**2 * own)
+        rounding = EPSILON * len(own) * _heads(given.last**2 * own)
         along = np.sqrt(np.maximum(_heads(products), 0.0) + rounding)
         whole = given.norm * along + given.defect * np.sqrt(_heads(own))
         return np.asarray(np.sqrt(self.step) * whole + given.static_defect * self.step * abs(slope))

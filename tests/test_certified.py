@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import eigh, expm
+from scipy.sparse import csc_array
 
 from fem_reference import certified, definite
 from fem_reference.certificate import Certificate, certificate, krylov_space, residual
@@ -326,6 +327,7 @@ def test_pivots_count_the_eigenvalues_below_a_shift(bodies):
         found = pivots(definite._shifted(one.body, shift, nothing))
         assert found.in_place
         assert found.negative == 5 + pressures
+        assert 0.0 < found.rounding < 1e-9
 
 
 def test_a_body_that_nothing_holds_has_no_floor(bodies):
@@ -380,3 +382,16 @@ def test_products_of_free_motions_are_those_of_quadrature(mass, stiffness, rng):
     )
     found = np.einsum("ia,iajb,jb->ij", state, free_products(squares, damping, step), state)
     assert found == pytest.approx(wanted, rel=1e-8, abs=1e-10)
+
+
+def test_pivots_of_a_matrix_that_rounding_could_turn_are_not_trusted(rng):
+    """The smallest eigenvalue, against the diagonal, is told from one below rounding."""
+    basis = np.linalg.qr(rng.normal(size=(40, 40)))[0]
+    for smallest in (1e-3, 1e-6, -1e-6, 1e-16, -1e-16):
+        matrix = (basis * np.concatenate([[smallest], rng.uniform(0.5, 2.0, 39)])) @ basis.T
+        found = pivots(csc_array(0.5 * (matrix + matrix.T)))
+        if abs(smallest) > 1e-9:
+            assert found.negative == (smallest < 0.0)
+            assert found.rounding < 0.1 * abs(smallest)
+        else:
+            assert found.rounding > abs(smallest)
