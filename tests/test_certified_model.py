@@ -1,6 +1,8 @@
 """The certified error in a scene: run, results, report, and frame by frame."""
 
+import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.conftest import SMALL
 
+DATA = Path(__file__).parents[1] / "reports" / "data"
 LIGHT = (
     *('models=["superposition"]', "superposition.count=4", "superposition.certificate=40"),
     *('damping={kind="rayleigh", mass="20 s^-1", stiffness="1e-4 s"}', "time.samples=41"),
@@ -116,3 +119,18 @@ def test_each_frame_has_its_bound_and_none_is_computed_unasked(scene, monkeypatc
     assert again.bound() == pytest.approx(bounds[-1], rel=1e-12)
     assert np.shape(bounds) == (10, 2)
     assert np.min(bounds) > 0.0
+
+
+def test_the_committed_table_has_no_bound_below_its_error():
+    with (DATA / "certified.csv").open(encoding="utf-8") as file:
+        lines = [
+            {key: float(text) for key, text in line.items() if key not in ("damping", "load")}
+            for line in csv.DictReader(file)
+        ]
+    assert len(lines) == 72
+    for line in lines:
+        assert line["bound"] >= line["error"] - line["error_change"]
+        assert line["bound_at_tool"] >= line["error_at_tool"] - line["error_change"]
+    light = [line for line in lines if line["mass_per_s"] == 32.0 and line["certificate"] == 128.0]
+    nearest = sorted(line["bound"] / line["error"] for line in light)
+    assert nearest[0] < 1.3
