@@ -304,6 +304,39 @@ def large_strain() -> Iterator[tuple[str, str]]:
     )
 
 
+CERTIFICATE = "128"
+"""Of a scene, unless it says otherwise."""
+
+
+def certified() -> Iterator[tuple[str, str]]:
+    """The error of a superposition and its bound, by damping, load and vectors."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    vectors: list[str] = []
+    for line in measured("certified"):
+        if line["certificate"] != CERTIFICATE:
+            continue
+        damping = f"{float(line['mass_per_s']):.3g} /s, {1e3 * float(line['stiffness_s']):g} ms"
+        cells = f"{_at_most(line['error'], 100)} / {_at_most(line['bound'], 100)} %"
+        rows.setdefault((line["damping"], damping, line["load"]), []).append(cells)
+        vectors = list(dict.fromkeys([*vectors, line["vectors"]]))
+    head = (
+        "damping",
+        "of mass, of stiffness",
+        "load",
+        *(f"{count} vectors, error / bound" for count in vectors),
+    )
+    yield "certified", table(head, [[*key, *cells] for key, cells in rows.items()])
+
+
+def _at_most(text: str, factor: float = 1.0) -> str:
+    """A number to two digits, rounded up so that a bound stays one."""
+    value = factor * float(text)
+    if value == 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
+
+
 def tradeoff() -> Iterator[tuple[str, str]]:
     """Error and cost of every model."""
     lines = measured("tradeoff")
@@ -531,7 +564,7 @@ def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
-    models = (tradeoff, corrected)
+    models = (certified, tradeoff, corrected)
     groups = (*fuzzy, *lattice, *models, verification, stability, ranking)
     return {name: text for group in groups for name, text in group()}
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from fem_reference.definite import UNIT, StiffnessFloor, stiffness_floor
-from fem_reference.direct import Solve, factorised
+from fem_reference.definite import StiffnessFloor, stiffness_floor
+from fem_reference.direct import EPSILON, Solve, factorised
 from fem_reference.elasticity import Body
 from fem_reference.subspace import Subspace, empty, extended
 
@@ -64,10 +64,9 @@ def residual(body: Body, space: Subspace, solve: Solve, floor: StiffnessFloor) -
     is f, less what K V balances of it; all but the last w_k vanish.
     """
     V, K = space.vectors, body.stiffness
-    KV = np.column_stack([K @ v for v in V.T])
     wanted = np.column_stack([space.load, np.eye(len(V.T))])
     balanced = np.asarray(np.linalg.solve(space.stiffness, wanted), np.float64)
-    whole = np.column_stack([body.load, body.mass @ V]) - KV @ balanced
+    whole = np.column_stack([body.load, body.mass @ V]) - _pushed(body, V) @ balanced
     solution = solve(whole[:, -1])
     whole[:, -1] -= K @ solution
     wrong = np.abs(whole) + _rounding(body, V, balanced, solution)
@@ -89,7 +88,7 @@ def _rounding(body: Body, V: Floats, balanced: Floats, solution: Floats) -> Floa
         pushed += abs(pressure.divergence).T @ (nodal / pressure.mass.diagonal()[:, None])
     pushed[:, 0] += np.abs(body.load)
     pushed[:, 1:] += abs(body.mass) @ np.abs(V)
-    return np.asarray(UNIT * entries * pushed)
+    return np.asarray(EPSILON * entries * pushed)
 
 
 class Seen(NamedTuple):
@@ -135,74 +134,111 @@ class Certificate:
         return self.load / self.squares
 
     @property
+    def error_at_rest(self) -> float:
+        """Bound of the energy norm's error of the subspace at rest, over the energy norm there.
+
+        Free of constants: the residual at rest is known, and so is its dual norm.
+        """
+        own = self.own_load / self.own_squares
+        inside = self.squares @ (self.rest - self.inside @ own) ** 2
+        outside = own @ self.outside[1:, 1:] @ own
+        known = float(np.sqrt(np.maximum(inside + outside, 0.0)))
+        return (known + self.static_defect) / float(np.sqrt(self.load @ self.rest))
+
+    @property
     def rounding(self) -> float:
         """What rounding adds to a bound at once, relative to the energy norm at rest."""
         at_rest = float(np.sqrt(self.load @ self.rest))
         return (self.static_defect + self.defect * float(np.linalg.norm(self.load))) / at_rest
 
 
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A body's Krylov space, with which any subspaces of the body may be compared.
+
+    `shapes` (n, M): its modes, the least square of their frequencies first; `load` (M,) and `last`
+    (M,): what each has of the load, and of the space's last vector.
+    """
+
+    body: Body
+    solve: Solve
+    floor: StiffnessFloor
+    shapes: Floats
+    squares: Floats
+    load: Floats
+    last: Floats
+    residual: Residual
+
+    def certificate(self, subspace: Subspace, at_probes: csr_array) -> Certificate:
+        """Of a subspace, as the body's control points are seen."""
+        own_squares, own_modes = eigh(subspace.stiffness)
+        own_shapes = subspace.vectors @ own_modes
+        inside = (self.shapes.T @ _pushed(self.body, own_shapes)) / self.squares[:, None]
+        left = np.column_stack([self.residual.solution, own_shapes - self.shapes @ inside])
+        return Certificate(
+            self.squares,
+            self.load,
+            self.last,
+            *self.residual[1:],
+            self.floor.eigenvalue,
+            inside,
+            left.T @ _pushed(self.body, left),
+            own_squares,
+            own_modes.T @ subspace.load,
+            self._seen(at_probes, left),
+        )
+
+    def _seen(self, at_probes: csr_array, left: Floats) -> Seen:
+        def of(vectors: Floats) -> Floats:
+            count = vectors.shape[1]
+            return np.asarray(at_probes @ vectors.reshape(-1, 3 * count)).reshape(-1, 3, count)
+
+        compliance = [self._compliance(row) for row in at_probes.toarray()]
+        beside = of(left)
+        return Seen(of(self.shapes), beside[..., 0], beside[..., 1:], np.array(compliance))
+
+    def _compliance(self, row: Floats) -> float:
+        """Largest length of the displacement of unit energy norm at a point, from above.
+
+        `row` (nodes,) has the weights of the nodes there.
+        """
+        forces = np.kron(row[:, None], np.eye(3))
+        answers = np.column_stack([self.solve(one) for one in forces.T])
+        balanced = _pushed(self.body, answers)
+        wrong = np.linalg.norm((forces - balanced) / np.sqrt(self.floor.diagonal)[:, None])
+        return float(np.sqrt(np.linalg.eigvalsh(answers.T @ balanced)[-1]) + wrong)
+
+
+def comparison(body: Body, lowest: float, count: int = VECTORS) -> Comparison:
+    """By at most `count` vectors, as many as the load reaches.
+
+    `lowest` [1/s^2]: above the lowest eigenvalue, the nearer the better. The stiffness is factored
+    twice. ValueError if it is not definite beyond rounding.
+    """
+    floor, solve = stiffness_floor(body, lowest), direct(body)
+    space = krylov_space(body, solve, min(count, body.stiffness.size))
+    squares, modes = eigh(space.stiffness)
+    found = residual(body, space, solve, floor)
+    shapes, load = space.vectors @ modes, modes.T @ space.load
+    return Comparison(body, solve, floor, shapes, squares, load, modes[-1], found)
+
+
 def certificate(
     body: Body, subspace: Subspace, at_probes: csr_array, vectors: int = VECTORS
 ) -> Certificate:
-    """Of a body in a subspace, as its control points are seen, by so many Krylov `vectors`.
-
-    There are at least as many as in the subspace, at most as many as the load reaches. The
-    stiffness is factored twice. ValueError if it is not definite beyond rounding.
-    """
-    floor = stiffness_floor(body, float(np.linalg.eigvalsh(subspace.stiffness)[0]))
-    solve = _direct(body)
-    count = min(max(vectors, subspace.load.size), body.stiffness.size)
-    space = krylov_space(body, solve, count)
-    found = residual(body, space, solve, floor)
-    squares, modes = eigh(space.stiffness)
-    own_squares, own_modes = eigh(subspace.stiffness)
-    shapes, own_shapes = space.vectors @ modes, subspace.vectors @ own_modes
-    pushed = np.column_stack([body.stiffness @ v for v in own_shapes.T])
-    inside = (shapes.T @ pushed) / squares[:, None]
-    left = np.column_stack([found.solution, own_shapes - shapes @ inside])
-    return Certificate(
-        squares,
-        modes.T @ space.load,
-        modes[-1],
-        found.norm,
-        found.defect,
-        found.static_defect,
-        floor.eigenvalue,
-        inside,
-        left.T @ np.column_stack([body.stiffness @ v for v in left.T]),
-        own_squares,
-        own_modes.T @ subspace.load,
-        _seen(body, at_probes, shapes, left, solve, floor),
-    )
+    """Of one subspace, by so many vectors or as many as it has itself; see `comparison`."""
+    lowest = float(np.linalg.eigvalsh(subspace.stiffness)[0])
+    wanted = max(vectors, subspace.load.size)
+    return comparison(body, lowest, wanted).certificate(subspace, at_probes)
 
 
-def _direct(body: Body) -> Solve:
-    """Solution by factors, without the pressures."""
+def direct(body: Body) -> Solve:
+    """Solution of K u = f by factors, to rounding; the pressures are left out."""
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
     return lambda load: solve(np.concatenate([load, padding]))[:size]
 
 
-def _seen(
-    body: Body,
-    at_probes: csr_array,
-    shapes: Floats,
-    left: Floats,
-    solve: Solve,
-    floor: StiffnessFloor,
-) -> Seen:
-    def of(vectors: Floats) -> Floats:
-        count = vectors.shape[1]
-        return np.asarray(at_probes @ vectors.reshape(-1, 3 * count)).reshape(-1, 3, count)
-
-    rows = at_probes.toarray()
-    compliance = [_compliance(body, np.kron(row[:, None], np.eye(3)), solve, floor) for row in rows]
-    return Seen(of(shapes), of(left[:, :1])[..., 0], of(left[:, 1:]), np.array(compliance))
-
-
-def _compliance(body: Body, forces: Floats, solve: Solve, floor: StiffnessFloor) -> float:
-    """Largest |J u| of |u|_K = 1, `forces` (n, 3) the transpose of J, from above."""
-    answers = np.column_stack([solve(one) for one in forces.T])
-    balanced = np.column_stack([body.stiffness @ one for one in answers.T])
-    wrong = np.linalg.norm((forces - balanced) / np.sqrt(floor.diagonal)[:, None])
-    return float(np.sqrt(np.linalg.eigvalsh(answers.T @ balanced)[-1]) + wrong)
+def _pushed(body: Body, vectors: Floats) -> Floats:
+    """K times each of the vectors (n, m)."""
+    return np.column_stack([body.stiffness @ v for v in vectors.T])

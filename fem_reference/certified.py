@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.certificate import Certificate
+from fem_reference.direct import EPSILON
 from fem_reference.free_motion import Decay, decay, free_products
 from fem_reference.subspace import transitions
 from study.problem.damping import RayleighDamping
@@ -65,7 +66,9 @@ class CertifiedMotion:
         self.time, self.load, self._slope = 0.0, float(factor(np.zeros(1))[0]), 0.0
         self._long = _Modes(given.squares, given.load, damping, step)
         self._own = _Modes(given.own_squares, given.own_load, damping, step)
-        self._products = free_products(given.squares, damping, step)
+        products = free_products(given.squares, damping, step)
+        self._own_products = np.einsum("iaib->iab", products)
+        self._leading = _leading_products(products)
         self._decay = decay(damping, given.lowest)
         self._fade = np.exp(-self._decay.rates * step)
         self._by_kink = _tail_by_kink(given, self._decay)
@@ -113,10 +116,12 @@ class CertifiedMotion:
         By Schwarz's inequality; within a step the forces' rates move freely.
         """
         given, rates = self.given, self._force_rates(slope)
-        products = np.einsum("ia,iajb,jb->ij", rates, self._products, rates)
-        along = _square_heads(given.last[:, None] * products * given.last)
-        wrong = np.maximum(_heads(np.diagonal(products)), 0.0)
-        whole = given.norm * np.sqrt(along) + given.defect * np.sqrt(wrong)
+        own = np.maximum(np.einsum("ia,iab,ib->i", rates, self._own_products, rates), 0.0)
+        part = (given.last[:, None] * rates).ravel()
+        products = (part * (self._leading @ part)).reshape(-1, 2).sum(axis=1)
+        rounding = EPSILON * len(own) * _heads(given.last**2 * own)
+        along = np.sqrt(np.maximum(_heads(products), 0.0) + rounding)
+        whole = given.norm * along + given.defect * np.sqrt(_heads(own))
         return np.asarray(np.sqrt(self.step) * whole + given.static_defect * self.step * abs(slope))
 
     def _force_rates(self, slope: float) -> Floats:
@@ -219,7 +224,8 @@ def _tails(values: Floats) -> Floats:
     return np.asarray(_heads(values[..., ::-1])[..., ::-1])
 
 
-def _square_heads(values: Floats) -> Floats:
-    """Sums of a matrix's leading squares from none to all of it, at least 0."""
-    sums = np.diagonal(np.cumsum(np.cumsum(values, axis=0), axis=1))
-    return np.asarray(np.maximum(np.concatenate([[0.0], sums]), 0.0))
+def _leading_products(products: Floats) -> Floats:
+    """What each mode adds to the form of those before it, (2 M, 2 M), from forms (M, 2, M, 2)."""
+    count = len(products)
+    twice = np.tril(np.full((count, count), 2.0), -1) + np.eye(count)
+    return np.asarray((products * twice[:, None, :, None]).reshape(2 * count, 2 * count))

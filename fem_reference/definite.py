@@ -16,7 +16,6 @@ Floats = NDArray[np.float64]
 MASS_SHARE, DIAGONAL_SHARE = 0.8, 1.0 / 16.0
 """Of the eigenvalue tried; a mass is 0.39 of its diagonal or more, in straight tetrahedra."""
 TRIES = 30
-UNIT = float(np.finfo(np.float64).eps)
 
 
 class StiffnessFloor(NamedTuple):
@@ -30,18 +29,16 @@ def stiffness_floor(body: Body, eigenvalue: float) -> StiffnessFloor:
     """A floor near an upper bound of the lowest squared angular frequency [1/s^2].
 
     The pivots of K - 0.8 s M - s D / 16, D the diagonal of M, have the signs of its eigenvalues
-    (Sylvester's law of inertia); s is halved until they prove it definite. What rounding may do to
-    the pivots is taken off: that of a definite matrix is below k^2 eps sqrt(a_ii a_jj), with k
-    entries in a column of the factor (Demmel 1989; Higham, Accuracy and Stability, ch. 10). The
-    factors of a saddle point have no such bound; theirs is taken to be the same. ValueError if no
-    floor is found.
+    (Sylvester's law of inertia), those of a saddle point beside one negative sign for each
+    pressure; s is halved until they prove it definite. What rounding may do to them is taken off.
+    ValueError if no floor is found.
     """
     diagonal = body.mass.diagonal()
     stiffest = float((body.stiffness.matrix.diagonal() / diagonal).max())
     for halvings in range(TRIES):
         tried = eigenvalue * 0.5**halvings
         found = pivots(_shifted(body, tried * MASS_SHARE, tried * DIAGONAL_SHARE * diagonal))
-        left = tried * DIAGONAL_SHARE - found.largest_column**2 * UNIT * stiffest
+        left = tried * DIAGONAL_SHARE - found.rounding * stiffest
         if left <= 0.0:
             break
         if found.in_place and found.negative == body.unknowns - body.stiffness.size:

@@ -28,6 +28,11 @@ def needed(count: int, element: str, *, stepping: bool) -> float:
     return assembled + (FACTORS * count ** (5.0 / 3.0) if stepping else 0)
 
 
+def factors_fit(count: int, element: str) -> bool:
+    """Whether the memory that is free holds the factors of so many unknowns beside the body."""
+    return needed(count, element, stepping=True) <= SHARE * available()
+
+
 def available() -> float:
     """Bytes of memory that are free."""
     try:

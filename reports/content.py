@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reports import budget, fuzzy_tables, score_tables, summary, tables
 from reports.benchmarks import benchmarks
+from reports.certified import certified_rows
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
@@ -59,6 +60,7 @@ def document(results: Results) -> dict[str, object]:
         "models": tables.model_rows(results),
         "numerics": tables.numerics_rows(results),
         "corrections": tables.correction_rows(results),
+        "certified": certified_rows(results),
         "reference": reference(results),
         "checks": tables.check_rows(results),
         "assumptions": [words(text) for text in record.assumptions],

@@ -16,6 +16,7 @@ from study.results.arrays import Arrays
 from study.results.folder import Results
 from study.results.tables import (
     BandSample,
+    CertifiedSample,
     CurveSample,
     FieldDifference,
     Iso18571Rating,
@@ -30,6 +31,7 @@ Floats = NDArray[np.float64]
 Row = (
     CurveSample
     | BandSample
+    | CertifiedSample
     | SimilarityScore
     | Iso18571Rating
     | ScoreError
@@ -75,6 +77,7 @@ def differences(first: Results, second: Results) -> list[Difference]:
     found = [
         *_tables("curves.csv", first.curves, second.curves, 2),
         *_tables("bands.csv", first.bands, second.bands, 2),
+        *_tables("certified.csv", first.certified, second.certified, 2),
         *_tables("similarity.csv", first.scores, second.scores, 5),
         *_tables("iso_18571.csv", first.ratings, second.ratings, 4),
         *_tables("score_errors.csv", first.score_errors, second.score_errors, 5),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import eigh, expm
+from scipy.sparse import csc_array
 
 from fem_reference import certified, definite
 from fem_reference.certificate import Certificate, certificate, krylov_space, residual
@@ -18,7 +19,13 @@ from fem_reference.direct import factorised, pivots
 from fem_reference.elasticity import discretise
 from fem_reference.free_motion import decay, free_products
 from fem_reference.observation import evaluation
-from fem_reference.subspace import modal_subspace, ritz_subspace, superposition, transitions
+from fem_reference.subspace import (
+    Subspace,
+    modal_subspace,
+    ritz_subspace,
+    superposition,
+    transitions,
+)
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
@@ -201,7 +208,9 @@ def test_what_drives_the_head_is_no_less_than_its_integral(cases):
         assert (found >= whole - 1e-9 * whole.max()).all()
 
 
-@pytest.mark.parametrize("term", ["_tail_by_kink", "_tail_by_load", "_square_heads", "_distance"])
+@pytest.mark.parametrize(
+    "term", ["_tail_by_kink", "_tail_by_load", "_leading_products", "_distance"]
+)
 def test_a_term_that_is_left_out_is_found_out(term, cases, monkeypatch):
     whole = getattr(certified, term)
     monkeypatch.setattr(certified, term, lambda *given: 0.0 * whole(*given))
@@ -245,6 +254,24 @@ def test_a_subspace_of_all_that_the_load_reaches_is_as_exact_as_rounding(bodies)
     energy, _ = bounds(given, RayleighDamping(20.0), np.ones(20), 0.01)
     assert energy.max() < 1e-3 * np.sqrt(given.load @ given.rest)
     assert given.rounding < 1e-7
+
+
+def test_a_rest_is_bounded_free_of_constants(bodies):
+    """Of vectors that hold it, of some that do not, and of one that is wrong by a known share."""
+    for one in bodies[::3]:
+        squares, shapes = one.modes
+        whole = shapes @ ((shapes.T @ one.body.load) / squares)
+        at_rest = np.sqrt(one.body.load @ whole)
+        modes = Subspace(shapes[:, :5], np.diag(squares[:5]), shapes[:, :5].T @ one.body.load)
+        for subspace in (ritz_subspace(one.body, 3), modes):
+            off = shapes.T @ (one.body.mass @ (whole - subspace.rest()))
+            true = np.sqrt(squares @ off**2) / at_rest
+            found = certificate(one.body, subspace, one.probes, 12).error_at_rest
+            assert true <= found < 1.001 * true + 1e-7
+            short = replace(subspace, load=0.99 * subspace.load)  # 1 % too small
+            found = certificate(one.body, short, one.probes, 12).error_at_rest
+            share = np.sqrt(subspace.load @ np.linalg.solve(subspace.stiffness, subspace.load))
+            assert found == pytest.approx(np.hypot(true, 0.01 * share / at_rest), rel=1e-4)
 
 
 def test_nothing_is_not_known_of_a_body_at_rest_without_a_load(certified_bodies):
@@ -300,6 +327,7 @@ def test_pivots_count_the_eigenvalues_below_a_shift(bodies):
         found = pivots(definite._shifted(one.body, shift, nothing))
         assert found.in_place
         assert found.negative == 5 + pressures
+        assert 0.0 < found.rounding < 1e-9
 
 
 def test_a_body_that_nothing_holds_has_no_floor(bodies):
@@ -354,3 +382,16 @@ def test_products_of_free_motions_are_those_of_quadrature(mass, stiffness, rng):
     )
     found = np.einsum("ia,iajb,jb->ij", state, free_products(squares, damping, step), state)
     assert found == pytest.approx(wanted, rel=1e-8, abs=1e-10)
+
+
+def test_pivots_of_a_matrix_that_rounding_could_turn_are_not_trusted(rng):
+    """The smallest eigenvalue, against the diagonal, is told from one below rounding."""
+    basis = np.linalg.qr(rng.normal(size=(40, 40)))[0]
+    for smallest in (1e-3, 1e-6, -1e-6, 1e-16, -1e-16):
+        matrix = (basis * np.concatenate([[smallest], rng.uniform(0.5, 2.0, 39)])) @ basis.T
+        found = pivots(csc_array(0.5 * (matrix + matrix.T)))
+        if abs(smallest) > 1e-9:
+            assert found.negative == (smallest < 0.0)
+            assert found.rounding < 0.1 * abs(smallest)
+        else:
+            assert found.rounding > abs(smallest)

@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TABLES = {
     "curves": tables.CurveSample,
     "bands": tables.BandSample,
+    "certified": tables.CertifiedSample,
     "similarity": tables.SimilarityScore,
     "iso_18571": tables.Iso18571Rating,
     "score_errors": tables.ScoreError,

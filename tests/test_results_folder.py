@@ -26,7 +26,7 @@ from tests.report_samples import known, whole, with_model, with_record
 
 TABLES = (
     *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
-    *("iso_18571.csv", "score_errors.csv", "score_differences.csv"),
+    *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
 )
 FILES = ("results.json", "scene.toml", *TABLES, "fields.npz", "fuzzy.npz", "SHA256SUMS")
 DRAWS = 25

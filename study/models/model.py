@@ -50,7 +50,8 @@ class ModelRun:
     """The motion of a model with its record, in which its own numerical errors stand.
 
     `bounds`: motion at both ends of an interval of stiffness, if the model has one; `halved`: that
-    by half as long steps, if it finished.
+    by half as long steps, if it finished; `certified`: bound [m] (samples, probes) of what the
+    displacement is off all unknowns, of a subspace that has one.
     """
 
     trajectory: Trajectory
@@ -59,6 +60,7 @@ class ModelRun:
     notes: tuple[str, ...] = ()
     bounds: tuple[Trajectory, Trajectory] | None = None
     halved: Trajectory | None = None
+    certified: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,8 @@ class Stepper:
     `restart()` puts it at rest again, where what a step costs depends on the motion.
     `displacement()` [m] (n, 3) of the nodes is the state that is delivered. `step` [s]; `unknowns`:
     components of displacement, or coordinates of a superposition, which every step turns into
-    displacements.
+    displacements. `bound()` [m] (probes,): of what the displacement delivered at the control points
+    is off all unknowns, where that can be proven; it costs nothing unless it is asked for.
     """
 
     take_step: Callable[[], None]
@@ -79,6 +82,7 @@ class Stepper:
     unknowns: int
     take_bare_steps: Callable[[int], None] | None = None
     restart: Callable[[], None] = lambda: None
+    bound: Callable[[], Floats] | None = None
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
+from fem_reference.certificate import Certificate, certificate
+from fem_reference.certified import CertifiedMotion
 from fem_reference.elasticity import Body
 from fem_reference.elements import chosen_element
 from fem_reference.grid import Projection
-from fem_reference.memory import unknowns
+from fem_reference.memory import factors_fit, unknowns
 from fem_reference.observation import at_points, evaluation
 from fem_reference.subspace import Subspace, SubspaceMotion, modal_subspace, ritz_subspace
 from fem_reference.superposition import subspace_motion
 from msm.timestep import whole_steps
 from study.mesh.kinds import TetrahedralMesh
+from study.models.certified import Certified, bound_on_demand, certified
 from study.models.damping import reference_damping
 from study.models.errors import estimated_run
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
@@ -43,12 +46,16 @@ ORDER = 2
 
 @dataclass(frozen=True, kw_only=True)
 class SuperpositionModel:
-    """So many Ritz vectors or modes of finite elements, `level` 0 being the scene's mesh."""
+    """So many Ritz vectors or modes of finite elements, `level` 0 being the scene's mesh.
+
+    `certificate`: vectors by which their error is bounded, 0 for no bound.
+    """
 
     element: str
     damping: RayleighDamping
     vectors: str
     count: int
+    certificate: int = 0
     level: int = 0
     name: str = "superposition"
     label: str = "Superposition"
@@ -99,6 +106,14 @@ class PreparedSuperposition:
         make = ritz_subspace if self.model.vectors == "ritz" else modal_subspace
         return make(self.body, self.model.count)
 
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What its error is bounded by. ValueError where there is none, with the reason."""
+        if not factors_fit(self.body.unknowns, self.body.element):
+            raise ValueError(f"the memory holds no factors of {self.body.unknowns} unknowns")
+        probes = evaluation(self.body, self.problem.observation.probes)
+        return certificate(self.body, self.subspace, probes, self.model.certificate)
+
     @property
     def critical_time_step(self) -> float:
         """Infinite: each mode is integrated exactly."""
@@ -111,25 +126,31 @@ class PreparedSuperposition:
         size = unknowns(self.mesh, element)
         return [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
 
+    def _steps_per_sample(self, longest: float | None = None) -> int:
+        return whole_steps(float(self.problem.observation.times[1]), longest or STEP)
+
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion, exact in the subspace for a load that is linear over steps of a frame."""
         seen, subspace = self.problem.observation, self.subspace
         sample = float(seen.times[1])
-        every = whole_steps(sample, longest or STEP)
+        every = self._steps_per_sample(longest)
         where = (self.model.damping, self.problem.factor, seen, every)
         found = subspace_motion(self.body, subspace, *where)
         return Simulation(found.trajectory, sample / every, largest_strain=found.strain)
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion, its error by the steps of the load, and what it is made of."""
+        """The motion, its errors by the steps of the load and by the subspace, and its record."""
+        found = estimated_run(self.model, self, self.problem, watch, ORDER)
+        with watch.progress.stage(f"{self.model.name}: certificate"):
+            bound, notes = self._certified(found.trajectory.displacement)
         elements = ElementsRecord(
             element=self.body.element,
             elements=len(self.body.mesh.tetrahedra),
             unknowns=self.body.unknowns,
             method=self.model.vectors,
             subspace_vectors=self.subspace.load.size,
+            certified=None if bound is None else bound.record,
         )
-        found = estimated_run(self.model, self, self.problem, watch, ORDER)
         modulus, damping = self.problem.tissue.youngs_modulus, self.model.damping
         record = replace(
             found.record,
@@ -139,7 +160,19 @@ class PreparedSuperposition:
             damping_rate_per_s=damping.mass,
             stiffness_damping_s=damping.stiffness,
         )
-        return replace(found, record=record)
+        bounds = None if bound is None else bound.bounds
+        return replace(found, record=record, notes=(*found.notes, *notes), certified=bounds)
+
+    def _certified(self, motion: Floats) -> tuple[Certified | None, tuple[str, ...]]:
+        """The bound of a motion's error if one is asked for, or a note on why there is none."""
+        if not self.model.certificate:
+            return None, ()
+        try:
+            given = self.certificate
+        except ValueError as error:
+            return None, (f"The error of {self.model.name} is not certified: {error}.",)
+        steps = self._steps_per_sample()
+        return certified(given, self.model.damping, self.problem, steps, motion), ()
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field."""
@@ -147,14 +180,24 @@ class PreparedSuperposition:
         return at_points(evaluation(self.body, points), self.subspace.rest())
 
     def stepper(self) -> Stepper:
-        """Steps of a frame, each of which gives the displacement of all nodes."""
+        """Steps of a frame, each of which gives the displacement of all nodes, and its bound."""
         subspace = self.subspace
         motion = SubspaceMotion(subspace, self.model.damping, self.problem.factor, STEP)
 
         def displacement() -> Floats:
             return motion.displacement.reshape(-1, 3)
 
-        return Stepper(motion.take_step, displacement, STEP, subspace.load.size)
+        def certified_motion() -> CertifiedMotion:
+            return CertifiedMotion(self.certificate, self.model.damping, self.problem.factor, STEP)
+
+        bound = bound_on_demand(certified_motion, lambda: motion.time)
+        return Stepper(
+            motion.take_step,
+            displacement,
+            STEP,
+            subspace.load.size,
+            bound=bound if self.model.certificate else None,
+        )
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[SuperpositionModel]:
@@ -165,6 +208,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[SuperpositionModel]:
         damping=reference_damping(scene),
         vectors=chosen.vectors,
         count=chosen.count,
+        certificate=chosen.certificate,
     )
 
 

@@ -18,6 +18,7 @@ from study.results.records import DiscretisationError, ModelRecord, StudyRecord
 from study.results.tables import (
     QUANTITIES,
     BandSample,
+    CertifiedSample,
     CurveSample,
     ScoreDifference,
     ScoreError,
@@ -70,6 +71,7 @@ def check(results: Results) -> None:
     times = np.linspace(0.0, scene.time.duration, scene.time.samples)
     _check_motions("curves.csv", results.curves, _curves(record, times), times)
     _check_motions("bands.csv", results.bands, _bands(record, times), times)
+    _check_motions("certified.csv", results.certified, _bounded(record, times), times)
     _check_keys("similarity.csv", [row[:-1] for row in results.scores], _scored(record))
     for line, row in enumerate(results.scores, FIRST_LINE):
         if not 0.0 <= row.score <= 1.0:
@@ -146,6 +148,9 @@ def _check_model(model: ModelRecord, record: StudyRecord) -> None:
         raise ValueError(f"{where}: {model.system} is none of the fuzzy systems")
     rounding = {} if model.lattice is None else model.lattice.rounding_errors
     tables: list[Mapping[str, object]] = [one for one in (model.time_step_errors, rounding) if one]
+    certified = None if model.elements is None else model.elements.certified
+    if certified is not None:
+        tables += [certified.displacement, certified.largest_m]
     error = model.mesh_error
     if error is not None:
         tables += _by_probe(error)
@@ -186,9 +191,17 @@ def _bands(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
             yield Wanted(model.name, probe, 0 if lost else len(times), len(times))
 
 
+def _bounded(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
+    """Of models with a certificate."""
+    for model in record.models:
+        if model.elements is not None and model.elements.certified is not None:
+            for probe in record.probes:
+                yield Wanted(model.name, probe, len(times), len(times))
+
+
 def _check_motions(
     file: str,
-    rows: Sequence[CurveSample | BandSample],
+    rows: Sequence[CurveSample | BandSample | CertifiedSample],
     wanted: Iterator[Wanted],
     times: Floats,
 ) -> None:

@@ -5,6 +5,7 @@ results.json    numbers, provenance        bands.csv       type-2 interval carri
 similarity.csv  score of each pair         errors.csv      differences of the whole field
 sensitivity.csv choices of the fuzzy side  iso_18571.csv   parts of those scores
 score_errors.csv, score_differences.csv    what scores depend on, and their differences
+certified.csv   bound of a superposition's error
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
 MODEL.vtkhdf    motion of all nodes, if asked for
 SHA256SUMS      checksums of all these, which `sha256sum -c` verifies too
@@ -36,6 +37,7 @@ from study.results.errors import ResultsError
 from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
 from study.results.tables import (
     BandSample,
+    CertifiedSample,
     CurveSample,
     FieldDifference,
     Iso18571Rating,
@@ -74,6 +76,7 @@ class Results:
     record: StudyRecord
     curves: tuple[CurveSample, ...] = ()
     bands: tuple[BandSample, ...] = ()
+    certified: tuple[CertifiedSample, ...] = ()
     scores: tuple[SimilarityScore, ...] = ()
     ratings: tuple[Iso18571Rating, ...] = ()
     score_errors: tuple[ScoreError, ...] = ()
@@ -116,6 +119,7 @@ def write(results: Results, folder: Path) -> None:
     (folder / SCENE).write_text(write_scene(results.scene), encoding="utf-8")
     write_table(folder / "curves.csv", CurveSample, results.curves)
     write_table(folder / "bands.csv", BandSample, results.bands)
+    write_table(folder / "certified.csv", CertifiedSample, results.certified)
     write_table(folder / "similarity.csv", SimilarityScore, results.scores)
     write_table(folder / "iso_18571.csv", Iso18571Rating, results.ratings)
     write_table(folder / "score_errors.csv", ScoreError, results.score_errors)
@@ -190,6 +194,7 @@ def _content(folder: Path, table: Mapping[str, object]) -> Results:
         record,
         read_table(folder / "curves.csv", CurveSample),
         read_table(folder / "bands.csv", BandSample),
+        read_table(folder / "certified.csv", CertifiedSample),
         read_table(folder / "similarity.csv", SimilarityScore),
         read_table(folder / "iso_18571.csv", Iso18571Rating),
         read_table(folder / "score_errors.csv", ScoreError),

@@ -19,7 +19,7 @@ DATA = frozenset(
     {
         *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
         *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
-        *("iso_18571.csv", "score_errors.csv", "score_differences.csv"),
+        *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
     }
 )
 ALWAYS = DATA - {"fields.npz", "fuzzy.npz"}

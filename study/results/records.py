@@ -83,11 +83,32 @@ class LargeStrain:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CertifiedReduction:
+    """Bounds, not estimates, of what a subspace's motion is off all unknowns of its mesh.
+
+    Under the same load, linear over the same steps: of neither the mesh's nor the steps' error.
+    `energy`: largest bound of the error's energy norm over the largest of the motion; by control
+    point the bound of the displacement's error in relative L2 of its curve, and the largest
+    [m]. `rest`: of the energy norm under the full load at rest. `vectors`: of the Krylov space by
+    which the error is bounded; `rounding`: what rounding alone adds to `energy` where the whole
+    load comes at once.
+    """
+
+    vectors: int
+    energy: float
+    rest: float
+    rounding: float
+    displacement: dict[str, float]
+    largest_m: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
 class ElementsRecord:
     """What only finite elements have.
 
-    `subspace_vectors` and `truncation_error` are those of a superposition; `accuracy_missed`: the
-    accuracy that was asked for and not reached.
+    `subspace_vectors` and `truncation_error` are those of a superposition, and so is `certified`,
+    None where no bound was asked for or found; `accuracy_missed`: the accuracy that was asked for
+    and not reached.
     """
 
     element: str
@@ -96,6 +117,7 @@ class ElementsRecord:
     method: str
     subspace_vectors: int | None = None
     truncation_error: float | None = None
+    certified: CertifiedReduction | None = None
     largest_rotation_rad: float | None = None
     levels: tuple[MeshLevel, ...] = ()
     mesh_error: DiscretisationError | None = None

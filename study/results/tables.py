@@ -33,6 +33,18 @@ class BandSample(NamedTuple):
     velocity_at_upper_m_per_s: float
 
 
+class CertifiedSample(NamedTuple):
+    """Bound of what a superposition's displacement is off all unknowns: certified.csv.
+
+    The length of the error, not only along the push, is at most this at that time.
+    """
+
+    model: str
+    probe: str
+    time_s: float
+    displacement_bound_m: float
+
+
 class SimilarityScore(NamedTuple):
     """Score of a model's curve against that of a reference by one measure: similarity.csv."""
 

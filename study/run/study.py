@@ -30,7 +30,7 @@ from study.run.requirement import requirement_checks
 from study.run.score_errors import error_rows, rating_rows
 from study.run.stages import ALONE, Means, Stage, Stages
 from study.run.suiting import suited
-from study.run.tables import band_rows, curve_rows, difference_rows, similarity_rows
+from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
 from study.run.warnings import warnings
 from study.scene import Scene
 from study.scene.file import validate, write_scene
@@ -200,6 +200,12 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             for name, run in runs.items()
             if run.bounds is not None
             for row in band_rows(response, name, run.bounds)
+        ),
+        tuple(
+            row
+            for name, run in runs.items()
+            if run.certified is not None
+            for row in certified_rows(response, name, run.certified)
         ),
         scores,
         tuple(rating_rows(response, sound, scores)),

@@ -1,4 +1,4 @@
-"""Rows of the result tables: curves, bands, similarity, differences of the field."""
+"""Rows of the result tables: curves, bands, bounds, similarity, differences of the field."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from study.problem.response import Response
 from study.problem.trajectory import Trajectory
 from study.results.tables import (
     BandSample,
+    CertifiedSample,
     CurveSample,
     FieldDifference,
     SimilarityScore,
@@ -40,6 +41,13 @@ def band_rows(response: Response, model: str, bounds: Sequence[Trajectory]) -> I
         for t, *values in zip(response.times, *columns, strict=True):
             if np.isfinite(values).all():
                 yield BandSample(model, probe, float(t), *map(float, values))
+
+
+def certified_rows(response: Response, model: str, bounds: Floats) -> Iterator[CertifiedSample]:
+    """Samples of a bound [m] (samples, probes)."""
+    for probe, bound in zip(response.probes, bounds.T, strict=True):
+        for t, value in zip(response.times, bound, strict=True):
+            yield CertifiedSample(model, probe, float(t), float(value))
 
 
 def similarity_rows(

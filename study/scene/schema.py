@@ -225,10 +225,15 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class Superposition:
-    """Of the model of that name: Ritz vectors or modes of vibration, and how many."""
+    """Of the model of that name: Ritz vectors or modes of vibration, and how many.
+
+    `certificate`: vectors of a longer Krylov space by which the error of these few is bounded; with
+    0 it is not.
+    """
 
     vectors: Literal["ritz", "modal"] = "ritz"
     count: Annotated[int, Quantity("", 1, 400)] = 16
+    certificate: Annotated[int, Quantity("", 0, 1000)] = 128
 
 
 @dataclass(frozen=True, kw_only=True)
