@@ -2,9 +2,9 @@
 
     python -m tests.benchmarks.over_time [ARGUMENTS OF asv run]
 
-measures this commit in the environment that runs it and adds it to the `results` beside this file; it
-takes three minutes and wants `pip install asv`. Commit first: a figure is stored under the commit
-that is checked out. Each figure is the processor time of a task over that of a calibration loop, so
+measures this commit in the environment that runs it and adds it to the `results` beside this file.
+It takes three minutes and wants `pip install asv`. Commit first: a figure is stored under the
+commit that is checked out. Each is the processor time of a task over that of a calibration loop, so
 that machines can be compared. `asv show`, `asv compare A B` and `asv publish`, each with
 `--config tests/benchmarks/over_time/asv.conf.json`, read the history.
 """
