@@ -81,15 +81,21 @@ def tenths(share: float | str) -> str:
     return f"{100 * float(share):.1f} %"
 
 
+def two_digits(number: str) -> str:
+    """A number to two digits, without an exponent."""
+    return f"{float(f'{float(number):.2g}'):g}"
+
+
 def count(number: float | str) -> str:
     """A count in groups of three digits."""
     return f"{int(number):,}".replace(",", " ")
 
 
 def span(values: Iterable[float], form: Callable[[float], str] = "{:.1f}".format) -> str:
-    """The least and the largest: "a to b"."""
-    least, *_, largest = sorted(values)
-    return f"{form(least).removesuffix(' %')} to {form(largest)}"
+    """The least and the largest: "a to b", or "a" where they read the same."""
+    ordered = sorted(values)
+    least, largest = form(ordered[0]), form(ordered[-1])
+    return largest if least == largest else f"{least.removesuffix(' %')} to {largest}"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -254,28 +260,36 @@ def _where(lines: list[Line]) -> str:
 def peers() -> Iterator[tuple[str, str]]:
     """Other engines on the same nodes."""
     lines = measured("peers")
-    own = {line["nodes"]: line for line in lines if line["engine"].startswith("lattice")}
-
-    def of(engine: str, nu: str | None = None) -> list[Line]:
-        named = [line for line in lines if line["engine"].startswith(engine)]
-        return [line for line in named if nu in (None, line["nu"])]
-
-    def errors(engine: str) -> list[float]:
-        found = of(engine, "0.45")
-        return [
-            float(one["field_error"]) / float(own[one["nodes"]]["field_error"]) for one in found
-        ]
-
-    newton = of("Newton SemiImplicit")
-    explicit = [one for one in of("MuJoCo flex") if one["engine"].endswith("Euler")]
-    yield "newton-cost", span(float(one["relative_to_ours"]) for one in newton)
+    yield "peers-on", _where(lines)
+    yield "newton-cost", _peer_cost(lines, "Newton SemiImplicit, springs")
+    yield "newton-tetrahedra-cost", _peer_cost(lines, "Newton SemiImplicit, tetrahedra")
+    yield "mujoco-cost", _peer_cost(lines, "MuJoCo flex trilinear, Euler")
+    newton = [one for one in lines if one["engine"] == "Newton SemiImplicit, springs"]
+    apart = max(float(one["from_ours"]) for one in newton)
+    yield "newton-apart", f"{apart:.0e}".replace("e-0", "e-")
+    most = max(int(one["nodes"]) for one in lines)
+    yield "peers-nodes", count(most)
     yield (
-        "newton-apart",
-        f"{max(float(one['from_ours']) for one in newton):.0e}".replace("e-0", "e-"),
+        "peers",
+        table(
+            ("engine", "Poisson ratio", "time over ours", "field error", "would be objected"),
+            [
+                [
+                    one["engine"],
+                    one["nu"],
+                    two_digits(one["relative_to_ours"]),
+                    tenths(one["field_error"]),
+                    one["objection"].partition("; ")[2],  # the first is that of the engine
+                ]
+                for one in lines
+                if int(one["nodes"]) == most
+            ],
+        ),
     )
-    yield "mujoco-cost", span((float(one["relative_to_ours"]) for one in explicit), "{:.0f}".format)
-    yield "mujoco-trilinear-error", span(errors("MuJoCo flex trilinear"))
-    yield "mujoco-full-error", span(errors("MuJoCo flex full"))
+
+
+def _peer_cost(lines: list[Line], engine: str) -> str:
+    return span(float(one["relative_to_ours"]) for one in lines if one["engine"] == engine)
 
 
 def error_bar() -> Iterator[tuple[str, str]]:

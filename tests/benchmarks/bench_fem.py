@@ -41,7 +41,7 @@ from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import nodal_problem
 from fem_reference.grid import straight
 from fem_reference.solvers import solve_static
-from study.problem.problem import NodalProblem
+from study.problem.problem import Problem
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -89,13 +89,13 @@ class Timed(NamedTuple):
     compiled: float
 
 
-def case(element_size: float) -> tuple[Scene, NodalProblem]:
+def case(element_size: float) -> tuple[Scene, Problem]:
     """The built-in liver."""
     scene = read_scene("liver", (f"reference.element_size={1e3 * element_size:g} mm",))
     return scene, problem_of(scene)
 
 
-def discretised(element_size: float) -> tuple[Scene, NodalProblem, Body]:
+def discretised(element_size: float) -> tuple[Scene, Problem, Body]:
     """Its body of straight quadratic tetrahedra."""
     scene, posed = case(element_size)
     body = discretise(posed.geometry.mesh, scene.tissue, posed.foundation, posed.tool, element="p2")
@@ -125,7 +125,7 @@ def assembly(felupe: str | None) -> list[Row]:
     return [assembly_row(name, runs, norm, len(body.load)) for name, runs in found.items()]
 
 
-def ours(scene: Scene, posed: NodalProblem) -> Timed:
+def ours(scene: Scene, posed: Problem) -> Timed:
     """Sums of scalar forms, as the reference assembles."""
     seconds = []
     for _ in range(REPEATS):
@@ -135,7 +135,7 @@ def ours(scene: Scene, posed: NodalProblem) -> Timed:
     return Timed(version("scikit-fem"), seconds, float(np.linalg.norm(found.matrix.data)), 0.0)
 
 
-def on_vectors(scene: Scene, posed: NodalProblem) -> Timed:
+def on_vectors(scene: Scene, posed: Problem) -> Timed:
     """scikit-fem's own form of elasticity, on vectors."""
     seconds = []
     form = linear_elasticity(

@@ -3,10 +3,8 @@
     python -m tests.benchmarks.bench_growth
 
 prints the figures and writes reports/data/lattice_growth.csv; it takes three minutes and 4 GB.
-Times are of a full cube with volume term, least of several repeats in turns, as `bench_lattice`
-takes them. Steps over the number
-of nodes are those of a run, over the grid; orders of nodes matter only to the list of springs, as a
-grid has its own.
+Times are of a full cube with volume term, least of several repeats in turns, as in `bench_lattice`.
+Orders of nodes matter only to the list of springs, as a grid has its own.
 """
 
 from __future__ import annotations
