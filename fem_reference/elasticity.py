@@ -137,9 +137,12 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
 def _held(own: Stiffness, support: csc_array) -> Stiffness:
     """With the support in it, whose nodes are of cells too; the matrix is changed, not copied."""
     matrix, nodal = own.matrix, coo_array(support[::3, ::3])
-    count = nodal.shape[0]
-    rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
-    entries = np.searchsorted(rows * count + matrix.indices, nodal.row * count + nodal.col)
+    rows = np.repeat(np.arange(nodal.shape[0]), np.diff(matrix.indptr))
+    places, wanted = (
+        np.ravel_multi_index(pair, nodal.shape)
+        for pair in ((rows, matrix.indices), (nodal.row, nodal.col))
+    )
+    entries = np.searchsorted(places, wanted)
     matrix.data[entries] += nodal.data[:, None, None] * np.eye(3)
     return own
 
@@ -250,7 +253,7 @@ def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
 def _isotropic(integrals: Gradients, lame: float, mu: float) -> bsr_array:
     """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well."""
     D = integrals.values
-    blocks = mu * D.mT
+    blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
     blocks += lame * D
     diagonal = np.einsum("nii->ni", blocks)
     diagonal += mu * np.einsum("nii->n", D)[:, None]
