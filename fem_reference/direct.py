@@ -18,8 +18,8 @@ IMBALANCE = 1e-6
 """Share of the load by which no answer is out of balance, whatever rounding is to be expected."""
 
 
-def factorised(matrix: csc_array) -> Solve:
-    """Solution by factors of a symmetric matrix, in an ordering that keeps them small.
+def factorised(matrix: Any) -> Solve:
+    """Solution by factors of a symmetric sparse matrix, in an ordering that keeps them small.
 
     The matrix is positive definite, or that of a saddle point with definite blocks, which has such
     factors in any ordering too. ValueError if it is singular: nothing holds the body.
@@ -60,7 +60,7 @@ def pivots(matrix: csc_array) -> Pivots:
 def _factors(matrix: csc_array) -> Any:
     try:
         return splu(
-            matrix,
+            csc_array(matrix),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},

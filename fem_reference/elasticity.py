@@ -2,23 +2,23 @@
 
 Isotropic elasticity is a sum of scalar forms: with D_ij the integral of d_i u d_j v for one
 component, block (i, j) of the stiffness is lambda D_ji + mu D_ij, and on the diagonal the trace of
-D times mu as well. scikit-fem assembles the six scalar matrices ten times faster than one form on
-vectors.
+D times mu as well. D is integrated once and serves any Lame constants.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import block_array, csc_array, csr_array, eye_array, kron
+from scipy.sparse import bsr_array, coo_array, csc_array, eye_array, hstack, kron
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
+from fem_reference.forms import Gradients, gradients, pattern, products
 from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
@@ -34,13 +34,26 @@ MASS_ORDER = 4
 FACET_ORDER = 10
 
 
+class Outline(NamedTuple):
+    """A body's mesh and shape functions, by which fields on it are seen, without its matrices.
+
+    `nodes`: scikit-fem's basis of one component, at a single point of every cell.
+    """
+
+    mesh: TetrahedralMesh
+    element: ElementName
+    nodes: Any
+    unknowns: int
+
+
 @dataclass(frozen=True)
 class Body:
     """The discretised body; unknowns u [m] (3 nodes,), component by component of each node.
 
     `nodes`: scikit-fem's basis of one component, vertices first, then edges; `stiffness` [N/m] has
     the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
-    [N], the tool's force spread over the surface, its sum `force` along the tool.
+    [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
+    the stiffness is made of by the tissue's constants.
     """
 
     mesh: TetrahedralMesh
@@ -50,6 +63,7 @@ class Body:
     mass: csc_array
     support: csc_array
     load: Floats
+    gradients: Gradients
 
     @property
     def node_count(self) -> int:
@@ -60,6 +74,13 @@ class Body:
     def unknowns(self) -> int:
         """Number of displacements and pressures."""
         return self.stiffness.unknowns
+
+    @property
+    def outline(self) -> Outline:
+        """What fields on it are seen by."""
+        cells, centre = self.nodes, (np.full((3, 1), 0.25), np.ones(1))
+        nodes = skfem.Basis(cells.mesh, cells.elem, cells.mapping, quadrature=centre)
+        return Outline(self.mesh, self.element, nodes, self.unknowns)
 
     @cached_property
     def points(self) -> Floats:
@@ -91,11 +112,39 @@ def discretise(
     grid, one = surface.mesh, surface.elem
     support = _by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
-    mass = tissue.density * _finite(_product_form().assemble(nodes), "the mass")
-    own = elastic(grid, name, tissue)
-    stiffness = Stiffness(csc_array(own.matrix + support), own.pressure)
+    where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
+    mass = _by_component(tissue.density * _finite(products(nodes, where), "the mass"))
+    integrals = gradients(by_gradient, where)
+    stiffness = _held(_elastic(integrals, nodes, name, tissue), support)
     load = _load(surface, tool)
-    return Body(mesh, name, nodes, stiffness, _by_component(mass), support, load)
+    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals)
+
+
+def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
+    """The same body with the elastic constants of another tissue, on its nodes and their integrals.
+
+    Mass, support and load stay. ValueError for a Poisson ratio that no solid has, and for an
+    element with other nodes.
+    """
+    name = chosen_element(element, tissue.poisson_ratio)
+    _check_poisson_ratio(tissue.poisson_ratio)
+    if ELEMENTS[name].shapes is not ELEMENTS[body.element].shapes:
+        raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
+    own = _elastic(body.gradients, body.nodes, name, tissue, body.stiffness.pressure)
+    return replace(body, element=name, stiffness=_held(own, body.support))
+
+
+def _held(own: Stiffness, support: csc_array) -> Stiffness:
+    """With the support in it, whose nodes are of cells too; the matrix is changed, not copied."""
+    matrix, nodal = own.matrix, coo_array(support[::3, ::3])
+    rows = np.repeat(np.arange(nodal.shape[0]), np.diff(matrix.indptr))
+    places, wanted = (
+        np.ravel_multi_index(pair, nodal.shape)
+        for pair in ((rows, matrix.indices), (nodal.row, nodal.col))
+    )
+    entries = np.searchsorted(places, wanted)
+    matrix.data[entries] += nodal.data[:, None, None] * np.eye(3)
+    return own
 
 
 def loaded_surface(
@@ -156,51 +205,62 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
 
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
-    kind = ELEMENTS[name]
-    order = CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else kind.gradient_order
-    basis = skfem.Basis(grid, kind.shapes(), mapping(grid), intorder=order)
+    nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), mapping(grid), intorder=_order(grid, name))
+    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue)
+
+
+def _order(grid: Any, name: ElementName) -> int:
+    """Degree that the quadrature of the stiffness integrates."""
+    return CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else ELEMENTS[name].gradient_order
+
+
+def _by_order(nodes: Any, order: int) -> Any:
+    """The same basis with the quadrature of an order, where it is another than the mass's."""
+    if order == MASS_ORDER:
+        return nodes
+    return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=order)
+
+
+def _elastic(
+    integrals: Gradients,
+    nodes: Any,
+    name: ElementName,
+    tissue: Tissue,
+    pressure: Pressure | None = None,
+) -> Stiffness:
+    """Stiffness without support from its integrals, and from those of a pressure if there are."""
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    mixed = kind.mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
-    matrix = _interleaved(_blocks(basis, 0.0 if mixed else lame, mu))
+    mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
+    matrix = _isotropic(integrals, 0.0 if mixed else lame, mu)
     if not mixed:
         return Stiffness(matrix)
-    # One rule for both: the product of a gradient and a pressure, and of two pressures.
-    pressure = skfem.Basis(grid, skfem.ElementTetP1(), basis.mapping, intorder=order)
-    divergence = [
-        skfem.BilinearForm(lambda u, q, _, d=d: u.grad[d] * q).assemble(basis, pressure)
-        for d in range(3)
-    ]
-    coupling = _interleaved([[_finite(one, "the coupling") for one in divergence]])
-    products = csc_array(_product_form().assemble(pressure))
-    return Stiffness(matrix, Pressure(coupling, products, lame, mu))
+    known = _pressure(nodes, name) if pressure is None else (pressure.divergence, pressure.mass)
+    return Stiffness(matrix, Pressure(*known, lame, mu))
 
 
-def _blocks(basis: Any, lame: float, mu: float) -> list[list[csr_array]]:
-    """Blocks by component of the stiffness, rows those of the test function."""
-    D: dict[tuple[int, int], csr_array] = {}
-    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
-        form = skfem.BilinearForm(lambda u, v, _, i=i, j=j: u.grad[i] * v.grad[j])
-        D[i, j] = csr_array(_finite(form.assemble(basis), "the stiffness"))
-        D[j, i] = D[i, j].T
-    trace = D[0, 0] + D[1, 1] + D[2, 2]
-
-    def block(i: int, j: int) -> csr_array:
-        return lame * D[j, i] + mu * D[i, j] + (mu * trace if i == j else 0.0 * trace)
-
-    return [[block(i, j) for j in range(3)] for i in range(3)]
+def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
+    """One rule for both: the product of a divergence and a pressure, and of two pressures."""
+    grid, order = nodes.mesh, _order(nodes.mesh, name)
+    pressure = skfem.Basis(grid, skfem.ElementTetP1(), nodes.mapping, intorder=order)
+    basis = _by_order(nodes, order)
+    forms = [skfem.BilinearForm(lambda u, q, _, d=d: u.grad[d] * q) for d in range(3)]
+    parts = [_finite(one.assemble(basis, pressure), "the coupling") for one in forms]
+    by_node = np.arange(3 * basis.N).reshape(3, -1).T.ravel()
+    coupling = csc_array(csc_array(hstack(parts, format="csc"))[:, by_node])
+    return coupling, csc_array(products(pressure, pattern(pressure)))
 
 
-def _interleaved(blocks: list[list[csr_array]]) -> csc_array:
-    """Blocks of components as one matrix whose unknowns go node by node."""
-    whole = csr_array(block_array(blocks, format="csr"))
-    rows, columns = (
-        _node_by_node(n, len(b)) for n, b in zip(whole.shape, (blocks, blocks[0]), strict=True)
-    )
-    return csc_array(whole[rows][:, columns])
-
-
-def _node_by_node(size: int, components: int) -> NDArray[np.int64]:
-    return np.arange(size).reshape(components, -1).T.ravel()
+def _isotropic(integrals: Gradients, lame: float, mu: float) -> bsr_array:
+    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well."""
+    D = integrals.values
+    blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
+    blocks += lame * D
+    diagonal = np.einsum("nii->ni", blocks)
+    diagonal += mu * np.einsum("nii->n", D)[:, None]
+    if not np.isfinite(blocks).all():
+        raise ValueError("the stiffness matrix is not finite: the mesh has a flat tetrahedron")
+    size = 3 * (len(integrals.indptr) - 1)
+    return bsr_array((blocks, integrals.indices, integrals.indptr), shape=(size, size))
 
 
 def _by_component(matrix: csc_array) -> csc_array:
@@ -213,10 +273,6 @@ def _finite(matrix: Any, name: str) -> csc_array:
     if not np.isfinite(matrix.data).all():
         raise ValueError(f"{name} matrix is not finite: the mesh has a flat tetrahedron")
     return csc_array(matrix)
-
-
-def _product_form() -> Any:
-    return skfem.BilinearForm(lambda u, v, _: u * v)
 
 
 def _foundation_form(foundation: Foundation) -> Any:

@@ -23,6 +23,8 @@ HALVINGS = 4
 NEWTON_STEPS = 8
 NEWTON_TOLERANCE = 1e-9
 """[m]"""
+SETTLED = 1e-9
+"""[m]; from so far off, a step of Newton's method goes as near as numbers do."""
 # Corners, edge nodes and centre of the reference tetrahedron.
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 _EDGES = 0.5 * (_CORNERS[[0, 0, 0, 1, 1, 2]] + _CORNERS[[1, 2, 3, 2, 3, 3]])
@@ -35,6 +37,20 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
     scikit-fem's own starts outside the cell and is held to a cube round it, so that it fails for
     some points of curved cells and for all beyond a face.
     """
+
+    _kept: tuple[Any, Any, dict[tuple[int, int], Floats]] = (None, None, {})
+
+    def J(self, i: int, j: int, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+        """Derivative of coordinate i by local coordinate j, kept for the last points alone.
+
+        scikit-fem keeps those of every step of Newton's method, as long as there is a mesh.
+        """
+        if self._kept[0] is not X or self._kept[1] is not tind:
+            self._kept = (X, tind, {})
+        known = self._kept[2]
+        if (i, j) not in known:
+            known[i, j] = self._J(i, j, X, tind)
+        return known[i, j]
 
     def invF(self, x: Floats, tind: Any = None, **_: Any) -> Floats:  # noqa: N802 - scikit-fem's
         """Local coordinates (3, cells, q) of points x [m] (3, cells, q), by Newton's method.
@@ -52,9 +68,13 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
         edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0)
         offset = np.moveaxis(x - corners[:, 0][:, :, None], 1, 0)
         local = np.moveaxis(np.linalg.solve(edges, offset), 0, 1)
+        numbers = np.arange(local.shape[1]) if cells is None else cells
+        left = np.arange(len(numbers))
         for _ in range(NEWTON_STEPS):
-            off = x - self.F(local, cells)
-            local = local + np.einsum("ijqn,jqn->iqn", self.invDF(local, cells), off)
+            near, among = local[:, left], numbers[left]
+            off = x[:, left] - self.F(near, among)
+            local[:, left] = near + np.einsum("ijqn,jqn->iqn", self.invDF(near, among), off)
+            left = left[(np.abs(off) > SETTLED).any(axis=(0, 2))]
         return local, np.abs(x - self.F(local, cells)).max(axis=0)
 
 
@@ -90,7 +110,7 @@ def curved(mesh: TetrahedralMesh, project: Projection) -> Any:
     )
     for attempt in range(HALVINGS + 1):
         bent = _bent(flat, edges, middle + share[:, None] * move)
-        distorted = bent.mapping().detDF(_LOOKED_AT).min(axis=1) < LEAST_JACOBIAN * volumes
+        distorted = mapping(bent).detDF(_LOOKED_AT).min(axis=1) < LEAST_JACOBIAN * volumes
         if not distorted.any():
             return bent
         share[np.isin(edges, flat.t2e[:, distorted])] *= 0.5 if attempt < HALVINGS - 1 else 0.0

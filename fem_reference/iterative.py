@@ -1,20 +1,20 @@
 """Conjugate gradients on two levels of elements, and for mixed elements minimal residuals.
 
 Quadratic elements are preconditioned by a solution with linear elements on the same mesh, an eighth
-of the unknowns, added to the diagonal: the iterations do not grow as the mesh is refined. The
-linear elements are solved by factors, or, when they are many, by a cycle of algebraic multigrid
-with the six rigid motions as near-null space.
+of the unknowns, added to that of every node alone: the iterations do not grow as the mesh is
+refined. The linear elements are solved by factors, or, when they are many, by a cycle of algebraic
+multigrid with the six rigid motions as near-null space.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array, csr_matrix, eye_array, kron
+from scipy.sparse import bsr_array, bsr_matrix, csc_array, csr_array
 from scipy.sparse.linalg import LinearOperator, cg, minres
 
 from fem_reference.direct import IMBALANCE, Solve, factorised
@@ -31,18 +31,48 @@ ROUNDING = 1e-15
 """Of the sum of magnitudes that make up a residual."""
 FACTORED_BELOW = 6_000
 """Linear unknowns that are solved by factors as fast as by a cycle."""
+SHARE = 0.7
+"""Of the solution of every node alone: the sum with that of linear elements overshoots."""
+
+
+class Solver(Protocol):
+    """Solution of K u = f for loads f [N] (n,), however many."""
+
+    def __call__(
+        self, load: Floats, tolerance: float | None = None, start: Floats | None = None
+    ) -> Floats:
+        """Displacement [m] (n,) to a residual of `tolerance` times the load, from a `start`."""
 
 
 def preconditioner(body: Body) -> Solve:
     """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
-    matrix = csr_array(body.stiffness.matrix)
+    matrix = body.stiffness.matrix.tobsr(blocksize=(3, 3))
     if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
-    prolong = csr_array(kron(_from_vertices(body.nodes.mesh, body.node_count), eye_array(3)))
-    vertices = prolong.shape[1] // 3
-    coarse = _linear_level(csr_array(prolong.T @ matrix @ prolong), body.points[:vertices])
-    restrict, diagonal = csr_array(prolong.T), matrix.diagonal()
-    return lambda residual: residual / diagonal + prolong @ coarse(restrict @ residual)
+    prolong = _from_vertices(body.nodes.mesh, body.node_count)
+    coarse = _linear_level(_on_vertices(matrix, prolong), body.points[: prolong.shape[1]])
+    restrict, alone = csr_array(prolong.T), SHARE * _inverted_diagonal(matrix)
+
+    def both(residual: Floats) -> Floats:
+        by_node = residual.reshape(-1, 3)
+        vertices = coarse((restrict @ by_node).ravel()).reshape(-1, 3)
+        return np.asarray((alone @ by_node[..., None])[..., 0] + prolong @ vertices).ravel()
+
+    return both
+
+
+def _on_vertices(matrix: bsr_array, prolong: csr_array) -> bsr_array:
+    """The matrix of linear elements, as quadratic ones that are linear."""
+    blocks = prolong.data[:, None, None] * np.eye(3)
+    shape = (3 * prolong.shape[0], 3 * prolong.shape[1])
+    by_node = bsr_array((blocks, prolong.indices, prolong.indptr), shape=shape)
+    return by_node.T @ matrix @ by_node
+
+
+def _inverted_diagonal(matrix: bsr_array) -> Floats:
+    """Inverses of the diagonal blocks (nodes, 3, 3)."""
+    rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+    return np.linalg.inv(matrix.data[rows == matrix.indices])
 
 
 def _from_vertices(mesh: Any, nodes: int) -> csr_array:
@@ -55,20 +85,19 @@ def _from_vertices(mesh: Any, nodes: int) -> csr_array:
     return csr_array((values, (rows, columns)), shape=(nodes, count))
 
 
-def _linear_level(matrix: csr_array, points: Floats) -> Solve:
+def _linear_level(matrix: bsr_array, points: Floats) -> Solve:
     if matrix.shape[0] < FACTORED_BELOW:
-        return factorised(csc_array(matrix))
+        return factorised(matrix)
     from pyamg import smoothed_aggregation_solver
 
-    smoother = ("block_gauss_seidel", {"sweep": "symmetric"})
     with _drawing_alike():
         levels = smoothed_aggregation_solver(
-            csr_matrix(matrix).tobsr(blocksize=(3, 3)),
+            bsr_matrix(matrix),
             B=rigid_motions(points),
             strength=("symmetric", {"theta": 0.0}),
             smooth="jacobi",
-            presmoother=smoother,
-            postsmoother=smoother,
+            presmoother=("block_gauss_seidel", {"sweep": "forward"}),
+            postsmoother=("block_gauss_seidel", {"sweep": "backward"}),
         )
     cycle = levels.aspreconditioner()
     return lambda residual: np.asarray(cycle @ residual)
@@ -98,15 +127,14 @@ def rigid_motions(points: Floats) -> Floats:
     return motions.reshape(-1, 6)
 
 
-def iterative(body: Body, tolerance: float) -> Solve:
-    """Solution of K u = f to a residual of `tolerance` times f.
+def iterative(body: Body, tolerance: float) -> Solver:
+    """Solution of K u = f to a residual of `tolerance` times f, where no other is asked for.
 
     ValueError if it is not reached: nothing holds the body, or the elements are nearly flat.
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        matrix = csr_array(body.stiffness.matrix)
-        return lambda load: _refined(cg, matrix, inner, load, tolerance)
+        return _solver(cg, body.stiffness.matrix, inner, tolerance)
     # The Schur complement is equivalent to the pressure's mass over the shear modulus, at any nu.
     schur = factorised(csc_array((1.0 / pressure.shear + 1.0 / pressure.lame) * pressure.mass))
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
@@ -114,25 +142,42 @@ def iterative(body: Body, tolerance: float) -> Solve:
     def both(residual: Floats) -> Floats:
         return np.concatenate([inner(residual[:size]), schur(residual[size:])])
 
-    padding = np.zeros(whole.shape[0] - size)
-    return lambda load: _refined(minres, whole, both, np.concatenate([load, padding]), tolerance)[
-        :size
-    ]
+    return _solver(minres, whole, both, tolerance, size)
+
+
+def _solver(
+    method: Any, matrix: Any, inner: Solve, usual: float, size: int | None = None
+) -> Solver:
+    """Of the first `size` unknowns, the others being those of a pressure and without load."""
+
+    def padded(values: Floats) -> Floats:
+        return np.concatenate([values, np.zeros(matrix.shape[0] - len(values))])
+
+    def solve(load: Floats, tolerance: float | None = None, start: Floats | None = None) -> Floats:
+        wanted = usual if tolerance is None else tolerance
+        first = None if start is None else padded(start)
+        return _refined(method, matrix, inner, padded(load), wanted, first)[:size]
+
+    return solve
 
 
 def _refined(
-    method: Any, matrix: csr_array, inner: Solve, load: Floats, tolerance: float
+    method: Any,
+    matrix: Any,
+    inner: Solve,
+    load: Floats,
+    tolerance: float,
+    start: Floats | None = None,
 ) -> Floats:
     """Iterate again on what is left, as minimal residuals stop by a norm of their own."""
     operator = LinearOperator(matrix.shape, matvec=inner, dtype=np.float64)
-    found, left, scale = np.zeros_like(load), load, float(np.linalg.norm(load))
-    magnitude = abs(matrix)
+    found = np.zeros_like(load) if start is None else start
+    left, scale = load - matrix @ found, float(np.linalg.norm(load))
     for _ in range(REFINEMENTS):
-        reachable = ROUNDING * float(np.linalg.norm(magnitude @ np.abs(found)))
-        # Rounding excuses no more than that: of a nearly singular matrix it would excuse anything.
-        if np.linalg.norm(left) <= max(tolerance * scale, min(reachable, IMBALANCE * scale)):
+        size = float(np.linalg.norm(left))
+        if size <= tolerance * scale or size <= _rounding(matrix, found, size, scale):
             return found
-        wanted = STRICTER[method] * tolerance * scale / float(np.linalg.norm(left))
+        wanted = STRICTER[method] * tolerance * scale / size
         within = {"rtol": max(wanted, ROUNDING), "maxiter": MAX_ITERATIONS}
         with np.errstate(all="ignore"):  # a singular matrix may end in 0 / 0, as the residual tells
             more, _ = method(matrix, left, M=operator, **within)
@@ -144,3 +189,14 @@ def _refined(
         "the finite elements find no rest: the support does not hold the body, or a tetrahedron is "
         "nearly flat; enlarge support.depth, raise support.stiffness, or repair organ.mesh"
     )
+
+
+def _rounding(matrix: Any, found: Floats, size: float, scale: float) -> float:
+    """How much of a residual is rounding, which no iteration reduces.
+
+    That is no excuse for an imbalance that no answer has: in a nearly singular matrix it would
+    excuse anything.
+    """
+    if size > IMBALANCE * scale:
+        return 0.0  # without the magnitudes, which are a copy of the matrix
+    return ROUNDING * float(np.linalg.norm(abs(matrix) @ np.abs(found)))

@@ -22,6 +22,7 @@ from fem_reference.solvers import solve_static
 from fem_reference.superposition import (
     LOAD_STEPS,
     Choose,
+    Near,
     Superposed,
     enough_modes,
     enough_ritz_vectors,
@@ -96,7 +97,7 @@ class Solution:
         return solve_static(body) if self.superposed is None else self.superposed.subspace.rest()
 
 
-MotionMethod = Callable[[Body, RayleighDamping, Factor, Recorder, Method, Advance], Solution]
+MotionMethod = Callable[[Body, RayleighDamping, Factor, Recorder, Method, Near, Advance], Solution]
 """Motion under a load history, as a recorder observes it, by the settings of a method."""
 
 
@@ -107,9 +108,11 @@ def _stepped(
     factor: Factor,
     recorder: Recorder,
     method: Method,
+    near: Near,
     advance: Advance,
 ) -> Solution:
     """By equal steps in time; samples within a step are those of its cubic."""
+    del near  # a step is solved by factors
     times = recorder.observation.times
     pace = method.pace(factor, times)
     step, count = pace.length(float(times[1] - times[0])), pace.steps(len(times) - 1)
@@ -150,13 +153,14 @@ def _superposed(
     factor: Factor,
     recorder: Recorder,
     method: Method,
+    near: Near,
     advance: Advance,
 ) -> Solution:
     """In a subspace; its strain also where a control point is farthest out."""
     started = time.perf_counter()
     pace = method.load_pace(factor, recorder.observation.times)
     excitation = excitation_of(damping, factor, recorder, pace)
-    found = superposed(excitation, choose(body, excitation, method.modes, advance))
+    found = superposed(excitation, choose(body, excitation, method.modes, near, advance))
     wall = time.perf_counter() - started
     for sample in range(len(recorder.observation.times)):
         recorder.motion(sample, *(curve[sample] for curve in found.curves))
@@ -211,11 +215,16 @@ def run(
     observation: Observation,
     method: Method = Method(),
     on_progress: Advance = lambda _: None,
+    near: Near = None,
 ) -> Solution:
-    """Motion from rest under `factor` of the body's load. ValueError for an unknown method."""
+    """Motion from rest under `factor` of the body's load.
+
+    `near` (n, k): vectors near those of its superposition, as those on a coarser mesh, by which
+    they are found sooner. ValueError for an unknown method.
+    """
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
-    recorded = (Recorder(body, observation), method, on_progress)
+    recorded = (Recorder(body, observation), method, near, on_progress)
     return METHODS[method.name](body, damping, factor, *recorded)
 
 

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from fem_reference.elasticity import Body
+from fem_reference.elasticity import Body, Outline
 from fem_reference.grid import NEWTON_TOLERANCE, CurvedMapping
 from study.mesh.locate import locate
 
 Floats = NDArray[np.float64]
 
 
-def evaluation(body: Body, points: Floats) -> csr_array:
+def evaluation(body: Body | Outline, points: Floats) -> csr_array:
     """Matrix that takes values at nodes to values at points [m] (q, 3)."""
     basis = body.nodes
     cells, barycentric = locate(body.mesh, points)
@@ -22,10 +22,7 @@ def evaluation(body: Body, points: Floats) -> csr_array:
         found, off = basis.mapping.located(points.T[:, :, None], cells)
         # The few points beyond a strongly bent face keep their straight coordinates.
         local = np.where(off < NEWTON_TOLERANCE, found, local)
-    values = [
-        np.asarray(basis.elem.gbasis(basis.mapping, local, k, tind=cells)[0])[..., 0]
-        for k in range(basis.Nbfun)
-    ]
+    values = [np.asarray(basis.elem.lbasis(local, k)[0])[..., 0] for k in range(basis.Nbfun)]
     columns = basis.element_dofs[:, cells]
     rows = np.broadcast_to(np.arange(len(points)), columns.shape)
     entries = (np.concatenate(values), (rows.ravel(), columns.ravel()))
@@ -35,6 +32,13 @@ def evaluation(body: Body, points: Floats) -> csr_array:
 def at_points(matrix: csr_array, u: Floats) -> Floats:
     """Displacement [m] (q, 3) at the points of an evaluation matrix."""
     return np.asarray(matrix @ u.reshape(-1, 3))
+
+
+def carried(vectors: Floats, body: Body | Outline, other: Body) -> Floats:
+    """Nodal vectors (n, k) of a body as those of another, of the same organ on another mesh."""
+    matrix = evaluation(body, other.points)
+    by_node = vectors.reshape(matrix.shape[1], -1)
+    return np.asarray(matrix @ by_node).reshape(-1, vectors.shape[1])
 
 
 def largest_strain(body: Body, u: Floats) -> float:

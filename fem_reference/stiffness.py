@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +42,10 @@ class Stiffness:
     """K = matrix + lambda B^T M^-1 B, the second term by the divergence and mass of a pressure.
 
     `matrix` [N/m] (n, n), symmetric; where there is a pressure, only what the shear modulus and the
-    support do.
+    support do. It is kept by blocks of 3 x 3, with a quarter of the indices.
     """
 
-    matrix: csc_array
+    matrix: Any
     pressure: Pressure | None = None
 
     @property
@@ -68,7 +69,8 @@ class Stiffness:
 
         Beside a pressure its last rows are those of the pressure over -share.
         """
-        block = share * self.matrix if mass is None else mass + share * self.matrix
+        own = share * csc_array(self.matrix)
+        block = own if mass is None else mass + own
         if self.pressure is None:
             return csc_array(block)
         B, C = share * self.pressure.divergence, (share / self.pressure.lame) * self.pressure.mass

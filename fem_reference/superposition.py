@@ -147,22 +147,26 @@ def subspace_motion(
     return recorder
 
 
-Choose = Callable[[Body, Excitation, int, Advance], Subspace]
-"""A subspace for a body's motion, of so many modes where they are asked for."""
+Near = Floats | None
+"""Vectors (n, k) near those of a subspace, as of the same body on another mesh, if there are."""
+Choose = Callable[[Body, Excitation, int, Near, Advance], Subspace]
+"""A subspace for a body's motion, of so many modes where they are asked for, from vectors near."""
 
 
-def enough_modes(body: Body, excitation: Excitation, modes: int, advance: Advance) -> Subspace:
+def enough_modes(
+    body: Body, excitation: Excitation, modes: int, near: Near, advance: Advance
+) -> Subspace:
     """So many modes of vibration."""
-    del excitation, advance
+    del excitation, near, advance
     return modal_subspace(body, modes)
 
 
 def enough_ritz_vectors(
-    body: Body, excitation: Excitation, modes: int, advance: Advance
+    body: Body, excitation: Excitation, modes: int, near: Near, advance: Advance
 ) -> Subspace:
     """Load-dependent Ritz vectors, until the last ones change little."""
     del modes
-    growing, limit = ritz_subspaces(body), min(MAX_VECTORS, body.stiffness.size)
+    growing, limit = ritz_subspaces(body, near), min(MAX_VECTORS, body.stiffness.size)
     found, change = next(growing), np.inf
     while found.load.size < limit and change > TRUNCATION:
         *_, found = islice(growing, min(GROWTH, limit - found.load.size))

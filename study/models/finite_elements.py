@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fem_reference import model as fem
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
-from fem_reference.elasticity import Body
+from fem_reference.elasticity import Body, of_tissue
 from fem_reference.grid import Projection
 from fem_reference.observation import at_points, evaluation
 from fem_reference.pace import Pace
@@ -153,18 +153,26 @@ class PreparedElements:
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field; after a run, its."""
-        best = self.best
-        body = self.body() if best is None else best.body
+        best, body = self.best, self._best_body()
         u = solve_static(body) if best is None else best.found.rest(body)
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
 
     def rest_at(self, poisson_ratio: float) -> Floats:
         """The same at another Poisson ratio, on the mesh of the last run if there was one."""
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
-        other = PreparedElements(self.model, replace(self.problem, tissue=tissue))
-        body = other.body(None if self.best is None else self.best.level)
+        own = self._best_body()
+        body = of_tissue(own, tissue, self.model.reference.element)
+        start = None if self.best is None else self.best.found.rest(own)
         points = self.problem.observation.volume_points
-        return at_points(evaluation(body, points), solve_static(body))
+        return at_points(evaluation(body, points), solve_static(body, start=start))
+
+    def _best_body(self) -> Body:
+        """That of the last run, or of the model's level, with its matrices."""
+        return self.body() if self.best is None else self._body_of(self.best)
+
+    def _body_of(self, solved: MeshSolution) -> Body:
+        """With its matrices, made again where they are not kept."""
+        return solved.body if isinstance(solved.body, Body) else self.body(solved.level)
 
     def stepper(self) -> Stepper:
         """Steps of TR-BDF2 at the rate, factors made once, whatever the method of a run."""
@@ -234,10 +242,10 @@ class PreparedElements:
             or (is_too_coarse(asked, error) and not locks(self.problem, solved[-1]))
         ):
             with progress.stage(f"{self.model.name}: where the error is"):
-                finer = self.refined(solved[-1].level, solved[-1].body)
+                finer = self.refined(solved[-1].level, self._body_of(solved[-1]))
             if finer is None:
                 break
-            solved.append(self.solved_on(finer, progress))
+            self._refine(solved, finer, progress)
             error = mesh_error(self.problem, solved, graded=True)
         return solved, error
 
@@ -279,36 +287,47 @@ class PreparedElements:
         """On the scene's mesh and those coarser, then finer until it is accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
         levels = filter(None, (*self._usable(range(-COARSER, 0)), geometry.level(0)))
-        rest = [level for level in levels if level is not coarsest.level]
-        solved = [coarsest, *(self.solved_on(level, progress) for level in rest)]
+        solved = [coarsest]
+        for level in [level for level in levels if level is not coarsest.level]:
+            self._refine(solved, level, progress)
         error = mesh_error(self.problem, solved)
         while is_too_coarse(accuracy, error):
             finer = self._finer(solved[-1].level, next_size(accuracy, error))
             if finer is None:
                 break
-            solved.append(self.solved_on(finer, progress))
+            self._refine(solved, finer, progress)
             error = mesh_error(self.problem, solved)
         return solved, error
 
+    def _refine(self, solved: list[MeshSolution], level: Level, progress: Progress) -> None:
+        """Solve on one more mesh, without the matrices of the one before."""
+        solved[-1] = solved[-1].outlined
+        solved.append(self.solved_on(level, progress, solved[-1]))
+
     def _finer(self, last: Level, share: float) -> Level | None:
         """The level expected to be accurate enough, or the finest there is, if it is finer."""
-        found: Level | None = None
-        for level in self._usable(range(1, FINER + 1)):
-            if level.size < last.size and (found is None or found.size > share * last.size):
-                found = level
-        return found
+        levels = filter(None, map(self.problem.geometry.level, range(1, FINER + 1)))
+        finer = [level for level in levels if level.size < last.size]
+        enough = [level for level in finer if level.size <= share * last.size]
+        coarser = finer[: len(finer) - len(enough)]
+        return next(filter(self._is_usable, (*enough, *reversed(coarser))), None)
 
     def _usable(self, numbers: range) -> Iterator[Level]:
         """Levels that there are and that a body can be made on."""
-        for level in filter(None, map(self.problem.geometry.level, numbers)):
-            try:
-                self._refuse(level)
-            except ValueError:  # too coarse to meet the tool, or too fine for the memory
-                continue
-            yield level
+        levels = map(self.problem.geometry.level, numbers)
+        return filter(self._is_usable, filter(None, levels))
 
-    def solved_on(self, level: Level | None, progress: Progress) -> MeshSolution:
-        """Body and motion on one of the organ's meshes, None for that of the model."""
+    def _is_usable(self, level: Level) -> bool:
+        try:
+            self._refuse(level)
+        except ValueError:  # too coarse to meet the tool, or too fine for the memory
+            return False
+        return True
+
+    def solved_on(
+        self, level: Level | None, progress: Progress, coarser: MeshSolution | None = None
+    ) -> MeshSolution:
+        """Body and motion on a mesh, None for the model's own, sooner after a coarser one."""
         level = level or self.own_level()
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
@@ -316,15 +335,16 @@ class PreparedElements:
         with progress.stage(name) as advance:
             problem = self.problem
             arguments = (self.model.damping, problem.factor, problem.observation)
-            return MeshSolution(
-                level, body, fem.run(body, *arguments, self.model.method(self._times), advance)
-            )
+            near = None if coarser is None else coarser.near(body)
+            method = self.model.method(self._times)
+            return MeshSolution(level, body, fem.run(body, *arguments, method, advance, near))
 
     def _halved(self, solved: MeshSolution, progress: Progress) -> fem.Solution:
         problem = self.problem
+        body = self._body_of(solved)
         with progress.stage(f"{self.model.name}: halved steps") as advance:
             arguments = (self.model.damping, problem.factor, problem.observation)
-            return fem.run(solved.body, *arguments, self.model.method(2 * self._times), advance)
+            return fem.run(body, *arguments, self.model.method(2 * self._times), advance)
 
     def _at_large_strain(
         self, solved: Sequence[MeshSolution], progress: Progress
@@ -334,9 +354,9 @@ class PreparedElements:
         if law == "none" or not is_large(found.largest_strain, found.largest_rotation):
             return None, ""
         count = len(self.problem.geometry.mesh.tetrahedra)
-        own = min(solved, key=lambda one: abs(one.found.elements - count)).body
+        own = min(solved, key=lambda one: abs(one.found.elements - count))
         with progress.stage(f"{self.model.name}: {law}"):
-            compared = compare(self.problem, own, law)
+            compared = compare(self.problem, self._body_of(own), law)
         if isinstance(compared, str):
             return None, f"No {law} solution at the peak load: {compared}."
         return compared, ""

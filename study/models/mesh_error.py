@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.elasticity import Body
+from fem_reference.elasticity import Body, Outline
 from fem_reference.elements import ELEMENTS
 from fem_reference.error_estimate import ErrorEstimate, discretisation_error, graded_error
+from fem_reference.observation import carried
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.results.records import CurveErrors, CurveOrders, DiscretisationError
@@ -27,11 +28,21 @@ LINEAR_LOCKING = 0.4
 
 @dataclass(frozen=True)
 class MeshSolution:
-    """The reference on one mesh."""
+    """The reference on one mesh; `body` keeps no matrices once a finer mesh is to be solved."""
 
     level: Level
-    body: Body
+    body: Body | Outline
     found: fem.Solution
+
+    @property
+    def outlined(self) -> MeshSolution:
+        """The same without the matrices."""
+        return replace(self, body=self.body.outline) if isinstance(self.body, Body) else self
+
+    def near(self, body: Body) -> Floats | None:
+        """Vectors (n, k) near those of a superposition on another mesh; none of steps in time."""
+        superposed = self.found.superposed
+        return None if superposed is None else carried(superposed.subspace.vectors, self.body, body)
 
 
 def mesh_error(

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.models.finite_elements import models
-from study.models.mesh_error import mesh_error
+from study.models.mesh_error import MeshSolution, mesh_error
 from study.progress import Silent
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -89,7 +89,11 @@ def rows(name: str) -> Iterator[Row]:
     levels = [found for k in range(-2, FINEST + 1) if (found := posed.geometry.level(k))]
     (reference,) = models(scene, {})
     prepared = reference.prepare(posed)
-    solved = [prepared.solved_on(level, Silent()) for level in levels]
+    solved: list[MeshSolution] = []
+    for level in levels:  # as a run does, each from the one before
+        coarser = solved[-1].outlined if solved else None
+        solved[-1:] = [coarser] if coarser else []
+        solved.append(prepared.solved_on(level, Silent(), coarser))
     truth, volumes = solved[-1].found.trajectory, posed.volume_rule.weights
     for last in range(2, len(solved) - 2):
         errors = mesh_error(posed, solved[: last + 1])

@@ -1,0 +1,75 @@
+"""Integrals over cells of products of shape functions and of their gradients, node by node.
+
+scikit-fem gives the shape functions at the quadrature points; what cells add to a matrix are then
+batched products of small matrices, and their sums share one pattern. As forms of scikit-fem, which
+are called for every pair of shape functions, the same took eight times as long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Pattern(NamedTuple):
+    """Rows `indptr` and columns `indices` of a matrix whose entries are pairs of a cell's nodes.
+
+    `place` (cells, a, a): entry of the pair of a cell's nodes.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    place: Ints
+
+    def summed(self, parts: Floats) -> Floats:
+        """Entries of the matrix from the parts (cells, a, a) of the cells."""
+        found = np.bincount(self.place.ravel(), parts.ravel(), minlength=len(self.indices))
+        return np.asarray(found, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Integrals [m] of d_i v d_j u over a body, v of the row's node and u of the column's.
+
+    `values` (entries, 3, 3) in the pattern of rows `indptr` and columns `indices`.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    values: Floats
+
+
+def pattern(basis: Any) -> Pattern:
+    """That of a scikit-fem basis of one component."""
+    nodes = np.asarray(basis.element_dofs.T, dtype=np.int64)
+    pairs = nodes[:, :, None] * basis.N + nodes[:, None, :]
+    keys, place = np.unique(pairs.ravel(), return_inverse=True)
+    counts = np.bincount(keys // basis.N, minlength=basis.N)
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return Pattern(indptr, (keys % basis.N).astype(np.int32), place.reshape(pairs.shape))
+
+
+def products(basis: Any, where: Pattern) -> csr_array:
+    """Integrals [m^3] of u v."""
+    values = np.stack([np.asarray(one[0])[0] for one in basis.basis], axis=-1)
+    pairs = (values[:, :, None] * values[:, None, :]).reshape(len(values), -1)
+    entries = where.summed(basis.dx @ pairs)
+    return csr_array((entries, where.indices, where.indptr), shape=(basis.N, basis.N))
+
+
+def gradients(basis: Any, where: Pattern) -> Gradients:
+    """Integrals of the products of all pairs of derivatives."""
+    slopes = [np.stack([one[0].grad[i] for one in basis.basis], axis=-1) for i in range(3)]
+    found = np.empty((len(where.indices), 3, 3))
+    for i, tested in enumerate(slopes):
+        weighted = (tested * basis.dx[..., None]).mT
+        for j, tried in enumerate(slopes):
+            found[:, i, j] = where.summed(weighted @ tried)
+    return Gradients(where.indptr, where.indices, found)
