@@ -7,9 +7,13 @@ import tempfile
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from threading import Event
+
+import numpy as np
 
 from reports.budget_figure import budget_figure
 from reports.content import document
@@ -19,17 +23,31 @@ from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
 from reports.ranking_study import is_ranked
 from reports.ranking_study_figure import ranking_figures
-from reports.renders import Pictures, render
+from reports.renders import Pictures, render_once
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
+from study.results.records import Provenance
+from study.stages.flat import Arrays
+from study.stages.once import made_once
+from study.sweep.program import everything
 
 NAME = "report.pdf"
 TEMPLATE = "template.typ"
 Figures = dict[str, list[bytes]]
 Drawing = dict[str, str] | None
+NOWHERE = Provenance(
+    versions={},
+    commit=None,
+    platform="",
+    processor=None,
+    seed=None,
+    scene_sha256="",
+    mesh_sha256=None,
+)
+"""Of results that are drawn, which show none."""
 
 
 def make_report(folder: Path) -> None:
@@ -52,12 +70,17 @@ def pdf(results: Results) -> bytes:
 def draw(results: Results) -> tuple[Figures, Drawing]:
     """SVG figures by place in the document, and what the caption of the organ's pictures says.
 
-    VTK renders in its own process while matplotlib draws the rest.
+    VTK renders in its own process while matplotlib draws the rest. What was drawn of the same
+    motions before is taken from the store, if there is one.
     """
     seen = views(results)
     with ThreadPoolExecutor(1) as pool, _set_after_a_failure() as unwanted:
-        pictures = None if seen is None else pool.submit(render, job(seen), unwanted)
-        figures = _plots(results)
+        pictures = (
+            None
+            if seen is None
+            else pool.submit(copy_context().run, render_once, job(seen), unwanted)
+        )
+        figures = _kept_plots(_drawn_of(results))
         if pictures is not None:
             pictures.result()  # here, where a signal makes them unwanted
     if seen is None or pictures is None:
@@ -74,6 +97,42 @@ def _set_after_a_failure() -> Iterator[Event]:
     except BaseException:
         event.set()
         raise
+
+
+def _drawn_of(results: Results) -> Results:
+    """Results without what no figure shows, so that none depends on it: title, times, sources."""
+    scene = replace(results.scene, title="", renders=True, remarks=())
+    models = tuple(replace(one, wall_s=None) for one in results.record.models)
+    record = replace(
+        results.record,
+        title="",
+        notes=(),
+        warnings=(),
+        assumptions=(),
+        models=models,
+        study_wall_s=None,
+        stages=(),
+        workers=1,
+        provenance=NOWHERE,
+    )
+    return replace(results, scene=scene, record=record)
+
+
+def _kept_plots(results: Results) -> Figures:
+    """The plots as they were drawn of equal results by an equal program, or are drawn now."""
+
+    def make() -> Arrays:
+        return {
+            f"{place}/{i}": np.frombuffer(svg, np.uint8)
+            for place, drawn in _plots(results).items()
+            for i, svg in enumerate(drawn)
+        }
+
+    found = made_once("plots", make, results, everything("reports"), modules=(__name__,))
+    figures: Figures = {}
+    for name, svg in found.items():
+        figures.setdefault(name.partition("/")[0], []).append(svg.tobytes())
+    return figures
 
 
 def _plots(results: Results) -> Figures:

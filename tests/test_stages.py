@@ -32,7 +32,7 @@ from study.progress import Silent
 from study.results.records import Check, ModelRecord
 from study.run.moving import AT_REST, ORGAN, Moving
 from study.run.stages import ALONE, Means, Stages
-from study.run.study import FUZZY, fuzzy_stage, run_study
+from study.run.study import FUZZY, SIMILARITY, fuzzy_stage, run_study
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.stages import fingerprint
@@ -176,7 +176,7 @@ def test_nothing_is_unpickled(store, tmp_path):
 
 def test_the_stage_not_used_for_longest_goes_first(store):
     store.put(KEY, {}, numbers(1000), wall=1.0)
-    small = dataclasses.replace(store, limit=4 * store.size())
+    small = dataclasses.replace(store, limit=4 * store.size() + 100)  # a time may be longer
     (store.folder / f"{KEY}.npz").unlink()
     names = [str(k) * 64 for k in range(6)]
     for k, name in enumerate(names[:3]):
@@ -551,14 +551,15 @@ def test_kept_and_computed_results_are_the_same_bit_by_bit(store):
     alone, first, again = (results_of(scene, one) for one in (ALONE, means, means))
     assert same(alone, first)
     assert same(alone, again)
-    assert {one.name for one in again.record.stages} == {*keys(scene)}
+    assert {one.name for one in again.record.stages} == {*keys(scene), SIMILARITY}
     assert all(one.kept for one in again.record.stages)
     walls = [{one.name: one.wall_s for one in run.record.stages} for run in (first, again)]
     assert walls[0] == walls[1]
     other = tiny(FEWER, "patient.hcv=14 kPa", "title=Other")
     mixed = results_of(other, means)
     assert same(mixed, results_of(other))
-    assert {one.name for one in mixed.record.stages if not one.kept} == {FUZZY, "msm-sugeno"}
+    computed = {one.name for one in mixed.record.stages if not one.kept}
+    assert computed == {FUZZY, "msm-sugeno", SIMILARITY}
     afresh = results_of(scene, Means(store, fresh=True))
     assert not any(one.kept for one in afresh.record.stages)
 

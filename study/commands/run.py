@@ -106,7 +106,7 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
     with on_stderr() as progress:
         results = _computed(scene, how, store, progress) if left is None else left.results
         wanted = how.report and not (left and left.has_report)
-        failure = _report_failure(how.folder, progress) if wanted else None
+        failure = _report_failure(how, store, progress) if wanted else None
     if store is not None and (left is None or wanted):
         unchanged.note(store, key, how.folder)
     _print_summary(results, how.folder)
@@ -143,15 +143,22 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
     return results
 
 
-def _report_failure(folder: Path, progress: Progress) -> Exception | KeyboardInterrupt | None:
+def _report_failure(
+    how: _How, store: Store | None, progress: Progress
+) -> Exception | KeyboardInterrupt | None:
     """Make the report; neither a fault in it nor a signal must cost a finished run."""
     from study.folders import claimed
+    from study.stages.once import keeping_in
 
     try:
-        with progress.stage("report"), claimed(folder):
+        with (
+            progress.stage("report"),
+            claimed(how.folder),
+            keeping_in(store, readable=not how.fresh),
+        ):
             from reports.report import make_report
 
-            make_report(folder)
+            make_report(how.folder)
     except (Exception, KeyboardInterrupt) as error:  # whatever it is, the results stay
         return error
     return None

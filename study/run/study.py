@@ -12,6 +12,7 @@ from study.models.linear_limits import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Watch
 from study.models.table import is_tuned, references
 from study.problem.response import Response
+from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.results.folder import Arrays, Results
 from study.results.provenance import mesh_sha256, provenance
@@ -20,8 +21,16 @@ from study.results.records import (
     Dimensionless,
     ErrorBudget,
     LatticeLimits,
+    ModelRecord,
     Provenance,
     StudyRecord,
+)
+from study.results.tables import (
+    FieldDifference,
+    Iso18571Rating,
+    ScoreDifference,
+    ScoreError,
+    SimilarityScore,
 )
 from study.run.assumptions import assumptions
 from study.run.posed import Posed
@@ -38,7 +47,7 @@ from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.lanes import lanes
 
-SUITED, FUZZY = "scene suited to the organ", "fuzzy systems"
+SUITED, FUZZY, SIMILARITY = "scene suited to the organ", "fuzzy systems", "similarity"
 NO_FUZZY = (
     *("organ", "support", "tool", "lattice", "damping", "basafa", "reference"),
     *("superposition", "corrected"),
@@ -78,8 +87,8 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
         else:
             found = _on_organ(scene, stages, watch, made_by)
         fuzzy = stages.results().get(FUZZY, FuzzySide())
-    with watch.progress.stage("similarity"):
-        results = _results(scene, fuzzy, found, made_by)
+        alike = stages.now(_likeness_stage(scene, found))
+    results = _results(scene, fuzzy, found, alike, made_by)
     wall = time.perf_counter() - started
     record = replace(results.record, stages=stages.records(), workers=workers, study_wall_s=wall)
     return replace(results, record=record)
@@ -155,23 +164,58 @@ def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
     } | {name: run.trajectory.surface_field for name, run in runs.items()}
 
 
-def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenance) -> Results:
+@dataclass(frozen=True)
+class Likeness:
+    """How like the motions are: rows of the tables, and notes on pairs that have none."""
+
+    scores: tuple[SimilarityScore, ...]
+    unscored: tuple[str, ...]
+    ratings: tuple[Iso18571Rating, ...]
+    errors: tuple[ScoreError, ...]
+    differences: tuple[ScoreDifference, ...]
+    of_field: tuple[FieldDifference, ...]
+
+
+def _likeness_stage(scene: Scene, found: Compared) -> Stage[Likeness]:
+    """Scores and differences of all that were moved; they follow from motions and records alone."""
+    # One that diverged leaves a note in place of its scores.
+    sound = {n: one.trajectory for n, one in found.runs.items() if not one.record.inverted_cells}
+    records = tuple(replace(run.record, wall_s=None) for run in found.runs.values())
+    given = (found.response, sound, records, tuple(references(scene)))
+    name = key(SIMILARITY, *given, modules=(__name__,))
+    return Stage(SIMILARITY, Likeness, name, lambda progress: _likeness(*given, progress))
+
+
+def _likeness(
+    response: Response,
+    sound: dict[str, Trajectory],
+    records: tuple[ModelRecord, ...],
+    compared_with: tuple[str, ...],
+    progress: Progress,
+) -> Likeness:
+    with progress.stage(SIMILARITY):
+        scores, unscored = similarity_rows(response, sound, compared_with)
+        errors, apart = error_rows(response, sound, records, scores)
+        ratings = tuple(rating_rows(response, sound, scores))
+        has_field = response.volumes.size > 0
+        of_field = difference_rows(response, sound, compared_with) if has_field else ()
+        return Likeness(scores, unscored, ratings, errors, apart, tuple(of_field))
+
+
+def _results(
+    scene: Scene, fuzzy: FuzzySide, found: Compared, alike: Likeness, made_by: Provenance
+) -> Results:
     runs, response = found.runs, found.response
     models = tuple(run.record for run in runs.values())
     # A lattice's mass is checked for each model on it, and is told once.
     checks = tuple(dict.fromkeys(check for run in runs.values() for check in run.checks))
     checks += tuple(requirement_checks(scene, response.probes, runs))
-    compared_with = references(scene)
-    # One that diverged leaves a note in place of its scores.
-    sound = {n: run.trajectory for n, run in runs.items() if not run.record.inverted_cells}
-    scores, unscored = similarity_rows(response, sound, compared_with)
-    errors, apart = error_rows(response, sound, models, scores)
     record = StudyRecord(
         title=scene.title,
         probes=response.probes,
         fuzzy=fuzzy.record,
         models=models,
-        references=tuple(compared_with),
+        references=tuple(references(scene)),
         checks=checks,
         warnings=warnings(scene, models, checks),
         assumptions=assumptions(scene, found.control_point),
@@ -180,7 +224,7 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             *fuzzy.notes,
             *found.notes,
             *(note for run in runs.values() for note in run.notes),
-            *unscored,
+            *alike.unscored,
         ),
         strain_limit=STRAIN_LIMIT,
         study_wall_s=None,
@@ -190,7 +234,6 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
         control_point=found.control_point,
         budgets=found.budgets,
     )
-    has_field = response.volumes.size > 0
     return Results(
         scene,
         record,
@@ -207,11 +250,11 @@ def _results(scene: Scene, fuzzy: FuzzySide, found: Compared, made_by: Provenanc
             if run.certified is not None
             for row in certified_rows(response, name, run.certified)
         ),
-        scores,
-        tuple(rating_rows(response, sound, scores)),
-        errors,
-        apart,
-        tuple(difference_rows(response, sound, compared_with)) if has_field else (),
+        alike.scores,
+        alike.ratings,
+        alike.errors,
+        alike.differences,
+        alike.of_field,
         fuzzy.sensitivity,
         found.fields,
         fuzzy.arrays,

@@ -17,15 +17,18 @@ PACKAGES = ("study", "fem_reference", "msm", "fuzzy")
 DATA = {".csv", ".toml"}
 LIBRARIES = (
     "llvmlite",
+    "matplotlib",
     "meshio",
     "numba",
     "numpy",
     "pyamg",
     "pytetwild",
+    "pyvista",
     "scikit-fem",
     "scikit-fuzzy",
     "scipy",
     "similaritymeasures",
+    "typst",
     "vtk",
 )
 

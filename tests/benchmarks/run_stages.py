@@ -21,15 +21,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 CASES = {
-    "one after another": ("--fresh", "--workers", "1"),
     "side by side": ("--fresh", "--workers", "2"),
     "unchanged": (),
     "other title": ("--set", "title=Another"),
     "no renders": ("--set", "renders=false"),
     "other reading": ("--set", "patient.hcv=14 kPa"),
     "other spacing": ("--set", "lattice.spacing=9 mm"),
+    "one after another": ("--fresh", "--workers", "1"),
 }
-"""Flags by case; each of the last four is a change of the second, whose stages are kept."""
+"""Flags by case; those between are of the first, whose stages are kept, or change it."""
 COLUMNS = ("case", "stage", "kept", "wall_s", "processor_s", "memory_mb", "load")
 
 
