@@ -1,0 +1,57 @@
+"""Arrays that are dear, or come out otherwise each time, made once for all runs that need them.
+
+They are asked for deep in a stage by code that knows no store: that of the run is set around it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import NamedTuple
+
+from study.folders import tell
+from study.stages.fingerprint import key
+from study.stages.flat import Arrays
+from study.stages.store import Store
+
+
+class _Current(NamedTuple):
+    """A store, and whether what is there may be taken from it."""
+
+    store: Store
+    readable: bool
+
+
+_CURRENT: ContextVar[_Current | None] = ContextVar("current", default=None)
+
+
+@contextmanager
+def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
+    """Let what is made in the block be kept in a store, and taken from it if it is readable."""
+    token = _CURRENT.set(None if store is None else _Current(store, readable))
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+
+
+def made_once(
+    name: str, make: Callable[[], Arrays], *given: object, modules: tuple[str, ...]
+) -> Arrays:
+    """Arrays by name that `make` gives, or gave before of equal `given` by the same modules."""
+    current, found = _CURRENT.get(), key(name, *given, modules=modules)
+    if current is None or found is None:
+        return make()
+    store = current.store
+    entry = store.get(found) if current.readable else None
+    if entry is not None:
+        return entry.arrays
+    started = time.perf_counter()
+    arrays = make()
+    try:
+        store.put(found, None, arrays, time.perf_counter() - started)
+    except OSError as error:
+        tell(f"{name}: not kept for the next run ({error})")
+    return arrays
