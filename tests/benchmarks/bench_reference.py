@@ -76,9 +76,16 @@ def measured(checkout: Path) -> Iterator[tuple[str, float, float, float]]:
         yield tuple(json.loads(line))
 
 
+def commit(checkout: Path) -> str:
+    """Its version, as git names it."""
+    command = ["git", "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(command, cwd=checkout, check=True, capture_output=True, text=True)
+    return done.stdout.strip()
+
+
 def main() -> None:
     """Write the table."""
-    checkouts = {"this": ROOT} | {Path(name).name: Path(name) for name in sys.argv[1:]}
+    checkouts = {commit(path): path for path in (ROOT, *map(Path, sys.argv[1:]))}
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(FIELDS)
