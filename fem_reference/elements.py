@@ -18,8 +18,8 @@ class Element:
     `shapes`: scikit-fem's class. `gradient_order`: degree that the quadrature of the stiffness
     integrates, which squares of gradients have in straight cells. `formal_order`: of convergence of
     the displacement in L2. `bytes_per_unknown`: at the peak of assembly and iterative solution,
-    measured at 20 000 to 100 000 unknowns. `quadratic`: it has nodes on edges too, and may be
-    curved. `mixed`: it has a linear, continuous pressure of its own.
+    measured at 20 000 to 100 000 unknowns, of `p2` to 220 000. `quadratic`: it has nodes on edges
+    too, and may be curved. `mixed`: it has a linear, continuous pressure of its own.
     """
 
     shapes: Any
@@ -32,7 +32,7 @@ class Element:
 
 ELEMENTS: dict[ElementName, Element] = {
     "p1": Element(skfem.ElementTetP1, 1, 2.0, 30_000, quadratic=False),
-    "p2": Element(skfem.ElementTetP2, 2, 3.0, 10_000),
+    "p2": Element(skfem.ElementTetP2, 2, 3.0, 6_000),
     "taylor-hood": Element(skfem.ElementTetP2, 2, 3.0, 13_000, mixed=True),
 }
 AUTO = "auto"
