@@ -1,4 +1,4 @@
-"""The decorator of every compiled kernel of the package.
+"""The decorators of the compiled kernels of the package.
 
 Numba keeps the type of a kernel's arguments in an index on disk, a named tuple as the name of its
 class. A spring law from outside the package would make that index unreadable for a process that

@@ -400,6 +400,35 @@ def test_where_nothing_keeps_up_the_fastest_is_nearest():
     assert advice.best([FINE, faster], Demand(1e3, None)) is faster
 
 
+def test_single_precision_is_taken_where_only_it_keeps_up_or_it_is_cheaper():
+    fine = replace(candidate(0.03, 1.0), precision="single")
+    assert advice.best([MIDDLE, FINE, fine], Demand(60.0, None)) is fine
+    same = replace(candidate(0.08, 0.2), precision="single")
+    assert advice.best([MIDDLE, same], Demand(60.0, None)) is MIDDLE
+    assert advice.best([MIDDLE, same], Demand(60.0, 0.1)) is same
+
+
+def test_a_recommended_scene_says_its_precision():
+    one = replace(candidate(0.08, 0.2), precision="single", spacing=0.02)
+    found = advice.Recommended(one, True, Errors("resolved", field=0.08), None, 0.2)
+    text = advice.recommended_scene(read_scene("block", SMALL), found)
+    assert 'precision = "single"' in text
+    assert "in single precision" in text
+
+
+def test_what_single_precision_adds_is_the_change_of_the_field():
+    """Of runs in double and in single; where one is missing single precision is not offered."""
+    given = problem_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    count = len(given.problem.volume_rule.weights)
+    task = Task("study.tradeoff.observation:observe", {})
+    double, single = (
+        Outcome(task, "done", vars(Observed(None, 0, None, 1e-3, [x] * (3 * count), [])), "", 0.0)
+        for x in (1.0, 1.1)
+    )
+    assert advice._added_by_single([double, single], given) == pytest.approx({"single": 0.1})
+    assert advice._added_by_single([double], given) == {}
+
+
 @pytest.fixture
 def command(monkeypatch, tmp_path, capsys):
     """Exit code, and what was printed, of a command; `main` turns ValueErrors into code 2."""
