@@ -11,6 +11,7 @@ from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
 from reports.ranking_study import is_ranked, ranking_study
 from reports.reference import is_built_in_liver, reference
+from reports.reference_spacing import reference_spacing
 from reports.robustness import robustness
 from reports.rule_view import view_names
 from reports.verification import verification
@@ -29,6 +30,7 @@ def document(results: Results) -> dict[str, object]:
         "warnings": [words(text) for text in record.warnings],
         "glance": summary.glance(results),
         "summary": summary.sentences(results),
+        "reference_spacing": reference_spacing(results),
         "has_reference": finite_elements(results) is not None,
         "has_own_error": own_error(results) is not None,
         "is_built_in_liver": is_built_in_liver(results.scene),

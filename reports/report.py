@@ -19,6 +19,7 @@ from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
 from reports.ranking_study import is_ranked
 from reports.ranking_study_figure import ranking_figures
+from reports.reference_spacing import reference_spacing_figure
 from reports.renders import Pictures, render
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
@@ -86,6 +87,7 @@ def _plots(results: Results) -> Figures:
         "sensitivity": sensitivity_figure(results.sensitivity),
         "differences": difference_figure(results),
         "budget": budget_figure(results),
+        "reference_spacing": reference_spacing_figure(results),
         **robustness_figures(results),
     }
     if is_ranked(results):
