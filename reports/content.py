@@ -7,6 +7,7 @@ from reports.benchmarks import benchmarks
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
+from reports.organ_ranking import organ_ranking
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
 from reports.ranking_study import is_ranked, ranking_study
@@ -69,6 +70,7 @@ def document(results: Results) -> dict[str, object]:
         "verification": verification(results),
         "robustness": robustness(results),
         "ranking_study": ranking_study() if is_ranked(results) else None,
+        "organ_ranking": organ_ranking() if is_ranked(results) else None,
     }
 
 

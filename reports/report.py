@@ -17,6 +17,7 @@ from reports.difference_figure import difference_figure
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
+from reports.organ_ranking_figure import organ_figures
 from reports.ranking_study import is_ranked
 from reports.ranking_study_figure import ranking_figures
 from reports.reference_spacing import reference_spacing_figure
@@ -91,7 +92,7 @@ def _plots(results: Results) -> Figures:
         **robustness_figures(results),
     }
     if is_ranked(results):
-        single |= ranking_figures()
+        single |= ranking_figures() | organ_figures()
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 
