@@ -574,12 +574,20 @@ def ranking() -> Iterator[tuple[str, str]]:
     yield "ranking-draws", count(nearest[0]["draws"])
 
 
+def organ() -> Iterator[tuple[str, str]]:
+    """What the study of an organ found, a line a finding, as the report says it."""
+    from reports.organ_ranking import sentences
+
+    lines = "\n".join(f"- {text}" for text in sentences())
+    yield "organ-ranking", f"\n\n{lines}\n\n"
+
+
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
     models = (certified, tradeoff, corrected)
-    groups = (*fuzzy, *lattice, *models, verification, stability, ranking)
+    groups = (*fuzzy, *lattice, *models, verification, stability, ranking, organ)
     return {name: text for group in groups for name, text in group()}
 
 

@@ -8,10 +8,12 @@ from reports.certified import certified_rows
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
+from reports.organ_ranking import organ_ranking
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
 from reports.ranking_study import is_ranked, ranking_study
 from reports.reference import is_built_in_liver, reference
+from reports.reference_spacing import reference_spacing
 from reports.robustness import robustness
 from reports.rule_view import view_names
 from reports.verification import verification
@@ -30,6 +32,7 @@ def document(results: Results) -> dict[str, object]:
         "warnings": [words(text) for text in record.warnings],
         "glance": summary.glance(results),
         "summary": summary.sentences(results),
+        "reference_spacing": reference_spacing(results),
         "has_reference": finite_elements(results) is not None,
         "has_own_error": own_error(results) is not None,
         "is_built_in_liver": is_built_in_liver(results.scene),
@@ -70,6 +73,7 @@ def document(results: Results) -> dict[str, object]:
         "verification": verification(results),
         "robustness": robustness(results),
         "ranking_study": ranking_study() if is_ranked(results) else None,
+        "organ_ranking": organ_ranking() if is_ranked(results) else None,
     }
 
 

@@ -23,9 +23,10 @@ class Lead:
     """Lead of the best fuzzy-tuned model over the next, for one reference, probe and measure.
 
     `margin`: difference of their scores; `low` and `high`: its 95 % block interval, the same blocks
-    left out of both; `resampled`: its change with every second sample. `error` is the sum of the
-    relative numerical errors of the three curves compared, at the probe; `is_whole` says whether
-    all of them are known.
+    left out of both; `resampled`: its change with every second sample; `observed`: the larger of
+    its range over windows and its change with other axes of the phase plane. `error` is the sum of
+    the relative numerical errors of the three curves compared, at the probe; `is_whole` says
+    whether all of them are known.
     """
 
     reference: str
@@ -36,8 +37,14 @@ class Lead:
     low: float
     high: float
     resampled: float
+    observed: float
     error: float | None
     is_whole: bool
+
+    @property
+    def hangs_on_view(self) -> bool:
+        """Whether another window or other axes may take the lead away."""
+        return self.margin <= self.observed
 
     @property
     def is_resolved(self) -> bool | None:
@@ -117,6 +124,7 @@ def leads(results: Results, reference: str, probe: str) -> Iterator[Lead]:
             low=paired.low,
             high=paired.high,
             resampled=paired.resampled,
+            observed=max(paired.window, paired.normalised),
             error=sum(known) if known else None,
             is_whole=len(known) == len(parts),
         )

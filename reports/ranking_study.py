@@ -185,9 +185,11 @@ def movers(lines: Sequence[Line], draws: int, output: str, name: str) -> str:
         )
     named = sorted(known, key=lambda unknown: -_mean(known[unknown], "total"))[:MOST_NAMED]
     parts = ", ".join(f"{words(one.replace('_', ' '))} {_index(known[one])}" for one in named)
+    lost = len(found) - len(known)
+    most = "most by" if lost == 0 else "among others by"
     return (
-        f"{name} is moved most by (total Sobol' index and its 95 % interval, means over measures): "
-        f"{parts}{_untold(len(found) - len(known))}."
+        f"{name} is moved {most} (total Sobol' index and its 95 % interval, means over measures): "
+        f"{parts}{_untold(lost)}."
     )
 
 

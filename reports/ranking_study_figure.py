@@ -123,15 +123,15 @@ def _over(folder: Traversable | None) -> Figure | None:
         return None
     figure = canvas.sheet(HEIGHT)
     strips, *panels = figure.subplots(1, 1 + len(DRAWN), width_ratios=(1.3, 1.0, 1.0))
-    _strips(strips, lines)
+    draw_winners(strips, lines)
     for axes, (curve, measure) in zip(panels, DRAWN, strict=True):
         chosen = [line for line in lines if (line["curve"], line["measure"]) == (curve, measure)]
-        _curves(axes, chosen)
+        draw_curves(axes, chosen)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
-def _strips(axes: Axes, lines: Sequence[Line]) -> None:
+def draw_winners(axes: Axes, lines: Sequence[Line]) -> None:
     """Colour of the nearest system over the spacing, a strip a measure."""
     wins = winners_over_spacing(lines)
     names = list(dict.fromkeys(map(column, lines)))
@@ -145,7 +145,7 @@ def _strips(axes: Axes, lines: Sequence[Line]) -> None:
     axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="reference spacing h₀ [mm]", title="nearest")
 
 
-def _curves(axes: Axes, lines: Sequence[Line]) -> None:
+def draw_curves(axes: Axes, lines: Sequence[Line]) -> None:
     """Score of each system over the spacing, and what the paper prints for it."""
     for system in SYSTEM_NAMES:
         own = [line for line in lines if line["system"] == system]

@@ -21,8 +21,10 @@ from reports.difference_figure import difference_figure
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
+from reports.organ_ranking_figure import organ_figures
 from reports.ranking_study import is_ranked
 from reports.ranking_study_figure import ranking_figures
+from reports.reference_spacing import reference_spacing_figure
 from reports.renders import Pictures, render_once
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
@@ -145,10 +147,11 @@ def _plots(results: Results) -> Figures:
         "sensitivity": sensitivity_figure(results.sensitivity),
         "differences": difference_figure(results),
         "budget": budget_figure(results),
+        "reference_spacing": reference_spacing_figure(results),
         **robustness_figures(results),
     }
     if is_ranked(results):
-        single |= ranking_figures()
+        single |= ranking_figures() | organ_figures()
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 

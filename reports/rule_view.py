@@ -100,7 +100,7 @@ def _label_row(axes: Axes, view: Arrays, row: int) -> None:
     text = f"rule {view['rules.number'][row]}{star}"
     shares = view["rules.share"]
     if shares.size:
-        text += f"\n{fixed(100 * shares[row], 1)} %"
+        text += f"\n{_percent(shares[row])}"
     place: Style = {"transform": axes.transAxes, "ha": "right", "va": "center"}
     axes.text(-0.08, 0.4, text, fontsize=CELL_TEXT, **place)
 
@@ -156,7 +156,16 @@ def _label(axes: Axes, text: str) -> None:
 
 
 def _span(low: float, high: float) -> str:
-    return fixed(high, 2) if low == high else f"{fixed(low, 2)}–{fixed(high, 2)}"
+    return _degree(high) if low == high else f"{_degree(low)}–{_degree(high)}"
+
+
+def _degree(value: float) -> str:
+    """To two decimals; what is too small for them is no 0."""
+    return "<0.01" if 0.0 < value < 5e-3 else fixed(value, 2)
+
+
+def _percent(share: float) -> str:
+    return "<0.1 %" if 0.0 < share < 5e-4 else f"{fixed(100 * share, 1)} %"
 
 
 def _last_change(x: NDArray[Any], memberships: NDArray[Any], reading: float) -> float:
@@ -244,5 +253,5 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
             "fontsize": CELL_TEXT,
         }
         axes.annotate(str(name), (constant, share), (4, 0), **place)
-        text = f"{name}: {fixed(constant, 2)} {unit}, weight {fixed(100 * share, 1)} %"
+        text = f"{name}: {fixed(constant, 2)} {unit}, weight {_percent(share)}"
         axes.plot([], [], color=CONSEQUENT, marker="o", markersize=2.6, linewidth=1.6, label=text)

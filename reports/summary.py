@@ -283,7 +283,13 @@ def _resolution(found: list[Lead]) -> str:
         for text, value in counts.items()
         if (n := sum(lead.is_resolved is value for lead in found))
     ]
-    return f"Of these leads {', '.join(parts)}."
+    turned = sum(lead.hangs_on_view for lead in found)
+    verb = "is no larger than its" if turned == 1 else "are no larger than their"
+    view = (
+        f" {turned if turned else 'None'} {verb} spread over windows of the motion and axes of the "
+        "phase plane."
+    )
+    return f"Of these leads {', '.join(parts)}.{view}"
 
 
 def _reference(results: Results) -> Iterator[str]:

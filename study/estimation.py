@@ -119,6 +119,11 @@ def _flag(key: str) -> str:
 
 def _patient(request: EstimationRequest) -> Answer:
     settings = settings_of(request.settings)
+    if not request.readings and settings.missing.silences:
+        raise ValueError(
+            "no reading is given: give one or more in kPa, such as --hcv 9.5, a table of them by "
+            "--inputs, or --absent normal for a normal liver"
+        )
     for name, value in request.readings.items():
         _check_plausible(value, f"--{name} {value:g}")
     readings = {name: PA_PER_KPA * value for name, value in request.readings.items()}

@@ -135,7 +135,8 @@ def bare(results: Results | None = None) -> dict[str, Any]:
     """Content of a report without figures."""
     results = without_arrays(results)
     results = with_record(results, lattice_limits=None)  # the text on them refers to a figure
-    return document(results) | {"drawing": None, "ranking_study": None}
+    left_out = dict.fromkeys(("drawing", "ranking_study", "organ_ranking"))
+    return document(results) | left_out
 
 
 def printed(content: dict[str, Any]) -> list[str]:

@@ -17,6 +17,7 @@ from fuzzy.systems.inference import infer
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
+from study.estimation import EstimationRequest, answer
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -227,3 +228,8 @@ def test_figures_are_drawn_over_any_two_readings(tmp_path):
     assert done.returncode == 0, done.stderr
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"sets.svg", "surfaces.svg", "rules-mamdani.svg"}
+
+
+def test_no_reading_at_all_is_told_with_what_to_give():
+    with pytest.raises(ValueError, match=r"no reading is given: .* --hcv 9\.5, .* --absent normal"):
+        answer(EstimationRequest())

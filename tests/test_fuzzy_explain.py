@@ -271,3 +271,24 @@ def test_drawn_sets_pass_through_the_drawn_degrees():
             drawn = np.interp(view["readings"][i], view["x"][i], view[f"terms.{bound}"][t])
             # Linear between points 1/30 apart, slopes turning by at most 1/4 a unit per unit.
             assert drawn == pytest.approx(view[f"terms.degree_{bound}"][t], abs=1e-4)
+
+
+def test_a_reading_that_no_rule_asks_for_is_not_listed_as_one():
+    unused = replace(SMALL, rules=(Rule((Term(0, 0),), 0), Rule((Term(0, 1),), 1)))
+    x = np.full(len(SMALL.inputs), 9.0)
+    lines = explanation_lines(explain(unused, x, "sugeno"))
+    rain = next(line for line in lines if line.split()[:1] == ["rain"])
+    assert rain.split() == ["rain", "in", "no", "rule"]
+    whole = explanation_lines(explain(SMALL, x, "sugeno"))
+    assert any(line.split()[:2] == ["rain", "9.00"] for line in whole)
+
+
+def test_a_small_degree_is_not_printed_as_none():
+    x = np.array([2.0, *np.full(len(SMALL.inputs) - 1, 9.0)])
+    (heat,) = (line for line in explanation_lines(explain(SMALL, x, "sugeno")) if "heat  " in line)
+    cold, hot = heat.split("cold ")[1].split("hot ")
+    assert float(hot) == pytest.approx(np.exp(-0.5 * 3.5**2), abs=1e-3)
+    far = explanation_lines(explain(SMALL, np.array([0.0, *x[1:]]), "sugeno"))
+    (heat,) = (line for line in far if "heat  " in line)
+    assert heat.split("hot ")[1] == "4e-05"
+    assert float(cold) > 0.8

@@ -191,7 +191,7 @@ def test_rules_that_name_an_absent_aetiology_are_left_out():
 @pytest.mark.parametrize(
     ("reading", "present", "message"),
     [
-        ("R1", (), "no rule on no aetiology alone"),
+        ("R1", (), "no aetiology has a reading: give one"),
         ("R4-pair", ("hcv",), "reading R4-pair has no rule on hcv alone"),
         ("R1", ("hvc",), "aetiology 'hvc': use one of hcv, hbv"),
     ],

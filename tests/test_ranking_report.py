@@ -3,9 +3,11 @@
 import pytest
 
 from reports import ranking_study as told
+from reports.reference_spacing import reference_spacing, reference_spacing_figure
 from study.results.tables import write_table
 from study.robustness import rows
 from study.similarity.batch import COLUMNS
+from tests.report_samples import results_of
 
 FIRST, SECOND = COLUMNS[0], COLUMNS[4]
 SYSTEMS = ("mamdani", "sugeno", "interval-type-2")
@@ -79,3 +81,16 @@ def test_the_sentences_name_the_numbers_of_the_tables(folder):
     assert "rest length 0.80 (0.70–1.00), mass 0.30 (0.20–0.50)" in movers
     assert "Sugeno from 2.0 to 2.0 mm" in spacing
     assert "Mamdani from 4.0 to 4.0 mm" in spacing
+
+
+def test_the_first_page_says_which_reference_spacing_makes_whom_the_nearest(folder):
+    results = results_of()
+    found = reference_spacing(results, folder)
+    own = 1e3 * results.scene.damping.reference_spacing
+    assert f"here h₀ is {own:.1f} mm" in found
+    assert "Sugeno is nearest by 1 of 1 measures at h₀ of 2.0 to 2.0 mm, Mamdani" in found
+    assert "margins of 0.0018 and 0.0031" in found
+    assert reference_spacing_figure(results).startswith(b"<?xml")
+    assert reference_spacing(results_of(["fem"]), folder) is None
+    (folder / f"{told.SPACING}.csv").unlink()
+    assert reference_spacing(results, folder) is None

@@ -359,3 +359,15 @@ def test_columns_of_the_scene_keep_every_group_in_order():
     assert [group for column in split for group in column] == groups
     heights = [sum(len(group["rows"]) + 2 for group in column) for column in split]
     assert max(heights) - min(heights) <= 8  # no more than the tallest group
+
+
+def test_leads_that_another_window_or_other_axes_may_turn_are_counted():
+    results = results_of()
+
+    def said(**spread):
+        rows = tuple(row._replace(**spread) for row in results.score_differences)
+        return " ".join(sentences(replace(results, score_differences=rows)))
+
+    assert "None are no larger than their spread over windows" in said(window=0.0, normalised=0.0)
+    assert " 7 are no larger than their spread over windows" in said(window=1.0, normalised=0.0)
+    assert " 7 are no larger than their spread over windows" in said(window=0.0, normalised=1.0)

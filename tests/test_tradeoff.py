@@ -17,10 +17,10 @@ from study.problem.damping import RayleighDamping
 from study.progress import Silent
 from study.run.stated import arguments
 from study.scene.file import read_scene
+from study.sweep import stated as stated_module
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
-from study.tradeoff import problem as problem_module
 from study.tradeoff import recommend as advice
 from study.tradeoff import study as study_module
 from study.tradeoff import table
@@ -62,7 +62,7 @@ def found(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def stated():
-    return problem_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    return stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
 
 
 def rows_of(entries, folder):
@@ -285,7 +285,7 @@ def test_cells_turned_inside_out_and_steps_beyond_the_limit_leave_no_error(
 
 def test_control_points_have_one_order_here_and_in_a_run(stated):
     given = arguments(sampled(read_scene("block", SMALL)))
-    there = problem_module.stated(**json.loads(json.dumps(given, sort_keys=True)))
+    there = stated_module.stated(**json.loads(json.dumps(given, sort_keys=True)))
     assert list(read_scene("block").control_points) == ["tool", "corner"]
     assert there.problem.probes == stated.problem.probes == ("corner", "tool")
     assert stated.problem.probes[stated.problem.tool_probe] == "tool"
@@ -347,7 +347,7 @@ def test_a_mesh_that_changed_since_the_runs_were_planned_is_refused(tmp_path):
     given = arguments(scene)
     mesh.write_text("solid b")
     with pytest.raises(ValueError, match="has changed"):
-        problem_module.stated(**given)
+        stated_module.stated(**given)
 
 
 def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():

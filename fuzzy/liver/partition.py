@@ -26,7 +26,7 @@ from fuzzy.liver.knowledge import (
     rows,
 )
 from fuzzy.liver.readings import READINGS, disease_sets
-from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
+from fuzzy.liver.settings import FOOTPRINTS, NO_READING, LiverSettings
 from fuzzy.liver.table1 import AETIOLOGIES, Cell
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
@@ -168,14 +168,16 @@ def antecedents(present: Sequence[str], reading: str, *, completed: bool = False
 
     ValueError if there is none.
     """
+    if not present:
+        raise ValueError(NO_READING)
     found = [cell for cell in disease_sets(READINGS[reading]) if {*cell} <= {*present}]
     if completed:
         every = (c for size in range(1, len(present) + 1) for c in combinations(present, size))
         found = list(dict.fromkeys([*found, *every]))
     if not found:
         raise ValueError(
-            f"no rule on {' and '.join(present) or 'no aetiology'} alone: give a reading, or set "
-            "absent to normal"
+            f"no rule on {' and '.join(present)} alone: give a reading of another, or set absent "
+            "to normal"
         )
     return found
 

@@ -50,6 +50,7 @@ FOOTPRINTS: dict[str, FootprintKind] = {
 }
 
 AS_KNOWLEDGE = "auto"
+NO_READING = "no aetiology has a reading: give one, or set absent to normal"
 
 ABSENT: dict[str, Absent | None] = {
     AS_KNOWLEDGE: None,

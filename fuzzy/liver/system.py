@@ -14,7 +14,7 @@ from fuzzy.liver.knowledge import (
 from fuzzy.liver.partition import following_records, following_system, placement
 from fuzzy.liver.readings import disease_sets, reading_named
 from fuzzy.liver.rules import rule_base
-from fuzzy.liver.settings import FOOTPRINTS, LiverSettings
+from fuzzy.liver.settings import FOOTPRINTS, NO_READING, LiverSettings
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Variable
@@ -69,11 +69,13 @@ def _require_known(present: tuple[str, ...]) -> None:
 
 
 def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tuple[str, ...]]:
+    if not present:
+        raise ValueError(NO_READING)
     cells = disease_sets(reading_named(settings.reading))
     found = [cell for cell in cells if {*cell} <= {*present}]
     if not found:
         raise ValueError(
-            f"reading {settings.reading} has no rule on {' and '.join(present) or 'no aetiology'} "
+            f"reading {settings.reading} has no rule on {' and '.join(present)} "
             "alone: give readings for more aetiologies, choose another reading, or set absent to "
             "normal"
         )

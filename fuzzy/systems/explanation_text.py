@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from fuzzy.systems.explain import Explanation, Firing, OutputSet, shown_rules
 from fuzzy.systems.rule_text import rule_text
+from fuzzy.systems.system import FuzzySystem
 
 
 def explanation_lines(explanation: Explanation, unit: str = "", rules: int = 10) -> list[str]:
@@ -39,16 +40,37 @@ def _answer(explanation: Explanation, unit: str) -> str:
 
 
 def _span(lower: float, upper: float) -> str:
-    return f"{upper:.3f}" if lower == upper else f"{lower:.3f}-{upper:.3f}"
+    return _degree(upper) if lower == upper else f"{_degree(lower)}-{_degree(upper)}"
+
+
+def _degree(value: float) -> str:
+    """To three decimals; one too small for them as a power of ten, as it is not 0."""
+    return f"{value:.0e}" if 0.0 < value < 5e-4 else f"{value:.3f}"
+
+
+def _share(value: float) -> str:
+    return "below 0.1 %" if 0.0 < value < 5e-4 else f"{100 * value:.1f} %"
 
 
 def _degree_rows(explanation: Explanation, unit: str) -> list[list[str]]:
+    """Readings and their degrees, but of one that has no part in the answer."""
     rows = []
-    for variable, x in zip(explanation.system.inputs, explanation.readings, strict=True):
+    for i, (variable, x) in enumerate(
+        zip(explanation.system.inputs, explanation.readings, strict=True)
+    ):
+        if not _has_part(explanation.system, i):
+            rows.append([variable.name, "in no rule"])
+            continue
         mine = [degree for degree in explanation.degrees if degree.input == variable.name]
         cells = [f"{degree.set} {_span(degree.lower, degree.upper)}" for degree in mine]
         rows.append([variable.name, f"{x:.2f} {unit}", *cells])
     return rows
+
+
+def _has_part(system: FuzzySystem, i: int) -> bool:
+    """Whether a rule names the i-th input, or a linear consequent may ask for it."""
+    named = (term.input for rule in system.rules for term in rule.antecedents)
+    return i in named or any(one.kind == "linear" for one in system.output.sets)
 
 
 def _rule_rows(explanation: Explanation, shown: Sequence[Firing]) -> list[list[str]]:
@@ -56,7 +78,7 @@ def _rule_rows(explanation: Explanation, shown: Sequence[Firing]) -> list[list[s
         [
             f"{firing.number}",
             _span(firing.lower, firing.upper),
-            *([] if firing.share is None else [f"{100 * firing.share:.1f} %"]),
+            *([] if firing.share is None else [_share(firing.share)]),
             rule_text(firing.rule, explanation.system),
             _effect(firing),
         ]
@@ -87,7 +109,7 @@ def _output_rows(explanation: Explanation, unit: str) -> list[list[str]]:
 def _constant(one: OutputSet, unit: str) -> list[str]:
     if one.constant is None or one.share is None:
         return []
-    return [f"constant {one.constant:.2f} {unit}", f"share {100 * one.share:.1f} %"]
+    return [f"constant {one.constant:.2f} {unit}", f"share {_share(one.share)}"]
 
 
 def _by(one: OutputSet) -> str:
