@@ -136,10 +136,12 @@ class SubspaceMotion:
         self.go_on()
         self.deliver()
 
-    def go_on(self) -> None:
-        """Go one step on, and leave the displacement where it was."""
-        self.advance(*self.factor(np.array([self.time, self.time + self.step])))
-        self.time += self.step
+    def go_on(self, steps: int = 1) -> None:
+        """Go so many steps on, and leave the displacement where it was."""
+        times = np.asarray(self.time + self.step * np.arange(steps + 1), dtype=np.float64)
+        for before, after in pairwise(self.factor(times)):
+            self.advance(before, after)
+        self.time += self.step * steps
 
     def deliver(self) -> Floats:
         """Bring the displacement [m] (n,) to where the motion is."""

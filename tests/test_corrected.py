@@ -182,7 +182,7 @@ def test_two_remainders_of_the_assumed_order_tell_its_error_exactly():
 def test_the_error_by_the_spacing_is_at_most_twice_what_is_told_and_no_small_part_of_it(pressed):
     ran = pressed.run(SILENT)
     told = ran.record.correction.remainder_errors["tool"].displacement
-    finest = prepared(FEW, "tool.force=0.5 N", spacing=0.005)
+    finest = prepared(FEW, "tool.force=0.5 N", spacing=0.0025)
     true = [
         PreparedRemainder(one.coarse, 24).run(Automatic()).trajectory.displacement[:, 0]
         for one in (pressed, finest)
@@ -196,7 +196,7 @@ def test_the_record_has_each_error_by_itself(results):
     record = results.model("corrected")
     found = record.correction
     assert found.spacing_m == pytest.approx(0.010)
-    assert found.compared_spacing_m == pytest.approx(0.02 / 3)
+    assert found.compared_spacing_m == pytest.approx(0.005)
     assert found.remainder.keys() == found.remainder_errors.keys() == set(results.record.probes)
     assert 0.0 < found.remainder_errors["tool"].displacement < found.remainder["tool"].displacement
     assert record.elements == dataclasses.replace(

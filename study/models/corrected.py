@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import lru_cache, partial
 from typing import Any, Self
 
 import numpy as np
@@ -110,10 +110,10 @@ class PreparedCorrected:
         self.fine.refuse()
         self.coarse.refuse()
 
-    @cached_property
+    @property
     def _on_level(self) -> MeshSolution:
         """The finite elements on the level of the model."""
-        return self.fine.solved_on(None, Silent())
+        return _solved(self.model.fine, self.problem)
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion by the lattice's own steps, or by equal ones of at most `longest` [s]."""
@@ -228,6 +228,12 @@ class PreparedCorrected:
         solved = self.best or self._on_level
         parts = self._remainder(solved), self._deformed(solved)
         return Together(*parts, self.problem.factor, self.fine.model.damping).stepper()
+
+
+@lru_cache(maxsize=1)
+def _solved(fine: FiniteElements, problem: Problem) -> MeshSolution:
+    """Elements on their level, for all lattices beside them."""
+    return fine.prepare(problem).solved_on(None, Silent())
 
 
 def _unknown(name: str, compared: Trajectory | str) -> Iterator[str]:

@@ -3,8 +3,8 @@
 The difference of a lattice and the same lattice linear about rest, both by the same steps of the
 same integrator. What the two have in common cancels: the error of the steps, of the cells that cut
 the surface, of the load spread over few nodes. What is left is small and smooth, so that a coarse
-lattice shows it: its error falls about with the spacing to the power ORDER, and a somewhat finer
-lattice tells how large it is.
+lattice shows it: its error falls about with the spacing to the power ORDER, and a lattice
+of half the spacing tells how large it is.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ Ints = NDArray[np.int64]
 
 ORDER = 1.5
 """Assumed of the remainder's error in the spacing; cells that are cut keep it from 2."""
-FINER = 2.0 / 3.0
+FINER = 0.5
 """Spacing of the lattice that tells the error, times that of the one whose error it tells.
 
 A coarser one would be cheaper, but where neither shows the strain under the tool both miss the same
-and seem to agree: at 40 and 20 mm under a tool of 15 or 25 mm the error is up to 14 times what they
-tell (`tests.benchmarks.corrected_places`).
+and seem to agree; one of two thirds differs too little beside the chance of how cells lie
+(`reports/data/corrected_places.csv` has both).
 """
 KEPT = 0.75
 """Share of the vectors that is left when their last ones are left out to see what they do."""

@@ -21,7 +21,8 @@ class Together:
     """A nonlinear lattice, itself linear, and linear elements, at rest and then by the same steps.
 
     `lattice` is the first, with its `step` [s]. The displacement of the mesh's vertices is made
-    when it is asked for, and at the end of every frame.
+    when it is asked for, and at the end of every frame. Until then the linear parts wait: many
+    steps at once cost them little more than one.
     """
 
     def __init__(
@@ -36,7 +37,7 @@ class Together:
         self.reduced = remainder.linear()
         self.linear = remainder.linear_motion(self.reduced)
         self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
-        self.every, self.taken = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
+        self.every, self.waiting = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
 
     @property
     def unknowns(self) -> int:
@@ -47,14 +48,20 @@ class Together:
     def take_step(self) -> None:
         """Take one step with all that a run does between steps."""
         self.lattice.take_step()
-        self.linear.advance(1, self.step)
-        self.elements.go_on()
-        self.taken += 1
-        if self.taken % self.every == 0:
+        self.waiting += 1
+        if self.waiting >= self.every:
             self.displacement()
+
+    def _catch_up(self) -> None:
+        """Bring the linear parts to where the lattice is."""
+        if self.waiting:
+            self.linear.advance(self.waiting, self.step)
+            self.elements.go_on(self.waiting)
+            self.waiting = 0
 
     def displacement(self) -> Floats:
         """Of the vertices of the elements' mesh [m] (v, 3), as they are now."""
+        self._catch_up()
         below = self.reduced.displacement(self.linear.coordinates)
         beyond = self.shape.weights @ (self.lattice.displacement() - below)
         return np.asarray(self.elements.deliver().reshape(-1, 3) + beyond)
@@ -64,7 +71,7 @@ class Together:
         self.lattice.restart()
         self.linear.restart()
         self.elements.restart()
-        self.taken = 0
+        self.waiting = 0
 
     def stepper(self) -> Stepper:
         """As a model gives it."""
