@@ -431,6 +431,31 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
     assert not (tmp_path / "block-0.1percent.toml").exists()
 
 
+@pytest.mark.slow
+def test_where_the_place_is_known_corrected_lattices_are_chosen_from_too(command, tmp_path):
+    """On this block no lattice down to half the scene's spacing promises as much."""
+    words = ("recommend", "block", *OVERRIDES, "--error", "12 %")
+    code, said = command(*words)
+    assert code == EXIT_FAILED_CHECK, said
+    code, said = command(*words, "--known-place")
+    assert code == 0, said
+    assert "corrected lattice of" in said
+    assert "this place of the load only" in said
+    scene = read_scene(str(tmp_path / "block-12percent.toml"))
+    assert scene.models[-1] == "corrected"
+    assert scene.corrected.spacing is not None
+
+
+def test_a_recommended_corrected_lattice_has_its_spacing_in_the_scene():
+    scene = read_scene("block", SMALL)
+    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))
+    chosen = advice.Candidate(0.015, advice.Promise(0.02, 0.01), cost, None, corrected=True)
+    found = advice.Recommended(chosen, True, Errors("resolved", 0.02), None, 0.01)
+    text = advice.recommended_scene(scene, found)
+    assert 'spacing = "0.015 m"' in text.split("[corrected]")[1]
+    assert '"corrected",\n]' in text
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -14,6 +14,7 @@ def recommend(
     rate: str | None = None,
     error: str | None = None,
     set_: Overrides = None,
+    known_place: bool = False,
     out: Path | None = None,
     where: Workers = HERE,
 ) -> None:
@@ -27,6 +28,9 @@ def recommend(
         States per second that must be ready in real time, for example "60 Hz".
     error
         Error of the displacement over the organ to stay below, for example "5 %".
+    known_place
+        The load stays where the scene has it: corrected lattices, which follow it only there, are
+        chosen from too.
     set_
         Override of the scene, table.key=value. May be repeated.
     out
@@ -39,7 +43,7 @@ def recommend(
         scene=scene, overrides=set_ or (), out=out, workers=where.workers, scheduler=where.scheduler
     )
     with on_stderr() as progress:
-        met, lines = asked.advise(request, rate, error, progress)
+        met, lines = asked.advise(request, rate, error, progress, known_place=known_place)
     print("\n".join(lines))
     if not met:
         sys.exit(EXIT_FAILED_CHECK)

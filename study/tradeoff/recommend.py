@@ -6,6 +6,9 @@ is timed at all. For a rate alone the most accurate that keeps up is recommended
 cheapest that promises it. A promise is the fit with its spread and the reference's own error; the
 recommended configuration is then run and timed afresh, and the next coarser one taken where it does
 not keep up after all.
+
+Where the place of the load is known beforehand, corrected lattices are chosen from too. There are
+few, and each promises what a run of it was off by, or the reference's own error if that is more.
 """
 
 from __future__ import annotations
@@ -39,6 +42,8 @@ ELEMENTS = 0.75
 SPREAD = 2.8
 """Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
 FEWEST = 3
+BESIDE = (2.0, 1.5, 1.0)
+"""Spacings of corrected lattices, times that of the scene."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +65,16 @@ class Promise:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A spacing [m] with what it is expected to give; `frame`: at the rate, if one is demanded."""
+    """A spacing [m] with what it is expected to give; `frame`: at the rate, if one is demanded.
+
+    `corrected`: whether it is that of a corrected lattice, which follows one place of the load.
+    """
 
     spacing: float
     promise: Promise
     cost: Cost
     frame: Frame | None
+    corrected: bool = False
 
     @property
     def wall_per_second(self) -> float:
@@ -90,9 +99,18 @@ class Recommended:
 
 
 def recommend(
-    scene: Scene, wanted: Demand, store: Store, how: How, progress: Progress
+    scene: Scene,
+    wanted: Demand,
+    store: Store,
+    how: How,
+    progress: Progress,
+    *,
+    known_place: bool = False,
 ) -> Recommended:
-    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified."""
+    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified.
+
+    With `known_place` also among the lattices that follow one place of the load.
+    """
     coarser = judged_by(scene)
     spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
     outcomes = study.solved(coarser, [_configuration(scene, h) for h in spacings], store, how)
@@ -103,6 +121,8 @@ def recommend(
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
     every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
     candidates = _candidates(given, every, curve, wanted, progress)
+    if known_place:
+        candidates += _corrected(given, known, wanted, store, how, progress)
     return _verified(given, known, candidates, wanted, store, how, progress)
 
 
@@ -144,7 +164,9 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
     )
 
 
-def _configuration(scene: Scene, spacing: float) -> Configuration:
+def _configuration(scene: Scene, spacing: float, *, corrected: bool = False) -> Configuration:
+    if corrected:
+        return Configuration("corrected", {"spacing": spacing, "step_fraction": FRACTION})
     lacks = lacks_poisson_ratio(scene)
     name = "volume-springs" if lacks else "springs"
     settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": FRACTION}
@@ -162,8 +184,32 @@ def _candidates(
     ]
 
 
-def _costs(given: Stated, spacings: Sequence[float], progress: Progress) -> list[Cost]:
-    chosen = [_configuration(given.scene, h) for h in spacings]
+def _corrected(
+    given: Stated, known: Truth, wanted: Demand, store: Store, how: How, progress: Progress
+) -> list[Candidate]:
+    """Corrected lattices on the mesh of the scene that is judged by, run and timed in turns."""
+    spacings = [tidy(times * given.scene.lattice.spacing) for times in BESIDE]
+    chosen = [_configuration(given.scene, h, corrected=True) for h in spacings]
+    _, *outcomes = study.solved(given.scene, chosen, store, how)
+    costs = _costs(given, spacings, progress, corrected=True)
+    return [
+        Candidate(h, _as_measured(found, known.field_error), cost, _frame(cost, wanted), True)
+        for h, found, cost in zip(
+            spacings, (errors(one, known, given) for one in outcomes), costs, strict=True
+        )
+        if found.status in {"resolved", "not resolved"}
+    ]
+
+
+def _as_measured(found: Errors, own: float) -> Promise:
+    """What a run was off by, with the reference's own error; that alone if it hides the other."""
+    return Promise(found.field or 0.0, own)
+
+
+def _costs(
+    given: Stated, spacings: Sequence[float], progress: Progress, *, corrected: bool = False
+) -> list[Cost]:
+    chosen = [_configuration(given.scene, h, corrected=corrected) for h in spacings]
     longest = [float("inf")] * len(chosen)  # that at rest is less
     return study.costs(given, chosen, longest, QUICK_REPEATS, progress)
 
@@ -197,10 +243,11 @@ def _verified(
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     chosen = best(candidates, wanted)
-    configuration = _configuration(given.scene, chosen.spacing)
+    kind = chosen.corrected
+    configuration = _configuration(given.scene, chosen.spacing, corrected=kind)
     (_, outcome) = study.solved(given.scene, [configuration], store, how)
     measured = errors(outcome, known, given)
-    (cost,) = _costs(given, [chosen.spacing], progress)
+    (cost,) = _costs(given, [chosen.spacing], progress, corrected=kind)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
     again = _frame(cost, wanted)
@@ -218,11 +265,21 @@ def recommended_scene(scene: Scene, found: Recommended) -> str:
 
     It names the model that was measured, springs of the tissue's own modulus, and the reference.
     """
+    head = "".join(f"# {line}\n" for line in lines(found))
+    if found.candidate.corrected:
+        return head + "\n" + write_scene(_with_corrected(scene, found.candidate.spacing))
     chosen = _configuration(scene, found.candidate.spacing).model(scene)
     assert isinstance(chosen, LatticeModel)  # noqa: S101 - lattices only are recommended
     models = tuple(dict.fromkeys(("fem", *scene.models, "tissue")))
-    head = "".join(f"# {line}\n" for line in lines(found))
     return head + "\n" + write_scene(replace(scene, models=models, lattice=chosen.lattice))
+
+
+def _with_corrected(scene: Scene, spacing: float) -> Scene:
+    """The scene with a corrected lattice of a spacing [m]; the elements are its reference's."""
+    own = replace(scene.lattice, step_fraction=FRACTION, time_step=None, step_rate=None)
+    models = tuple(dict.fromkeys(("fem", *scene.models, "corrected")))
+    corrected = replace(scene.corrected, spacing=spacing)
+    return replace(scene, models=models, lattice=own, corrected=corrected)
 
 
 def lines(found: Recommended) -> list[str]:
@@ -240,7 +297,8 @@ def lines(found: Recommended) -> list[str]:
     if measured.field is not None:
         verdict = ", as promised" if promise.holds(measured.field) else ", not as promised"
     text = [
-        f"lattice of {1e3 * one.spacing:.3g} mm, explicit, {FRACTION:g} of the critical step",
+        f"{'corrected ' * one.corrected}lattice of {1e3 * one.spacing:.3g} mm, explicit, "
+        f"{FRACTION:g} of the critical step",
         f"field error promised {100 * promise.error:.1f} +- {100 * promise.bar:.1f} %, measured "
         f"{error}" + verdict,
     ]
@@ -251,6 +309,11 @@ def lines(found: Recommended) -> list[str]:
             + ("" if slow is None else f", 95 % of them within {1e3 * slow:.3g} ms")
         )
     text.append(f"{found.wall_per_second:.3g} s of wall per simulated second on this machine")
+    if one.corrected:
+        text.append(
+            "It follows this place of the load only. The error is that against linear elements: "
+            "what geometry changes, which the model has, counts as error."
+        )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
         "fuzzy estimate have its error on top."

@@ -100,7 +100,12 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
 
 
 def advise(
-    request: TradeoffRequest, rate: str | None, error: str | None, progress: Progress
+    request: TradeoffRequest,
+    rate: str | None,
+    error: str | None,
+    progress: Progress,
+    *,
+    known_place: bool = False,
 ) -> tuple[bool, list[str]]:
     """Whether the demand can be met, and lines; writes the scene if it can."""
     wanted, given = demand(rate, error), request.read()
@@ -109,7 +114,11 @@ def advise(
     problem = _set_up(recommend.judged_by(sampled(given)))
     model(given, "tissue").varied().prepare(problem)  # a lattice of its spacing
     store = _store(Path("results") / f"{request.name}-tradeoff")
-    found = recommend.recommend(sampled(given), wanted, store, request.how, progress)
+    if known_place:
+        model(given, "corrected").prepare(problem)
+    found = recommend.recommend(
+        sampled(given), wanted, store, request.how, progress, known_place=known_place
+    )
     noted = dict.fromkeys((*given.remarks, *problem.geometry.notes))
     lines = [*(f"note: {note}" for note in noted), *recommend.lines(found), *_busy()]
     if not found.met:
