@@ -52,7 +52,8 @@ class ReducedLattice:
 
     def displacement(self, coordinates: Floats) -> Floats:
         """Displacement [m] (n, 3) of the nodes at modal coordinates (m,)."""
-        return np.asarray(self.shapes @ coordinates)
+        flat = self.shapes.reshape(-1, len(self.squares))  # one product, not one for each node
+        return np.asarray(flat @ coordinates).reshape(-1, 3)
 
 
 def ritz_vectors(assembly: Assembly, material: Material, count: int) -> Floats:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from msm.model import Automatic
+from study.models import corrected
 from study.models.keeping import Keeping
 from study.models.model import SILENT, Watch
 from study.models.remainder import FINER, ORDER, PreparedRemainder, remainder_errors
@@ -136,7 +137,10 @@ def test_cells_turned_inside_out_are_counted_and_keep_it_from_scores():
 
 def test_the_mesh_is_inverted_by_the_sum_though_no_cell_of_the_lattice_is(pressed):
     solved = pressed._on_level
-    shape, found = pressed._deformed(solved), pressed._remainder(solved).run(Automatic())
+    shape, found = (
+        pressed._deformed(solved),
+        pressed._remainder(solved).run(Automatic(), keep_nodes=True),
+    )
     assert shape.inverted_cells(found) == 0
     pushed = dataclasses.replace(found, nodal=found.nodal.copy())
     pushed.nodal[5, 0, 0] += 1.0
@@ -152,6 +156,13 @@ def test_a_lattice_that_diverges_takes_the_sum_with_it():
     assert ran.record.correction is None
     assert np.isnan(ran.trajectory.displacement[-1]).all()
     assert one.simulate().trajectory.status == "diverged"
+
+
+def test_more_samples_than_the_memory_holds_are_refused(pressed, monkeypatch):
+    monkeypatch.setattr(corrected, "available", lambda: 1e5)
+    monkeypatch.setattr(pressed.fine, "refuse", lambda: None)
+    with pytest.raises(ValueError, match=r"time\.samples: 31 of .* enlarge corrected\.spacing"):
+        pressed.refuse()
 
 
 def test_an_integrator_whose_material_is_that_of_its_step_is_refused():

@@ -17,6 +17,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.memory import SHARE, available
 from msm.calibration import SPRING_POISSON_RATIO
 from msm.damping import NodalDamping
 from msm.integrators import INTEGRATORS
@@ -51,6 +52,8 @@ Floats = NDArray[np.float64]
 
 TIMES = 2.0
 """Spacing of the coarse lattice, times that of the scene, where none is given."""
+NODE_BYTES = 24
+"""Kept of a node at a sample: displacement and velocity in single precision."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,9 +109,16 @@ class PreparedCorrected:
         ]
 
     def refuse(self) -> None:
-        """ValueError for what either refuses."""
+        """ValueError for what either refuses, and for more samples than the memory holds."""
         self.fine.refuse()
         self.coarse.refuse()
+        samples, nodes = len(self.problem.observation.times), len(self.coarse.assembly.mass)
+        wanted, limit = NODE_BYTES * samples * nodes, SHARE * available()
+        if wanted > limit:
+            raise ValueError(
+                f"time.samples: {samples} of {nodes} nodes need {wanted / 2**30:.1f} GiB of "
+                f"{limit / 2**30:.1f}; take fewer, or enlarge corrected.spacing"
+            )
 
     @property
     def _on_level(self) -> MeshSolution:
@@ -122,7 +132,7 @@ class PreparedCorrected:
         if longest is not None:
             interval = float(self.problem.observation.times[1])
             step = Fixed(interval / whole_steps(interval, longest))
-        found = self._remainder(solved).run(step)
+        found = self._remainder(solved).run(step, keep_nodes=True)
         shape = self._deformed(solved)
         return Simulation(
             plus(found.trajectory, solved.found.trajectory),
@@ -153,7 +163,7 @@ class PreparedCorrected:
         solved = self.best = self.fine.best
         prepared, shape = self._remainder(solved), self._deformed(solved)
         with watch.progress.stage(self.model.name) as advance:
-            found = prepared.run(asked_step(self.model.coarse.lattice), advance)
+            found = prepared.run(asked_step(self.model.coarse.lattice), advance, keep_nodes=True)
         self._keep_fields(found, shape, watch)
         record = replace(self._record(found, solved, shape), elements=linear.record.elements)
         whole = plus(found.trajectory, linear.trajectory)

@@ -47,7 +47,7 @@ class Remainder:
 
     `trajectory` is the difference, not a number from where the lattice diverged. `lattice`: run of
     the lattice; `nodal` (samples, 2, n, 3): difference of displacement [m] and velocity [m/s] at
-    its nodes, in single precision.
+    its nodes, in single precision, of no samples where it was not kept.
     """
 
     trajectory: Trajectory
@@ -86,14 +86,17 @@ class PreparedRemainder:
         damping, integrator = one.springs.material.damping, one.model.lattice.integrator
         return ReducedMotion(lattice, damping, one.problem.factor, integrator)
 
-    def run(self, step: Step, advance: Advance = lambda _: None) -> Remainder:
+    def run(
+        self, step: Step, advance: Advance = lambda _: None, *, keep_nodes: bool = False
+    ) -> Remainder:
         """The motion of the lattice by steps of its own choice, less that of the linear one."""
         one, problem = self.lattice, self.lattice.problem
-        samples, size = len(problem.observation.times), one.assembly.load.shape
+        samples, size = len(problem.observation.times) * keep_nodes, one.assembly.load.shape
         nodal = np.full((samples, 2, *size), np.nan, np.float32)
 
         def keep(sample: int, u: Floats, v: Floats) -> None:
-            nodal[sample] = u, v
+            if keep_nodes:
+                nodal[sample] = u, v
 
         found = msm.run(
             one.assembly,
@@ -110,7 +113,7 @@ class PreparedRemainder:
     def _beyond_linear(self, found: msm.Run, nodal: NDArray[np.float32]) -> Remainder:
         linear = self.linear()
         moved = self._moved(linear, found.substeps)
-        for sample, both in enumerate(zip(*moved, strict=True)):
+        for sample, both in zip(range(len(nodal)), zip(*moved, strict=True), strict=False):
             nodal[sample] -= [linear.displacement(y) for y in both]
         trajectory = plus(found.trajectory, self._seen(linear, *moved), -1.0)
         truncation = self._truncation(linear, moved[0], found)
