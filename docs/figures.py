@@ -9,9 +9,11 @@ a figure, add it to `figures`. A table of several lines is a figure too.
 """
 
 import csv
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from statistics import median
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -338,6 +340,114 @@ def _cost(line: Line) -> list[str]:
     ]
 
 
+STRAINS = (("1 to 5 %", 0.0, 0.05), ("5 to 20 %", 0.05, 1.0))
+"""Largest strain of the linear elements: words, above, up to."""
+
+
+def corrected() -> Iterator[tuple[str, str]]:
+    """The corrected lattice at random places of the tool, and what it costs."""
+    places, costs = measured("corrected_places"), measured("corrected_cost")
+    ratios = [float(one["error_20"]) / float(one["estimate_20"]) for one in places]
+    coarser = [float(one["error_20"]) / float(one["coarser_20"]) for one in places]
+    yield "corrected-count", str(len(places))
+    yield "corrected-within", str(sum(ratio <= 2.0 for ratio in ratios))
+    yield "corrected-ratios", span(ratios, "{:.2g}".format)
+    yield "corrected-coarser", span(coarser, "{:.2g}".format)
+    yield from _gains(places, costs)
+    yield "corrected-places", table(PLACES_HEAD, [_places(places, *one) for one in STRAINS])
+    yield "corrected-cost", table(COST_HEAD, map(_corrected_cost, costs))
+    yield from _at_1_khz(costs)
+
+
+PLACES_HEAD = (
+    *("largest strain", "places", "nonlinear part", "corrected, 20 mm", "15 mm", "10 mm", "8 mm"),
+    *("corrected at rest only, 20 mm", "lattice alone, 10 mm", "5 mm"),
+)
+
+
+def _places(lines: list[Line], words: str, above: float, up_to: float) -> list[str]:
+    """Median and worst of each column over the places of a range of strain."""
+    found = [line for line in lines if above < float(line["strain"]) <= up_to]
+    columns = (
+        "nonlinear",
+        "error_20",
+        "error_15",
+        "error_10",
+        "error_8",
+        "static_20",
+        "uniform_10",
+    )
+    return [
+        words,
+        str(len(found)),
+        *(_median_and_worst(found, name) for name in (*columns, "uniform_5")),
+    ]
+
+
+def _median_and_worst(lines: list[Line], column: str) -> str:
+    values = [float(line[column]) for line in lines]
+    return f"{percent(median(values))}, {percent(max(values))}"
+
+
+TOLERANCE = 0.02
+ALONE = {"20": 0.02, "15": 0.015, "10": 0.01, "8": 0.008, "7": 0.00667, "5": 0.005}
+"""Spacings [m] by the ends of the names of columns."""
+
+
+def _gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, str]]:
+    """What a lattice alone costs that is within the tolerance, over a corrected one that is."""
+    price = {(one["model"], _rounded(one["spacing_m"])): float(one["per_second"]) for one in costs}
+    for words, (_, above, up_to) in zip(("small", "large"), STRAINS, strict=True):
+        found = [one for one in places if above < float(one["strain"]) <= up_to]
+        gains = [gain for one in found if (gain := _gain(one, price)) is not None]
+        yield f"corrected-met-{words}", f"{len(gains)} of {len(found)}"
+        yield f"corrected-gain-{words}", f"{min(gains):.0f}"
+        yield f"corrected-gain-{words}-median", f"{median(gains):.0f}"
+    missed = sum(float(one["uniform_5"]) > TOLERANCE for one in places)
+    yield "corrected-alone-missed", str(missed)
+
+
+def _gain(line: Line, price: dict[tuple[str, float], float]) -> float | None:
+    """None where no corrected lattice is; at least so much where no lattice alone is."""
+    errors = {name: float(line[f"uniform_{name}"]) for name in ALONE} | {"5": 0.0}
+    alone = [price["uniform", ALONE[name]] for name, e in errors.items() if e <= TOLERANCE]
+    both = [
+        price["corrected", ALONE[name]]
+        for name in ("20", "15", "10", "8")
+        if float(line[f"error_{name}"]) <= TOLERANCE
+    ]
+    return min(alone) / min(both) if both else None
+
+
+def _rounded(spacing: str) -> float:
+    return float(f"{float(spacing):.3g}")
+
+
+COST_HEAD = ("lattice", "field", "at the tool", "processor time of a simulated second", "of a step")
+
+
+def _corrected_cost(line: Line) -> list[str]:
+    named = f"{line['model']}, {1e3 * float(line['spacing_m']):.2g} mm"
+    errors = (percent(line[name]) for name in ("field_error", "tool_error"))
+    step = f"{float(line['step_us']):.0f} µs of {1e3 * float(line['step_s']):.2g} ms"
+    return [named, *errors, f"{float(line['per_second']):.2g} s", step]
+
+
+def _at_1_khz(lines: list[Line]) -> Iterator[tuple[str, str]]:
+    """The most accurate of either kind of which a millisecond is computed within one."""
+    for kind in ("uniform", "corrected"):
+        able = [one for one in lines if one["model"] == kind and _millisecond(one) < 1e-3]
+        best = min(able, key=_field_error)
+        yield f"{kind}-1khz", percent(best["field_error"])
+        yield f"{kind}-1khz-tool", percent(best["tool_error"])
+        yield f"{kind}-1khz-spacing", f"{1e3 * float(best['spacing_m']):.2g} mm"
+
+
+def _millisecond(line: Line) -> float:
+    """Processor time [s] of the steps in a millisecond, which are shortened to divide it."""
+    return math.ceil(1e-3 / float(line["step_s"])) * 1e-6 * float(line["step_us"])
+
+
 def verification() -> Iterator[tuple[str, str]]:
     """The reference on problems with exact solutions."""
     lines = {(line["problem"], line["quantity"]): line for line in measured("verification")}
@@ -399,7 +509,7 @@ def ranking() -> Iterator[tuple[str, str]]:
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
-    lattice = (field_error, real_time, peers, error_bar, large_strain, tradeoff)
+    lattice = (field_error, real_time, peers, error_bar, large_strain, tradeoff, corrected)
     groups = (*fuzzy, *lattice, verification, stability, ranking)
     return {name: text for group in groups for name, text in group()}
 
