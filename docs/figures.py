@@ -467,17 +467,22 @@ def _gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, str]]:
     price = {(one["model"], _rounded(one["spacing_m"])): float(one["per_second"]) for one in costs}
     for words, (_, above, up_to) in zip(("small", "large"), STRAINS, strict=True):
         found = [one for one in places if above < float(one["strain"]) <= up_to]
-        gains = [gain for one in found if (gain := _gain(one, price)) is not None]
+        gains, own = (
+            [gain for one in found if (gain := _gain(one, price, kind)) is not None]
+            for kind in ("uniform", "own")
+        )
         yield f"corrected-met-{words}", f"{len(gains)} of {len(found)}"
         yield f"corrected-gain-{words}", f"{min(gains):.0f}"
         yield f"corrected-gain-{words}-median", f"{median(gains):.0f}"
+        yield f"corrected-own-gain-{words}", f"{min(own):.1f}"
+        yield f"corrected-own-gain-{words}-median", f"{median(own):.0f}"
     missed = sum(float(one["uniform_5"]) > TOLERANCE for one in places)
     yield "corrected-alone-missed", str(missed)
 
 
-def _gain(line: Line, price: dict[tuple[str, float], float]) -> float | None:
+def _gain(line: Line, price: dict[tuple[str, float], float], kind: str) -> float | None:
     """None where no corrected lattice is; at least so much where no lattice alone is."""
-    errors = {name: float(line[f"uniform_{name}"]) for name in ALONE} | {"5": 0.0}
+    errors = {name: float(line.get(f"{kind}_{name}", 0.0)) for name in ALONE} | {"5": 0.0}
     alone = [price["uniform", ALONE[name]] for name, e in errors.items() if e <= TOLERANCE]
     both = [
         price["corrected", ALONE[name]]

@@ -23,6 +23,7 @@ from reports.stability import cases
 from reports.summary import glance, sentences
 from reports.tables import (
     check_rows,
+    correction_rows,
     dimensionless_rows,
     error_rows,
     estimate_rows,
@@ -38,6 +39,7 @@ from reports.tradeoff_answers import answers
 from reports.verification import contest, growth, problems
 from study.results.records import (
     Check,
+    CorrectionRecord,
     CurveErrors,
     CurveOrders,
     Dimensionless,
@@ -251,6 +253,31 @@ def test_the_table_of_numerical_errors(results):
     found = with_model(results, "msm-sugeno", time_step_errors=swapped)
     rows = {row[0]: row[1:] for row in numerics_rows(found)}
     assert rows["MSM Sugeno"][:2] == ["3.0 %", "5.0 %"]
+
+
+def test_the_errors_of_a_corrected_lattice_stand_each_by_itself(results):
+    """And one that is not estimated is no zero."""
+    assert correction_rows(results) == []
+    correction = CorrectionRecord(
+        spacing_m=0.02,
+        compared_spacing_m=None,
+        remainder={"tool": errors(0.05, 0.06), "far": errors(0.01, 0.02)},
+        remainder_errors={},
+        vectors=5,
+        truncation_error=1e-3,
+    )
+    elements = results.model("fem").elements
+    found = with_model(results, "msm-sugeno", correction=correction, elements=elements)
+    rows = correction_rows(found)
+    assert [row[:4] for row in rows] == [
+        ["MSM Sugeno", "tool", "5.0 %", "–"],
+        ["MSM Sugeno", "far", "1.0 %", "–"],
+    ]
+    mesh = elements.mesh_error.by_probe
+    assert [row[4] for row in rows] == [
+        f"{100 * mesh[p].displacement:.1f} %" for p in ("tool", "far")
+    ]
+    assert all(row[6] == "0.1 %" for row in rows)
 
 
 def test_the_table_of_the_first_page(results):

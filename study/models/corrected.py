@@ -165,28 +165,34 @@ class PreparedCorrected:
         with watch.progress.stage(self.model.name) as advance:
             found = prepared.run(asked_step(self.model.coarse.lattice), advance, keep_nodes=True)
         self._keep_fields(found, shape, watch)
-        record = replace(self._record(found, solved, shape), elements=linear.record.elements)
+        record = replace(
+            self._record(found, solved, shape),
+            elements=linear.record.elements,
+            time_step_errors=linear.record.time_step_errors,
+        )
         whole = plus(found.trajectory, linear.trajectory)
         if whole.status == "diverged":
-            return ModelRun(whole, record, notes=linear.notes)
+            return ModelRun(whole, replace(record, time_step_errors={}), notes=linear.notes)
         half = plus(self._halved(prepared, found, watch.progress), linear.trajectory)
         compared = self._compared(found, watch.progress)
-        errors = Errors(self.problem.probes, found, whole)
-        steps = errors.by_steps(self._order, half, linear.record.time_step_errors)
-        correction = errors.by_spacing(self.model.coarse.lattice.spacing, compared)
-        record = replace(record, time_step_errors=steps, correction=correction)
-        return ModelRun(
-            whole,
-            record,
-            tuple(checks(self.model.name, steps, solved, found)),
-            (*linear.notes, *_unknown(self.model.name, compared)),
-            halved=half if steps else None,
+        record = self._with_errors(
+            record, Errors(self.problem.probes, found, whole), half, compared
         )
+        notes = (*linear.notes, *_unknown(self.model.name, compared))
+        sound = half if half.status == "finished" else None
+        return ModelRun(whole, record, tuple(checks(record, solved)), notes, halved=sound)
 
-    @property
-    def _order(self) -> int:
-        """Of the error of the steps."""
-        return INTEGRATORS[self.model.coarse.lattice.integrator].order
+    def _with_errors(
+        self, record: ModelRecord, errors: Errors, half: Trajectory, compared: Trajectory | str
+    ) -> ModelRecord:
+        """The record with the errors of the lattice's steps and of its spacing."""
+        lattice = self.model.coarse.lattice
+        order = INTEGRATORS[lattice.integrator].order
+        return replace(
+            record,
+            time_step_errors=errors.by_steps(order, half, record.time_step_errors),
+            correction=errors.by_spacing(lattice.spacing, compared),
+        )
 
     def _halved(
         self, prepared: PreparedRemainder, found: Remainder, progress: Progress

@@ -11,7 +11,9 @@ from study.models.finite_elements import TRUNCATION_LIMIT
 from study.models.mesh_error import MeshSolution
 from study.models.remainder import FINER, Remainder, relative_sizes, remainder_errors
 from study.problem.trajectory import Trajectory
-from study.results.records import Check, CorrectionRecord, CurveErrors
+from study.results.records import Check, CorrectionRecord, CurveErrors, ModelRecord, largest
+
+SPACING_LIMIT = 0.05
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,20 @@ class Errors:
         )
 
 
-def checks(
-    name: str, steps: dict[str, CurveErrors], solved: MeshSolution, found: Remainder
-) -> Iterator[Check]:
-    """Whether steps were short enough, and vectors of either linear part enough."""
-    yield from step_checks(name, steps)
+def checks(record: ModelRecord, solved: MeshSolution) -> Iterator[Check]:
+    """Whether steps, vectors of either linear part and spacing are good enough, by the record."""
+    yield from step_checks(record.name, record.time_step_errors)
+    found = record.correction
+    assert found is not None  # noqa: S101 - of a corrected lattice that finished
     meaning = "largest relative L2 change of a curve by the last quarter of the vectors"
-    errors = {"elements": superposed(solved).truncation_error, "lattice": found.truncation}
+    errors = {"elements": superposed(solved).truncation_error, "lattice": found.truncation_error}
     for part, value in errors.items():
-        title = f"{name}: vectors of the {part}"
+        title = f"{record.name}: vectors of the {part}"
         yield Check(name=title, value=value, limit=TRUNCATION_LIMIT, meaning=meaning)
+    if found.remainder_errors:
+        yield Check(
+            name=f"{record.name}: spacing",
+            value=largest(found.remainder_errors).displacement,
+            limit=SPACING_LIMIT,
+            meaning="largest estimated relative L2 error of a displacement curve by the spacing",
+        )

@@ -137,8 +137,8 @@ class PreparedRemainder:
         probes = _at(lattice.interpolation(seen.probes)[0], linear)
         frames = [linear.displacement(y[frame]) for frame in seen.frames]
         volume, surface = (
-            np.array([lattice.interpolation(points)[0] @ u for u in frames])
-            for points in (seen.volume_points, seen.surface_points)
+            np.array([weights @ u for u in frames])
+            for weights, _ in map(lattice.interpolation, (seen.volume_points, seen.surface_points))
         )
         u, v = (np.einsum("pdm,tm->tpd", probes, one) for one in (y, rates))
         return Trajectory(u, v, volume, surface)
