@@ -15,6 +15,8 @@ Names listed in `__all__` keep their meaning and their arguments from one minor 
 everything else may change.
 """
 
+from fem_reference.certificate import Certificate, Comparison, comparison
+from fem_reference.certified import CertifiedMotion
 from fem_reference.dynamics import Oscillator, SteppedMotion
 from fem_reference.elasticity import Body, discretise
 from fem_reference.elements import ELEMENTS, Element
@@ -36,6 +38,9 @@ __all__ = [
     "LAWS",
     "METHODS",
     "Body",
+    "Certificate",
+    "CertifiedMotion",
+    "Comparison",
     "Element",
     "ErrorEstimate",
     "Foundation",
@@ -54,6 +59,7 @@ __all__ = [
     "Trajectory",
     "at_points",
     "build",
+    "comparison",
     "discretisation_error",
     "discretise",
     "evaluation",

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -395,3 +396,17 @@ def test_pivots_of_a_matrix_that_rounding_could_turn_are_not_trusted(rng):
             assert found.rounding < 0.1 * abs(smallest)
         else:
             assert found.rounding > abs(smallest)
+
+
+def test_what_the_page_shows_bounds_each_frame(bodies):
+    page = (Path(__file__).parents[1] / "docs" / "models.md").read_text(encoding="utf-8")
+    block = next(text for text in page.split("```python\n")[1:] if "CertifiedMotion" in text)
+    shown: dict[str, object] = {}
+    exec(block.split("```")[0], shown)  # noqa: S102 - what is run is our own page
+    one, step, loads = bodies[0], 1.0 / 60.0, np.linspace(0.0, 1.0, 7)
+    times, damping = step * np.arange(7), RayleighDamping(20.0)
+    found = shown["bounds"](
+        one.body, PROBES, damping, lambda t: np.interp(t, times, loads), step, 6
+    )
+    _, true = one.error(damping, loads, step, ritz_subspace(one.body, 16))
+    assert (np.array(list(found)) >= true[1:]).all()

@@ -11,6 +11,7 @@ from fem_reference.subspace import ritz_subspace, superposition
 from reports import report
 from reports.certified import certified_rows
 from study.models import superposition as model
+from study.models.model import SILENT
 from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import read_scene
@@ -91,14 +92,16 @@ def test_a_bound_is_printed_no_smaller_than_it_is(found):
 
 def test_without_a_certificate_nothing_is_certified(scene):
     ready = prepared(scene, certificate=0)
-    assert ready._certified(np.zeros((41, 2, 3))) == (None, ())
+    assert ready._certified(np.zeros((41, 2, 3)), SILENT) == (None, ())
+    assert len(ready.describe()) == 1
     assert ready.stepper().bound is None
 
 
 def test_where_the_memory_holds_no_factors_a_note_says_so(scene, monkeypatch):
     monkeypatch.setattr(model, "factors_fit", lambda *_: False)
-    bound, notes = prepared(scene)._certified(np.zeros((41, 2, 3)))
+    bound, notes = prepared(scene)._certified(np.zeros((41, 2, 3)), SILENT)
     assert bound is None
+    assert "certified by 40 vectors" in prepared(scene).describe()[1]
     assert "not certified: the memory holds no factors" in notes[0]
 
 

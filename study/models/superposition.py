@@ -120,11 +120,14 @@ class PreparedSuperposition:
         return float("inf")
 
     def describe(self) -> list[str]:
-        """Unknowns and vectors."""
+        """Unknowns and vectors, and those that certify its error."""
         kind = "Ritz vectors" if self.model.vectors == "ritz" else "modes and the rest"
         element = chosen_element(self.model.element, self.problem.tissue.poisson_ratio)
         size = unknowns(self.mesh, element)
-        return [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
+        lines = [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
+        if self.model.certificate:
+            lines.append(f"{self.model.name}: error certified by {self.model.certificate} vectors")
+        return lines
 
     def _steps_per_sample(self, longest: float | None = None) -> int:
         return whole_steps(float(self.problem.observation.times[1]), longest or STEP)
@@ -141,8 +144,7 @@ class PreparedSuperposition:
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its errors by the steps of the load and by the subspace, and its record."""
         found = estimated_run(self.model, self, self.problem, watch, ORDER)
-        with watch.progress.stage(f"{self.model.name}: certificate"):
-            bound, notes = self._certified(found.trajectory.displacement)
+        bound, notes = self._certified(found.trajectory.displacement, watch)
         elements = ElementsRecord(
             element=self.body.element,
             elements=len(self.body.mesh.tetrahedra),
@@ -163,12 +165,13 @@ class PreparedSuperposition:
         bounds = None if bound is None else bound.bounds
         return replace(found, record=record, notes=(*found.notes, *notes), certified=bounds)
 
-    def _certified(self, motion: Floats) -> tuple[Certified | None, tuple[str, ...]]:
+    def _certified(self, motion: Floats, watch: Watch) -> tuple[Certified | None, tuple[str, ...]]:
         """The bound of a motion's error if one is asked for, or a note on why there is none."""
         if not self.model.certificate:
             return None, ()
         try:
-            given = self.certificate
+            with watch.progress.stage(f"{self.model.name}: certificate"):
+                given = self.certificate
         except ValueError as error:
             return None, (f"The error of {self.model.name} is not certified: {error}.",)
         steps = self._steps_per_sample()
