@@ -120,11 +120,14 @@ def steps_in_c(folder, liver, lanes, change=None):
     if shutil.which("cc") is None:
         pytest.skip("no C compiler")
     lattice, net, dt, law = liver
-    found = [
-        bench_lattice.on_list(law, net, dt),
-        bench_lattice.in_c(folder, law, net if change is None else change(net), dt, lattice, lanes),
-    ]
-    return bench_lattice.differences(found)
+    changed = net if change is None else change(net)
+    try:
+        in_c = bench_lattice.in_c(folder, law, changed, dt, lattice, lanes)
+    except subprocess.CalledProcessError as error:
+        if b"4 lanes want AVX2" not in error.stderr:  # what grid.c says where there are none
+            raise
+        pytest.skip(f"the processor has no {lanes} lanes in C")
+    return bench_lattice.differences([bench_lattice.on_list(law, net, dt), in_c])
 
 
 @pytest.mark.parametrize("volume", [True, False])

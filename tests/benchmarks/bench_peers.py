@@ -43,7 +43,7 @@ Truth = tuple[Converged, Floats, Floats]
 """Finite elements at points [m] (q, 3) of volumes [m^3] (q,)."""
 
 TABLE = Path(__file__).parents[2] / "reports" / "data" / "peers.csv"
-SPACINGS = (0.04 / 3,)
+SPACINGS = (0.04 / 3, 0.01)
 SETTLED = 1.0
 """Time [s] after which the lattice is within 1e-8 of its state at rest, relative to it."""
 TIMED = 0.1

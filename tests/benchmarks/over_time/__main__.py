@@ -65,9 +65,13 @@ def without_folders(path: Path) -> None:
     asv names an environment that exists by the path of its interpreter.
     """
     found = json.loads(path.read_text(encoding="utf-8"))
-    name = f"python{found['params']['python']}"
-    text = json.dumps(found | {"env_name": name, "python": name}, indent=1)
-    path.with_name(f"{path.name.partition('-')[0]}-{name}.json").write_text(text, encoding="utf-8")
+    name = f"python{platform.python_version()}"
+    found |= {"env_name": name, "python": name, "params": found["params"] | {"python": name}}
+    target = path.with_name(f"{path.name.partition('-')[0]}-{name}.json")
+    if target.exists():  # some figures measured again
+        before = json.loads(target.read_text(encoding="utf-8"))
+        found["results"] = before["results"] | found["results"]
+    target.write_text(json.dumps(found), encoding="utf-8")
     path.unlink()
 
 

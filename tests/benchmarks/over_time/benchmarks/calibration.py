@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-LEAST, TURNS = 0.02, 5
+LEAST, TURNS, FEW, LONG = 0.02, 5, 2, 1.0
 LOOP = np.random.default_rng(0).standard_normal((160, 160))
 
 
@@ -28,11 +28,14 @@ def processor() -> float:
 def times_calibration(task: Callable[[], object]) -> float:
     """Least processor time of a task over that of the loop, in turns after one that compiles.
 
-    A short task is repeated until its turn lasts LEAST seconds.
+    A short task is repeated until its turn lasts LEAST seconds; one of LONG seconds has FEW turns.
     """
     task()
-    count = max(1, round(LEAST / _taken(task, 1)))
-    turns = [(_taken(task, count), _taken(calibration, 3)) for _ in range(TURNS)]
+    once = _taken(task, 1)
+    count = max(1, round(LEAST / once))
+    turns = [
+        (_taken(task, count), _taken(calibration, 3)) for _ in range(FEW if once > LONG else TURNS)
+    ]
     ours, loops = (min(column) for column in zip(*turns, strict=True))
     return (ours / count) / (loops / 3)
 

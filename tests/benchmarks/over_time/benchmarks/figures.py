@@ -33,6 +33,7 @@ from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.score import scores
 from tests.benchmarks.bench_lattice import FRACTION, stepping
+from tests.conftest import SMALL
 
 from .calibration import times_calibration
 
@@ -152,13 +153,13 @@ def track_estimate_command():
 
 
 def track_report():
-    """The PDF of a stored run of the built-in block with a coarse lattice."""
+    """`liver-study report` of a small block."""
     with tempfile.TemporaryDirectory() as folder:
         study = [sys.executable, "-m", "study"]
         root = Path(__file__).resolve().parents[4]
-        small = ["--set", "reference.element_size=40 mm", "--set", "lattice.spacing=20 mm"]
+        small = [word for override in SMALL for word in ("--set", override)]
         subprocess.run(
-            [*study, "run", "block", *small, "--out", f"{folder}/block"],
+            [*study, "run", "block", *small, "--no-report", "--out", f"{folder}/block"],
             check=True,
             capture_output=True,
             cwd=root,
