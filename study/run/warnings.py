@@ -24,7 +24,7 @@ def warnings(
 
 def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.elements is not None:
-        yield from _of_elements(record, record.elements)
+        yield from _of_elements(scene, record, record.elements)
     if record.status == "diverged":
         yield (
             f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
@@ -37,7 +37,7 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
         )
 
 
-def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+def _of_elements(scene: Scene, record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
     if strain is not None and strain > STRAIN_LIMIT:
         yield (
@@ -54,9 +54,14 @@ def _of_elements(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]
         yield (
             f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "
             f"mesh of {elements.elements} tetrahedra, the last within the limit, reaches "
-            f"{100 * elements.mesh_error.worst.displacement:.2g} %. Ask for less, or simplify "
-            "the organ or its load."
+            f"{100 * elements.mesh_error.worst.displacement:.2g} %. {_more_accurate(scene)}"
         )
+
+
+def _more_accurate(scene: Scene) -> str:
+    """What brings the reference nearer to the accuracy that is asked for."""
+    graded = "" if scene.is_graded else 'set reference.refinement to "graded", '
+    return f"Ask for less, {graded}enlarge tool.radius, or give the run more free memory."
 
 
 def _name(record: ModelRecord) -> str:

@@ -21,7 +21,6 @@ LIBRARIES = (
     "numba",
     "numpy",
     "pyamg",
-    "pytetwild",
     "scikit-fem",
     "scikit-fuzzy",
     "scipy",
