@@ -43,7 +43,6 @@ def reference(results: Results) -> dict[str, object] | None:
         "errors": list(_error_rows(results, model, found)),
         "formal_order": f"{error.formal_order:g}" if error and by_three else "",
         "graded": results.scene.is_graded,
-        "graded_order": f"{error.formal_order - 1.0:g}" if error else "",
         "safety_graded": f"{SAFETY_GRADED:g}",
         "least_order": f"{LEAST_ORDER:g}",
         "assumed_order": f"{ASSUMED_ORDER:g}",
@@ -97,7 +96,7 @@ def _error_rows(results: Results, model: ModelRecord, found: ElementsRecord) -> 
         return
 
     formal = errors.formal_order if len(found.levels) > 2 else None
-    assumed = errors.formal_order - 1.0 if results.scene.is_graded else ASSUMED_ORDER
+    assumed = errors.formal_order if results.scene.is_graded else ASSUMED_ORDER
     order = partial(_order, formal=None if results.scene.is_graded else formal, assumed=assumed)
     for probe, error in errors.by_probe.items():
         observed = errors.order_by_probe[probe]
