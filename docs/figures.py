@@ -303,6 +303,16 @@ def error_bar() -> Iterator[tuple[str, str]]:
     yield "errors-worst", f"{max(factors):.1f}"
 
 
+def error_bar_livers() -> Iterator[tuple[str, str]]:
+    """How often the error stated on graded meshes holds."""
+    lines = measured("error_bar_livers")
+    factors = [float(line["true"]) / float(line["stated"]) for line in lines]
+    yield "liver-errors-stated", str(len(lines))
+    yield "liver-errors-held", str(sum(factor <= 1.0 for factor in factors))
+    yield "liver-errors-shapes", str(len({line["shape"] for line in lines}))
+    yield "liver-errors-worst", f"{max(factors):.2f}"
+
+
 def large_strain() -> Iterator[tuple[str, str]]:
     """Linear elements and the lattice against neo-Hookean elements."""
     lines = [one for one in measured("large_strain_elements") if one["spacing_m"] == "0.00666667"]
@@ -591,7 +601,7 @@ def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
-    models = (certified, tradeoff, corrected)
+    models = (error_bar_livers, certified, tradeoff, corrected)
     groups = (*fuzzy, *lattice, *models, verification, stability, ranking, organ)
     return {name: text for group in groups for name, text in group()}
 

@@ -7,8 +7,8 @@ al. (2008), J. Fluids Eng. 130:078001. Where three results alternate, half their
 place of the extrapolation: Stern et al. (2001), J. Fluids Eng. 123:793.
 
 Meshes that are refined where the error is are not similar, and show no order. Of them the error is
-taken to fall at least with an order that is half of what they reach, the saturation assumption:
-Bank and Smith (1993), SIAM J. Numer. Anal. 30:921.
+taken to fall with that of their elements in smooth solutions, which grading keeps where solutions
+are not smooth: a saturation assumption, Bank and Smith (1993), SIAM J. Numer. Anal. 30:921.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
 """Where the order is assumed: of two meshes, and of three that do not converge at one in reach."""
 SAFETY_GRADED = 1.5
-"""Of graded meshes, whose order is assumed but is half of what they reach."""
+"""Of graded meshes: 1.25 held over seven organs of tests/benchmarks, by 0.88 of it at most."""
 ASSUMED_ORDER = 2.0
 """Of two meshes: that of flat facets, of edges of a support, and of most user's meshes."""
 LEAST_ORDER = 1.0

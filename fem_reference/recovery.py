@@ -9,8 +9,8 @@ functional as a load: Becker and Rannacher (2001), Acta Numerica 10:1. Estimates
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -19,22 +19,19 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import cg
 from skfem.models.elasticity import lame_parameters
 
+from fem_reference.direct import Solve
 from fem_reference.elasticity import Body, rows
 from fem_reference.grid import Projection
-from fem_reference.solvers import solver
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 
 PROJECTED = 1e-4
 """Residual of the projection, which stands for an error that is itself known to some per cent."""
-LOOSE = 1e-4
-"""Residual of dual solutions, likewise."""
 GAP_ORDER = 4
 
 
-@dataclass(frozen=True)
-class Recovered:
+class Recovered(NamedTuple):
     """Strain of a displacement (3, 3, cells, q), and what a smoother one has more than it."""
 
     strain: Floats
@@ -54,25 +51,39 @@ def recovered(body: Body, u: Floats) -> Recovered:
 
 
 def goal_errors(
-    body: Body, tissue: Tissue, u: Floats, goal: Floats, project: Projection | None = None
+    body: Body,
+    tissue: Tissue,
+    solve: Solve,
+    u: Floats,
+    goals: Sequence[Floats],
+    project: Projection | None = None,
 ) -> Floats:
-    """Share of each cell (cells,) in the error of goal @ u, relative to it; its sum exceeds it.
+    """Share of each cell (cells,) in the errors of all goal @ u, relative to each; its sum exceeds.
 
-    `u` [m] (n,): at rest under the body's load; `goal` (n,). With `project`, onto the surface, also
-    by the gap that the cells leave to it: its volume times the mean density of energy of solution
-    and dual one, as where the surface of a body is moved.
+    `u` [m] (n,): at rest under the body's load; `goals` (n,), whose dual solutions `solve` gives.
+    With `project`, onto the surface, also by the gap that the cells leave to it: its volume times
+    the mean density of energy of solution and dual one, as where the surface of a body is moved.
     """
-    dual = solver(body, LOOSE)(goal)
-    a, b = recovered(body, u), recovered(body, dual)
-    by_strain = _mixed_energy(body, tissue, a.error, b.error)
-    by_shape = _gaps(body, project) * _mixed_energy(body, tissue, a.strain, b.strain)
-    return (by_strain + by_shape) / abs(float(goal @ u))
+    gaps, primal = _gaps(body, project), _energies(body, tissue, u)
+    found = np.zeros(body.nodes.mesh.nelements)
+    for goal in goals:
+        dual = _energies(body, tissue, solve(goal))
+        by_strain = np.sqrt(primal.error * dual.error)
+        by_shape = gaps * np.sqrt(primal.whole * dual.whole)
+        found += (by_strain + by_shape) / abs(float(goal @ u))
+    return found
 
 
-def _mixed_energy(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
-    """Bound of the energy product [J] of two strains in each cell, by those of each."""
-    both = (energy_products(body, tissue, one, one) for one in (a, b))
-    return np.asarray(np.sqrt(np.prod(list(both), axis=0)))
+class _Energies(NamedTuple):
+    """Twice the energy [J] of the strain of each cell, and of its error."""
+
+    whole: Floats
+    error: Floats
+
+
+def _energies(body: Body, tissue: Tissue, u: Floats) -> _Energies:
+    found = recovered(body, u)
+    return _Energies(*(energy_products(body, tissue, one, one) for one in found))
 
 
 def _gaps(body: Body, project: Projection | None) -> Floats:

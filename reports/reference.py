@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from reports.differences import finite_elements
 from reports.digits import DASH, count, fixed, percent, significant, words
@@ -21,6 +22,7 @@ STEPPING = {"tr-bdf2": "TR-BDF2", "hht-alpha": "HHT-α"}
 SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
 ASSUMED_ORDER = 2.0
+SAFETY_GRADED = 1.5
 LEAST_ORDER = 1.0
 BEYOND = 0.5
 
@@ -40,6 +42,8 @@ def reference(results: Results) -> dict[str, object] | None:
         "levels": [_level_row(level) for level in found.levels],
         "errors": list(_error_rows(results, model, found)),
         "formal_order": f"{error.formal_order:g}" if error and by_three else "",
+        "graded": results.scene.is_graded,
+        "safety_graded": f"{SAFETY_GRADED:g}",
         "least_order": f"{LEAST_ORDER:g}",
         "assumed_order": f"{ASSUMED_ORDER:g}",
         "safety": f"{SAFETY:g}",
@@ -92,25 +96,27 @@ def _error_rows(results: Results, model: ModelRecord, found: ElementsRecord) -> 
         return
 
     formal = errors.formal_order if len(found.levels) > 2 else None
+    assumed = errors.formal_order if results.scene.is_graded else ASSUMED_ORDER
+    order = partial(_order, formal=None if results.scene.is_graded else formal, assumed=assumed)
     for probe, error in errors.by_probe.items():
         observed = errors.order_by_probe[probe]
         yield [
             words(probe),
             printed_peak(results, model, probe),
-            *(percent(error.displacement), _order(observed.displacement, formal)),
-            *(percent(error.velocity), _order(observed.velocity, formal)),
+            *(percent(error.displacement), order(observed.displacement)),
+            *(percent(error.velocity), order(observed.velocity)),
         ]
-    field = percent(errors.field_peak), _order(errors.field_order, formal)
+    field = percent(errors.field_peak), order(errors.field_order)
     yield ["whole field at the peak", DASH, *field, DASH, DASH]
 
 
-def _order(observed: float | None, formal: float | None) -> str:
+def _order(observed: float | None, formal: float | None, assumed: float) -> str:
     """Observed order, and what was taken in its place where it was not fit to be used.
 
-    `formal`: the highest that is taken, None where the order is assumed.
+    `formal`: the highest that is taken, None where the order is `assumed`.
     """
     if formal is None:
-        return f"{ASSUMED_ORDER:g} assumed"
+        return f"{assumed:g} assumed"
     if observed is None:
         return "none"
     taken = min(max(observed, LEAST_ORDER), formal)

@@ -67,7 +67,7 @@ def test_top_level_holds_what_is_named_and_nothing_else():
 
 def test_every_dependency_is_pinned_in_the_lock_file():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    extras = ("surface", "workers", "test", "docs")
+    extras = ("workers", "test", "docs")
     wanted = project["dependencies"] + [
         line for extra in extras for line in project["optional-dependencies"][extra]
     ]

@@ -453,10 +453,16 @@ def test_a_users_tetrahedra_run_through_and_are_refined_for_an_accuracy(tmp_path
     meshio.write_points_cells(path, mesh.points, [("tetra", mesh.tetrahedra)])
     organ = dataclasses.replace(short.organ, mesh=str(path), unit="m")
     scene = dataclasses.replace(short, organ=organ)
-    _, elements, _ = run(with_reference(scene, accuracy=0.3, element_size=0.02))
-    assert [level.elements for level in elements.levels] == [72, 8 * 72]
-    assert elements.mesh_error.worst.displacement <= 0.3
-    assert elements.accuracy_missed is None
+    asked = {"accuracy": 0.3, "element_size": 0.02}
+    _, uniform, _ = run(with_reference(scene, refinement="uniform", **asked))
+    assert [level.elements for level in uniform.levels] == [72, 8 * 72]
+    _, graded, _ = run(with_reference(scene, **asked))
+    counts = [level.elements for level in graded.levels]
+    assert counts[0] == 72
+    assert all(2 * one < other < 8 * one for one, other in pairwise(counts))
+    for elements in (uniform, graded):
+        assert elements.mesh_error.worst.displacement <= 0.3
+        assert elements.accuracy_missed is None
 
 
 def test_locked_elements_get_no_error_and_a_note(short):

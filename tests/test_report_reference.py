@@ -60,7 +60,14 @@ def test_with_two_meshes_the_order_is_assumed():
 
 
 def test_the_estimate_is_described_as_the_run_makes_it():
-    for name in ("SAFETY", "SAFETY_ASSUMED", "ASSUMED_ORDER", "LEAST_ORDER", "BEYOND"):
+    for name in (
+        "SAFETY",
+        "SAFETY_ASSUMED",
+        "SAFETY_GRADED",
+        "ASSUMED_ORDER",
+        "LEAST_ORDER",
+        "BEYOND",
+    ):
         assert getattr(section, name) == getattr(convergence, name)
 
 

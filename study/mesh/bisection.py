@@ -69,8 +69,20 @@ def bisected(mesh: TetrahedralMesh, marked: Booleans) -> Bisection:
         tetrahedra = np.concatenate([tetrahedra, children[1]])
         tetrahedra[: len(marked)][marked] = children[0]
         parents = np.concatenate([parents, parents[marked]])
-        marked = np.asarray(np.isin(_keys(tetrahedra[:, EDGES]), split).any(axis=1))
+        marked = _with_hanging_nodes(tetrahedra, np.sort(split), len(points))
     return Bisection(TetrahedralMesh(points, tetrahedra), parents)
+
+
+def _with_hanging_nodes(tetrahedra: Ints, split: Ints, count: int) -> Booleans:
+    """Which tetrahedra have an edge of those, in order, that have been cut; of `count` nodes."""
+    is_end = np.zeros(count, dtype=np.bool_)
+    is_end[split // _KEY] = is_end[split % _KEY] = True
+    near = np.flatnonzero(is_end[tetrahedra].sum(axis=1) > 1)
+    keys = _keys(tetrahedra[near][:, EDGES])
+    place = np.minimum(np.searchsorted(split, keys), len(split) - 1)
+    found = np.zeros(len(tetrahedra), dtype=np.bool_)
+    found[near] = (split[place] == keys).any(axis=1)
+    return found
 
 
 def _keys(ends: Ints) -> Ints:

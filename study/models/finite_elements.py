@@ -13,6 +13,7 @@ from fem_reference import model as fem
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body, of_tissue
 from fem_reference.grid import Projection
+from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
 from fem_reference.pace import Pace
 from fem_reference.solvers import solve_static
@@ -252,9 +253,13 @@ class PreparedElements:
     def refined(self, level: Level, body: Body) -> Level | None:
         """The next of the graded meshes, None if it is too large; by the body on a level alone."""
         found = next_graded(self.problem, level, body)
+        if found is None:
+            return None
         try:
-            if found is not None:
-                self._refuse(found)
+            method = self.model.reference.method
+            refuse_too_large(
+                found.mesh, self.problem.tissue, body.element, stepping=method in fem.STEPPING
+            )
         except ValueError:  # too fine for the memory
             return None
         return found

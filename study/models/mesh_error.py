@@ -84,8 +84,8 @@ def _estimate(
     weights: Floats | None = None,
 ) -> ErrorEstimate:
     sizes, order = [one.level.size for one in solved], _formal_order(solved[-1])
-    if graded:  # which quadratic elements make converge with twice the order of their strain
-        return graded_error(results, sizes, order - 1.0, weights)
+    if graded:
+        return graded_error(results, sizes, order, weights)
     return discretisation_error(results, sizes, order, weights)
 
 

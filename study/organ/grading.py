@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from study.mesh.bisection import Bisection, cut_into
 from study.mesh.kinds import TetrahedralMesh
@@ -13,7 +14,7 @@ Floats = NDArray[np.float64]
 
 MOST_PARTS = 64.0
 """Of an element at once: beyond, its error was not known well enough."""
-TRIALS = 12
+TRIALS = 6
 TOLERANCE = 0.05
 """Of the number of elements added."""
 
@@ -48,13 +49,26 @@ def equidistributed(mesh: TetrahedralMesh, errors: Floats, order: float, more: i
     power.
     """
     weight = errors ** (1.0 / (1.0 + order / 3.0))
-    weight = weight / max(weight.max(), np.finfo(float).tiny)
-    low, high = 0.0, np.log(MOST_PARTS * len(errors) / max(weight.mean(), 1e-12))
+    aim = float(more)
     for _ in range(TRIALS):
-        middle = 0.5 * (low + high)
-        found = cut_into(mesh, np.clip(np.exp(middle) * weight, 1.0, MOST_PARTS))
-        excess = len(found.mesh.tetrahedra) - len(errors) - more
-        if abs(excess) <= TOLERANCE * more:
+        found = cut_into(mesh, _parts(weight, len(errors) + aim))
+        gained = len(found.mesh.tetrahedra) - len(errors)
+        if abs(gained - more) <= TOLERANCE * more:
             break
-        low, high = (low, middle) if excess > 0 else (middle, high)
+        aim *= more / gained  # halves are no parts of any number, and neighbours are cut too
     return found
+
+
+def _parts(weight: Floats, total: float) -> Floats:
+    """In proportion to the weight, between 1 and the most, with this sum or the largest."""
+    some = np.log(weight[weight > 0.0])
+    if not some.size:
+        return np.ones(len(weight))
+
+    def parts(logarithm: float) -> Floats:
+        return np.asarray(np.clip(np.exp(logarithm) * weight, 1.0, MOST_PARTS))
+
+    fewest, most = -float(some.max()), float(np.log(MOST_PARTS) - some.min())
+    if parts(most).sum() <= total:
+        return parts(most)
+    return parts(float(brentq(lambda x: parts(x).sum() - total, fewest, most, xtol=1e-9)))

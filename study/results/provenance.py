@@ -17,7 +17,6 @@ PACKAGES = (
     "meshio",
     "numba",
     "numpy",
-    "pytetwild",
     "pyvista",
     "scikit-fem",
     "scipy",

@@ -26,7 +26,7 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.elements is not None:
         if record.lattice is None:  # which adds what is not linear
             yield from _of_linear(record, record.elements)
-        yield from _of_mesh(record.elements)
+        yield from _of_mesh(scene, record.elements)
     if record.status == "diverged":
         yield (
             f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
@@ -54,14 +54,19 @@ def _of_linear(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
         )
 
 
-def _of_mesh(elements: ElementsRecord) -> Iterator[str]:
+def _of_mesh(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
     if elements.accuracy_missed and elements.mesh_error:
         yield (
             f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "
             f"mesh of {elements.elements} tetrahedra, the last within the limit, reaches "
-            f"{100 * elements.mesh_error.worst.displacement:.2g} %. Ask for less, or simplify "
-            "the organ or its load."
+            f"{100 * elements.mesh_error.worst.displacement:.2g} %. {_more_accurate(scene)}"
         )
+
+
+def _more_accurate(scene: Scene) -> str:
+    """What brings the reference nearer to the accuracy that is asked for."""
+    graded = "" if scene.is_graded else 'set reference.refinement to "graded", '
+    return f"Ask for less, {graded}enlarge tool.radius, or give the run more free memory."
 
 
 def _name(record: ModelRecord) -> str:

@@ -297,6 +297,12 @@ class Scene:
     remarks: tuple[str, ...] = ()
 
     @property
+    def is_graded(self) -> bool:
+        """Whether meshes of the reference are finer where the error comes from."""
+        asked = self.reference.refinement
+        return asked == "graded" or (asked == "auto" and self.organ.mesh is not None)
+
+    @property
     def is_point(self) -> bool:
         """Whether it is a single control mass point, without an organ."""
         return self.organ.shape == "point" and self.organ.mesh is None

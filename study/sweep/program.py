@@ -22,7 +22,6 @@ LIBRARIES = (
     "numba",
     "numpy",
     "pyamg",
-    "pytetwild",
     "pyvista",
     "scikit-fem",
     "scikit-fuzzy",
