@@ -18,8 +18,8 @@ from msm.forces import internal_forces
 from msm.lattice import CORNERS
 from study import compiled
 from tests.benchmarks import bench_lattice, field_error, grid_in_c
-from tests.benchmarks.bench_growth import cuthill_mckee, numbered
 from tests.benchmarks.bench_lattice import FRACTION, LAW, cube, free, moved
+from tests.benchmarks.bench_order import cuthill_mckee, numbered
 
 TABLE = bench_lattice.read()
 ROUNDING = 1e-12

@@ -15,9 +15,9 @@ from study.models import lattice
 from study.models.model import Stepper
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
+from study.run import stated as stated_module
 from study.run.stated import arguments
 from study.scene.file import read_scene
-from study.sweep import stated as stated_module
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
@@ -418,7 +418,7 @@ def test_a_recommended_scene_says_its_precision():
 
 def test_what_single_precision_adds_is_the_change_of_the_field():
     """Of runs in double and in single; where one is missing single precision is not offered."""
-    given = problem_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    given = stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
     count = len(given.problem.volume_rule.weights)
     task = Task("study.tradeoff.observation:observe", {})
     double, single = (

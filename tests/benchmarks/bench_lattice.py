@@ -6,7 +6,7 @@ prints the figures and writes reports/data/lattice_kernels.csv and reports/data/
 takes three minutes, and a C compiler for the rows in C. What is compared is measured in turns, in
 one process; the least of several repeats, which others on the machine disturb least, stands beside
 their median and the load of the machine. Times are those for which the one thread had a processor;
-on a core of its own the clock on the wall shows the same. `bench_growth` measures how a step grows
+on a core of its own the clock on the wall shows the same. `bench_order` measures how a step grows
 with the lattice.
 
 The C is no transliteration of ours but the best formulation that we know (grid.c), compiled for the

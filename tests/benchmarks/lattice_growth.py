@@ -26,7 +26,8 @@ from study.problem.problem import Problem
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
-from tests.benchmarks.bench_lattice import LAW, SIZES, SPRINGS_PER_REPEAT, cube, free
+from tests.benchmarks.bench_lattice import LAW, cube, free
+from tests.benchmarks.bench_order import SIZES, SPRINGS_PER_REPEAT
 
 DATA = Path(__file__).parents[2] / "reports" / "data"
 TURNS = 7

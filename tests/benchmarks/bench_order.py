@@ -1,8 +1,8 @@
-"""How a step of the lattice grows: with the number of nodes, with their order, and its memory.
+"""How a step of the lattice over its list depends on the order of nodes, and its memory by size.
 
-    python -m tests.benchmarks.bench_growth
+    python -m tests.benchmarks.bench_order
 
-prints the figures and writes reports/data/lattice_growth.csv; it takes three minutes and 4 GB.
+prints the figures and writes reports/data/lattice_order.csv; it takes three minutes and 4 GB.
 Times are of a full cube with volume term, least of several repeats in turns, as in `bench_lattice`.
 Orders of nodes matter only to the list of springs, as a grid has its own.
 """
@@ -37,7 +37,7 @@ from tests.benchmarks.machine import load, machine
 
 Ints = NDArray[np.int64]
 
-TABLE = Path(__file__).parents[2] / "reports" / "data" / "lattice_growth.csv"
+TABLE = Path(__file__).parents[2] / "reports" / "data" / "lattice_order.csv"
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 ORDERED = 100_000
 LATENCY_NODES = 2_400
@@ -131,7 +131,7 @@ def orders(size: int) -> list[Row]:
 
 def peak_memory(nodes: int) -> float:
     """Memory [byte] of a process that builds a lattice of that many nodes and steps it."""
-    code = f"from tests.benchmarks.bench_growth import *; print(memory_of_a_run({nodes}))"
+    code = f"from tests.benchmarks.bench_order import *; print(memory_of_a_run({nodes}))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
     return float(found.stdout)
 
