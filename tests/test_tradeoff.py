@@ -365,11 +365,14 @@ def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():
         advice.fitted(h[:2], h[:2], 0.004)
 
 
-def candidate(error, wall, *, in_time=True):
+def candidate(error, wall, *, in_time=True, single=False, spacing=0.01):
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), wall * 1e-3), None))
     promise = advice.Promise(error, 0.01)
-    configuration = Configuration("springs", {"spacing": error})
-    return advice.Candidate(configuration, promise, cost, Frame(1, wall, wall, in_time))
+    kind = "single-precision" if single else "springs"
+    settings = {"spacing": spacing} | ({"precision": "single"} if single else {})
+    return advice.Candidate(
+        Configuration(kind, settings), promise, cost, Frame(1, wall, wall, in_time)
+    )
 
 
 COARSE, MIDDLE, FINE = (
@@ -401,15 +404,15 @@ def test_where_nothing_keeps_up_the_fastest_is_nearest():
 
 
 def test_single_precision_is_taken_where_only_it_keeps_up_or_it_is_cheaper():
-    fine = replace(candidate(0.03, 1.0), precision="single")
+    fine = candidate(0.03, 1.0, single=True)
     assert advice.best([MIDDLE, FINE, fine], Demand(60.0, None)) is fine
-    same = replace(candidate(0.08, 0.2), precision="single")
+    same = candidate(0.08, 0.2, single=True)
     assert advice.best([MIDDLE, same], Demand(60.0, None)) is MIDDLE
     assert advice.best([MIDDLE, same], Demand(60.0, 0.1)) is same
 
 
 def test_a_recommended_scene_says_its_precision():
-    one = replace(candidate(0.08, 0.2), precision="single", spacing=0.02)
+    one = candidate(0.08, 0.2, single=True, spacing=0.02)
     found = advice.Recommended(one, True, Errors("resolved", field=0.08), None, 0.2)
     text = advice.recommended_scene(read_scene("block", SMALL), found)
     assert 'precision = "single"' in text
