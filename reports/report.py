@@ -131,7 +131,7 @@ def _kept_plots(results: Results) -> Figures:
         }
 
     found = made_once("plots", make, results, everything("reports"), modules=(__name__,))
-    figures: Figures = {}
+    figures: Figures = {"motion": []}  # of a motion without a finite sample
     for name, svg in found.items():
         figures.setdefault(name.partition("/")[0], []).append(svg.tobytes())
     return figures

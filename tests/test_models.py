@@ -249,7 +249,7 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
 
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))
     promise = recommend.Promise(measured.field, known.field_error)
-    candidate = recommend.Candidate(spacing, promise, cost, None)
+    candidate = recommend.Candidate(chosen, promise, cost, None)
     found = recommend.Recommended(candidate, True, measured, None, 0.01)
     path = tmp_path / "advised.toml"
     path.write_text(recommend.recommended_scene(scene, found), encoding="utf-8")

@@ -75,7 +75,7 @@ def test_the_document_prints_the_figures_of_the_tables():
     [
         ("field_error", "error", "0.98765", "98.8 %"),
         ("field_error", "order", "7.77", "7.8"),
-        ("real_time", "real_time_factor", "123.4", "120"),
+        ("real_time", "real_time_factor", "1234.5", "1200"),
         ("large_strain", "departure", "0.87654", "87.7 %"),
         ("peers", "relative_to_ours", "314.0", "310"),
         ("peers", "version", "0.1.0-planted", "0.1.0-planted"),

@@ -494,10 +494,14 @@ def same(one, other):
     return bits(one) == bits(other)
 
 
+NOT_FOUND = {"stages", "workers"}
+"""Of a record: how it was found, and not what."""
+
+
 def bits(thing):
     if dataclasses.is_dataclass(thing):
         names = (f.name for f in dataclasses.fields(thing) if not f.name.endswith("wall_s"))
-        return [[name, bits(getattr(thing, name))] for name in names if name != "stages"]
+        return [[name, bits(getattr(thing, name))] for name in names if name not in NOT_FOUND]
     if isinstance(thing, dict):
         return [[k, bits(v)] for k, v in thing.items()]
     if isinstance(thing, tuple | list):

@@ -42,19 +42,22 @@ def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Pr
 
 def mesh_sha256(mesh: str | None) -> str | None:
     """SHA-256 of a scene's mesh file, None without one. ValueError if it cannot be read."""
-    return _sha256(mesh, "organ.mesh: {} cannot be read ({}); name a mesh file")
+    return _sha256(mesh, "{}: no such file", "organ.mesh: {} cannot be read ({}); name a mesh file")
 
 
 def rule_base_sha256(rule_base: str | None) -> str | None:
     """SHA-256 of a scene's rule base, None without one. ValueError if it cannot be read."""
-    return _sha256(rule_base, "fuzzy.rule_base: {} cannot be read ({}); name a file")
+    missing = "fuzzy.rule_base: {} is no file; name a .fis or .json file"
+    return _sha256(rule_base, missing, "fuzzy.rule_base: {} cannot be read ({}); name a file")
 
 
-def _sha256(path: str | None, refusal: str) -> str | None:
+def _sha256(path: str | None, missing: str, refusal: str) -> str | None:
     if path is None:
         return None
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except FileNotFoundError:
+        raise ValueError(missing.format(path)) from None
     except OSError as error:
         raise ValueError(refusal.format(path, error.strerror)) from None
 

@@ -71,7 +71,7 @@ def surface_force(body: Solid, traction: Callable[[Floats, Floats], Floats]) -> 
 
 def restricted(stiffness: Stiffness, free: NDArray[np.bool_]) -> Stiffness:
     """Stiffness among the free displacements, the others held still."""
-    matrix, pressure = csc_array(stiffness.matrix[free][:, free]), stiffness.pressure
+    matrix, pressure = csc_array(stiffness.matrix)[free][:, free], stiffness.pressure
     if pressure is None:
         return Stiffness(matrix)
     return Stiffness(matrix, replace(pressure, divergence=pressure.divergence[:, free]))
