@@ -328,7 +328,7 @@ def test_pivots_count_the_eigenvalues_below_a_shift(bodies):
         found = pivots(definite._shifted(one.body, shift, nothing))
         assert found.in_place
         assert found.negative == 5 + pressures
-        assert 0.0 < found.rounding < 1e-9
+        assert 0.0 < found.rounding < 1e-8  # far below the gap to the next eigenvalue
 
 
 def test_a_body_that_nothing_holds_has_no_floor(bodies):

@@ -249,7 +249,7 @@ def test_estimates_by_odd_flags(typed, seed):
 def test_tables_and_rule_bases_that_are_damaged(typed, seed):
     dice = random.Random(seed)
     end = dice.choice(["fis", "json"])
-    assert typed("rules", "--out", f"own.{end}").code == 0
+    assert typed("rules", "--knowledge", "paper-count", "--out", f"own.{end}").code == 0
     table = b"hcv,hbv,ald,cld,nafld\n9,4,5,6,7\n12,4,5,6,7\n3,4,,6,7\n"
     Path("in.csv").write_bytes(damaged(table, dice) if seed % 2 else table)
     if seed % 3:
