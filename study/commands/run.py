@@ -124,13 +124,14 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
 def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
     from study.models.keeping import Keeping
     from study.models.model import Watch
-    from study.results.folder import continuing, replacing, write
+    from study.results.folder import continuing, replacing, told_to_start_again, write
     from study.run.stages import Means, told
     from study.run.study import run_study
     from study.stages.lanes import available
 
     means = Means(store, how.fresh, how.workers or available())
     with (
+        told_to_start_again(),
         replacing(how.folder) as partial,
         continuing(how.folder, scene, resume=how.resume) as state,
     ):

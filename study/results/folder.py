@@ -62,6 +62,8 @@ OURS, FIELDS = (".report.pdf", ".export."), manifest.FIELDS  # the first, of kil
 CHECKSUMS = "sha256"
 """Where results.json has the checksums of the other files, so that two runs are not mixed."""
 
+START_AGAIN = "start again: stages that had ended are kept, and no model had a state to --resume"
+
 
 @dataclass(frozen=True)
 class Results:
@@ -311,6 +313,20 @@ def _foreign(present: set[str]) -> str | None:
 
 
 @contextmanager
+def told_to_start_again() -> Iterator[None]:
+    """Give an OSError of the block that says nothing of how to go on a note that does.
+
+    Such is one of moving results into place, when `continuing` has removed what it kept.
+    """
+    try:
+        yield
+    except OSError as error:
+        if not getattr(error, "__notes__", None):
+            error.add_note(START_AGAIN)
+        raise
+
+
+@contextmanager
 def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
     """A folder beside `folder` for what an interrupted run goes on from; success removes it.
 
@@ -359,5 +375,5 @@ def _kept(state: Path) -> list[str]:
 
 def _how_to_go_on(state: Path, kept: list[str]) -> str:
     if not kept:
-        return "start again: stages that had ended are kept, and no model had a state to --resume"
+        return START_AGAIN
     return f"kept {', '.join(kept)} in {state}: the same command with --resume goes on from there"
