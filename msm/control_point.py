@@ -67,4 +67,11 @@ def _as_trajectory(state: Floats, times: Floats, finished: bool) -> Trajectory:
     if finished and np.isfinite(state).all():
         return Trajectory(displacement, velocity, none, none)
     lost = int(np.flatnonzero(~np.isfinite(state).all(axis=0))[0])
-    return Trajectory(displacement, velocity, none, none, "diverged", float(times[lost]))
+    return Trajectory(
+        displacement,
+        velocity,
+        none,
+        none,
+        status="diverged",
+        diverged_at=float(times[lost]),
+    )

@@ -167,7 +167,8 @@ class ModelKind:
     whether their stiffness is a patient's, who has no part in trade-offs and extremes;
     `follows_law`: whether its springs have the law and damping of the scene; `blind_to`: tables and
     keys of the scene that its models are made without, so that a run that differs in these alone
-    need not move them again. A model that is a reference has the name of its kind.
+    need not move them again; `able`: names of `study.problem.features.FEATURES` that it follows.
+    A model that is a reference has the name of its kind.
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
@@ -179,6 +180,7 @@ class ModelKind:
     follows_law: bool = False
     any_load: bool = True
     blind_to: tuple[str, ...] = ()
+    able: frozenset[str] = frozenset()
 
     def seen(self, scene: Scene) -> Scene:
         """What its models see of a scene: only a patient's are made of readings and rules."""

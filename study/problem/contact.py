@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,3 +57,22 @@ class ToolPatch:
         near = (across < 1.0) & (np.abs(along) < self.radius)
         facing = np.clip(-(normals @ self.direction), 0.0, None)
         return np.asarray(np.where(near, (1.0 - across) ** 2 * facing, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A blunt tool beside the first, and the share of its force at times [s]."""
+
+    tool: ToolPatch
+    factor: Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Weight:
+    """A body of a `mass` [kg] fixed on a patch: it hangs on it by gravity, and moves with it.
+
+    `patch` has a force of 1 N, so that its profile scaled to it shares the mass out.
+    """
+
+    patch: ToolPatch
+    mass: float

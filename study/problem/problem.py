@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import Foundation, Load, ToolPatch, Weight
 from study.problem.response import Response
+from study.problem.rigid import RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 
@@ -22,9 +23,12 @@ Floats = NDArray[np.float64]
 class Problem:
     """An organ with support, tool, load history, tissue, and what is observed of it.
 
-    `factor`: share of the tool's force at times [s]; `probes`: names of the control points. Two
-    problems are the same only if they are one object, so that what is assembled for one is kept by
-    it.
+    `tool` and `factor`: the first tool as a load, and the share of its force at times [s]; a tool
+    that is moved has no force there and stands in `rigid_tools`. `loads`: those of further tools.
+    `gravity` [m/s^2] (3,) acts on the tissue and on `weights`; with `given_loaded` the geometry is
+    the shape at rest under it, and displacements count from there. `probes`: names of the control
+    points. Two problems are the same only if they are one object, so that what is assembled for
+    one is kept by it.
     """
 
     geometry: Geometry
@@ -36,6 +40,11 @@ class Problem:
     volume_rule: VolumeRule
     observation: Observation
     probes: tuple[str, ...]
+    rigid_tools: tuple[RigidTool, ...] = ()
+    loads: tuple[Load, ...] = ()
+    gravity: Floats = field(default_factory=lambda: np.zeros(3))
+    weights: tuple[Weight, ...] = ()
+    given_loaded: bool = False
 
     @property
     def response(self) -> Response:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -32,20 +32,22 @@ class Trajectory:
     """Motion of one model.
 
     `displacement` [m] and `velocity` [m/s], shape (samples, probes, 3); `volume_field` [m], shape
-    (frames, q, 3); `surface_field` [m], shape (frames, s, 3). A model that diverges keeps NaN from
-    there on and says when and, if it has nodes, at which node's rest position [m].
+    (frames, q, 3); `surface_field` [m], shape (frames, s, 3). `tool_force` [N], shape (samples,
+    tools, 3): what the body does to each rigid tool of the problem. A model that diverges keeps NaN
+    from there on and says when and, if it has nodes, at which node's rest position [m].
     """
 
     displacement: Floats
     velocity: Floats
     volume_field: Floats
     surface_field: Floats
+    tool_force: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
     status: Literal["finished", "diverged"] = "finished"
     diverged_at: float | None = None
     diverged_near: Floats | None = None
 
 
-def empty_trajectory(observation: Observation) -> Trajectory:
+def empty_trajectory(observation: Observation, tools: int = 0) -> Trajectory:
     """Arrays of the right shape, filled with NaN, for a model to write into."""
     samples, frames = len(observation.times), len(observation.frames)
     return Trajectory(
@@ -53,4 +55,5 @@ def empty_trajectory(observation: Observation) -> Trajectory:
         np.full((samples, len(observation.probes), 3), np.nan),
         np.full((frames, len(observation.volume_points), 3), np.nan),
         np.full((frames, len(observation.surface_points), 3), np.nan),
+        np.full((samples, tools, 3), np.nan),
     )

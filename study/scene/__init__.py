@@ -5,10 +5,12 @@ from study.problem.tissue import Tissue
 from study.scene.law import SpringLaw
 from study.scene.schema import (
     Aetiology,
+    AttachedWeight,
     BasafaConstants,
     Corrected,
     Damping,
     Fuzzy,
+    Gravity,
     Lattice,
     Organ,
     Patient,
@@ -21,14 +23,17 @@ from study.scene.schema import (
     Support,
     Time,
     Tool,
+    Waypoint,
 )
 
 __all__ = [
     "Aetiology",
+    "AttachedWeight",
     "BasafaConstants",
     "Corrected",
     "Damping",
     "Fuzzy",
+    "Gravity",
     "Lattice",
     "LoadHistory",
     "Organ",
@@ -44,4 +49,5 @@ __all__ = [
     "Time",
     "Tissue",
     "Tool",
+    "Waypoint",
 ]

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
+from study.problem.features import FEATURES
+from study.problem.rigid import SLIDING
 from study.scene.law import SpringLaw
-from study.scene.schema import Lattice, Require, Scene
+from study.scene.schema import Lattice, Require, Scene, Tool, Waypoint
 
 if TYPE_CHECKING:
     from study.models.model import ModelKind
@@ -33,6 +35,14 @@ MESH_ONLY = (
     ("tool", "place"),
     ("tool", "direction"),
     ("tool", "radius"),
+    ("tool", "shape"),
+    ("tool", "displacement"),
+    ("tool", "path"),
+    ("tool", "clearance"),
+    ("tool", "contact"),
+    ("tool", "friction"),
+    ("gravity",),
+    ("weight",),
     ("tissue", "poisson_ratio"),
     ("tissue", "density"),
 )
@@ -61,13 +71,15 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     yield from _damping_contradictions(scene, table)
     yield from _mesh_contradictions(scene, table)
     yield from _rule_base_contradictions(scene, table)
-    for name, place in [("tool.place", scene.tool.place), *_named_points(scene)]:
+    for name, place in [*_named_points(scene), *_places_of_weights(scene)]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"
-    yield from _tool_contradictions(scene)
+    for number, tool in enumerate(scene.tools, 1):
+        name = "tool" if number == 1 else f"tool.{number}"
+        yield from _tool_contradictions(scene, name, tool)
+    yield from _feature_contradictions(scene)
     if scene.require is not None:
         yield from _require_contradictions(scene, scene.require)
-    yield from _unseen_load(scene)
     if scene.is_point:
         yield from _point_contradictions(scene, table)
     elif scene.organ.mass is not None:
@@ -241,19 +253,63 @@ def _damping_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield "damping.kind: rayleigh needs damping.mass, damping.stiffness or both; give them"
 
 
-def _tool_contradictions(scene: Scene) -> Iterator[str]:
-    if scene.tool.direction is not None and not any(scene.tool.direction):
-        yield "tool.direction: a zero vector has no direction"
-    if (
-        scene.tool.history.kind == "ramp-hold-release"
-        and scene.tool.history.ramp == 0.0
-        and scene.tool.history.hold == 0.0
-    ):
-        yield "tool.history: ramp and hold are both zero; nothing is ever loaded"
-    history, time = scene.tool.history, scene.time
+def _tool_contradictions(scene: Scene, name: str, tool: Tool) -> Iterator[str]:
+    if not _one_way(tool.place):
+        yield f"{name}.place: give either side and at, or fraction, or point"
+    if tool.direction is not None and not any(tool.direction):
+        yield f"{name}.direction: a zero vector has no direction"
+    yield from _drive_contradictions(name, tool)
+    if tool.path:
+        return
+    history, time = tool.history, scene.time
+    if history.kind == "ramp-hold-release" and history.ramp == 0.0 and history.hold == 0.0:
+        yield f"{name}.history: ramp and hold are both zero; nothing is ever loaded"
     if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
         needed = math.ceil(8 * history.frequency * time.duration)
         yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+    yield from _unseen_load(scene, tool)
+
+
+def _drive_contradictions(name: str, tool: Tool) -> Iterator[str]:
+    """A blunt tool has a force, a rigid one is moved in one way."""
+    if not tool.is_moved:
+        for key in ("displacement", "path"):
+            if getattr(tool, key):
+                yield f"{name}.{key}: moves a rigid tool; set {name}.shape to one, or remove it"
+        if tool.contact != SLIDING or tool.friction or tool.clearance:
+            yield f"{name}.contact: a blunt tool is a pressure; set {name}.shape or remove it"
+        return
+    if (tool.displacement is None) == (not tool.path):
+        yield f"{name}.displacement: give either it or {name}.path, which moves the tool"
+    if tool.contact != SLIDING and tool.friction:
+        yield f"{name}.friction: a bonded tool does not slide; remove it"
+    if tool.contact != SLIDING and tool.clearance:
+        yield f"{name}.clearance: a bonded tool touches from the start; remove it"
+    yield from _path_contradictions(name, tool.path)
+
+
+def _path_contradictions(name: str, path: tuple[Waypoint, ...]) -> Iterator[str]:
+    if not path:
+        return
+    times = [point.time for point in path]
+    if len(path) < 2 or times[0] != 0.0 or sorted(set(times)) != times:
+        yield f"{name}.path: give two points or more at rising times from 0 s"
+    if any((point.travel is None) == (point.offset is None) for point in path):
+        yield f"{name}.path: give each point either travel or offset"
+    elif path[0].travel or any(path[0].offset or ()):
+        yield f"{name}.path: starts elsewhere than at its place; begin with 0 mm"
+
+
+def _feature_contradictions(scene: Scene) -> Iterator[str]:
+    """Models that cannot follow what the scene asks."""
+    for feature in scene.features:
+        able = [name for name in MODELS.names() if feature in _kind(name).able]
+        for name in scene.models:
+            if name not in able:
+                yield (
+                    f"models: {name} cannot follow {FEATURES[feature]}; leave it out"
+                    + (f"; {', '.join(able)} can" if able else "")
+                )
 
 
 def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
@@ -275,9 +331,9 @@ def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
         yield "require.quantities: a single point has no field; remove it"
 
 
-def _unseen_load(scene: Scene) -> Iterator[str]:
+def _unseen_load(scene: Scene, tool: Tool) -> Iterator[str]:
     """A load that comes and goes between samples would leave no trace of itself."""
-    history, time = scene.tool.history, scene.time
+    history, time = tool.history, scene.time
     if history.kind != "ramp-hold-release":
         return
     loaded = min(history.ramp + history.hold + history.release, time.duration)
@@ -315,6 +371,10 @@ def _point_contradictions(scene: Scene, table: Table) -> Iterator[str]:
 
 def _named_points(scene: Scene) -> list[tuple[str, Any]]:
     return [(f"control_points.{name}", place) for name, place in scene.control_points.items()]
+
+
+def _places_of_weights(scene: Scene) -> list[tuple[str, Any]]:
+    return [(f"weight.{n}.place", one.place) for n, one in enumerate(scene.weight, 1)]
 
 
 def _one_way(place: Any) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from study.annotation.quantity import Quantity
-from study.scene import Organ, Scene, SpringLaw
+from study.scene import Organ, Scene, SpringLaw, Tool
 from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
 from study.scene.schema import SuitedKey
@@ -34,12 +34,29 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     text, base = _load(name)
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_files(table, base)
+    _split_tools(table)
     for override in overrides:
         lines[_apply(table, override)] = 0  # on no line
     _resolve_files(table, Path.cwd())
     if name in BUILT_IN:
         _suit_the_rest(table, overrides)
     return validate(table, name, lines)
+
+
+def _split_tools(table: Table) -> None:
+    """[[tool]] as the first tool and the further ones."""
+    found = table.get("tool")
+    if isinstance(found, list) and found and "further_tools" not in table:
+        table["tool"], *further = found
+        if further:
+            table["further_tools"] = further
+
+
+def _join_tools(table: Table) -> None:
+    """[[tool]] of the first tool and the further ones, where there are any."""
+    further = table.pop("further_tools", [])
+    if further:
+        table["tool"] = [table["tool"], *further]
 
 
 def _suit_the_rest(table: Table, overrides: Sequence[str]) -> None:
@@ -60,16 +77,26 @@ def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) 
     """
     from pydantic import TypeAdapter, ValidationError
 
+    _split_tools(table)
     try:
         scene = TypeAdapter(Scene).validate_python(table)
     except ValidationError as error:
-        problems = sorted({_line(problem) for problem in error.errors(include_url=False)})
+        found = (_line(problem) for problem in error.errors(include_url=False))
+        problems = sorted({_as_written(line) for line in found})
     else:
         problems = list(contradictions(scene, table))
     if problems:
-        found = lines or {}
-        raise SceneError(_summary(source, [_placed(one, found) for one in problems]))
+        raise SceneError(_summary(source, [_placed(one, lines or {}) for one in problems]))
     return scene
+
+
+def _as_written(problem: str) -> str:
+    """A problem of the second tool and further ones, with the number that it has in the file."""
+    prefix = "further_tools."
+    if not problem.startswith(prefix):
+        return problem
+    number, separator, rest = problem.removeprefix(prefix).partition(".")
+    return f"tool.{int(number) + 2}{separator}{rest}" if number.isdigit() else problem
 
 
 def _placed(problem: str, lines: Mapping[str, int]) -> str:
@@ -100,10 +127,11 @@ def resolved(scene: Scene) -> Table:
     if scene.is_point:
         for key in MESH_ONLY:
             _remove(table, key)
+    _join_tools(table)
     return table
 
 
-def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
+def _unused(scene: Scene) -> Iterator[tuple[str | int, ...]]:
     """Keys that mean nothing for the shape, history, springs and damping in use."""
     yield from _unused_of_organ(scene.organ)
     if not scene.remarks:
@@ -111,14 +139,7 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     own = ("rule_base", "inputs", "unit")
     for key in own if scene.fuzzy.rule_base is None else LIVER_ONLY:
         yield "fuzzy", key
-    for key, kind in (
-        ("ramp", "ramp-hold-release"),
-        ("hold", "ramp-hold-release"),
-        ("release", "ramp-hold-release"),
-        ("frequency", "sinusoid"),
-    ):
-        if scene.tool.history.kind != kind:
-            yield "tool", "history", key
+    yield from _unused_of_load(scene)
     if scene.lattice.springs == "tetrahedra":
         for key in ("spacing", "flexion", "body_diagonals"):
             yield "lattice", key
@@ -129,6 +150,39 @@ def _unused(scene: Scene) -> Iterator[tuple[str, ...]]:
     for name in ("superposition", "corrected"):
         if name not in scene.models:
             yield (name,)
+
+
+def _unused_of_load(scene: Scene) -> Iterator[tuple[str | int, ...]]:
+    for one in _unused_of_tool(scene.tool):
+        yield "tool", *one
+    for n, tool in enumerate(scene.further_tools):
+        for one in _unused_of_tool(tool):
+            yield "further_tools", n, *one
+    if not scene.further_tools:
+        yield ("further_tools",)
+    if not scene.weight:
+        yield ("weight",)
+    if not scene.gravity.acceleration:
+        yield ("gravity",)
+
+
+def _unused_of_tool(tool: Tool) -> Iterator[tuple[str | int, ...]]:
+    """Keys of the other kinds of tool and history."""
+    unused = ["force"] if tool.is_moved else ["shape", "clearance", "contact", "friction"]
+    unused += [] if tool.path else ["path"]
+    unused += ["history"] if tool.path else []
+    for key in unused:
+        yield (key,)
+    if tool.path:
+        return
+    for key, kind in (
+        ("ramp", "ramp-hold-release"),
+        ("hold", "ramp-hold-release"),
+        ("release", "ramp-hold-release"),
+        ("frequency", "sinusoid"),
+    ):
+        if tool.history.kind != kind:
+            yield "history", key
 
 
 def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
@@ -179,12 +233,22 @@ def _apply(table: Table, override: str) -> str:
     keys = [key.strip() for key in path.split(".")]
     if not separator or not all(keys):
         raise SceneError(f"--set {override}: write table.key=value, for example tool.force=1 N")
+    if keys[0] == "tool" and len(keys) > 2 and keys[1].isdigit():
+        return _apply_to_tool(table, int(keys[1]), ".".join(keys[2:]) + separator + text)
     for depth, key in enumerate(keys[:-1]):
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
             raise SceneError(f"--set {override}: {'.'.join(keys[: depth + 1])} is not a table")
     table[keys[-1]] = _value(text.strip())
     return ".".join(keys)
+
+
+def _apply_to_tool(table: Table, number: int, override: str) -> str:
+    """Set what an override sets of one of several tools; its key."""
+    tools = [table.get("tool", {}), *table.get("further_tools", [])]
+    if not 1 <= number <= len(tools):
+        raise SceneError(f"--set tool.{number}: there is no such tool; the scene has {len(tools)}")
+    return f"tool.{number}.{_apply(tools[number - 1], override)}"
 
 
 def _value(text: str) -> object:
@@ -250,7 +314,7 @@ def _summary(source: str, lines: Sequence[str]) -> str:
     return "\n  ".join([f"{source}: {len(lines)} problem(s)", *lines])
 
 
-def _remove(table: Table, keys: Sequence[str]) -> None:
+def _remove(table: Any, keys: Sequence[str | int]) -> None:
     for key in keys[:-1]:
         table = table[key]
     table.pop(keys[-1], None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +14,13 @@ from study.mesh.locate import locate
 from study.mesh.quadrature import SurfaceRule, over_surface, over_volume
 from study.organ import geometry as shapes
 from study.organ.geometry import Geometry
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import Foundation, Load, ToolPatch, Weight
 from study.problem.history import peak_sample
 from study.problem.problem import PointProblem, Problem
+from study.problem.rigid import BONDED, SHAPES, RigidTool
 from study.problem.trajectory import Observation
 from study.scene.place import OUTWARD, resolve
-from study.scene.schema import Organ, Scene
+from study.scene.schema import AttachedWeight, Organ, Scene, Tool
 
 Floats = NDArray[np.float64]
 
@@ -36,12 +39,14 @@ def problem_of(scene: Scene) -> Problem:
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
     foundation = _foundation(scene, surface)
-    tool = _tool(scene, surface)
+    tool = _tool(scene.tool, "tool", surface)
     surface_rule = over_surface(surface, SURFACE_POINTS)
     volume_rule = over_volume(geometry.mesh, VOLUME_POINTS)
     _check_touch(foundation, tool, surface_rule)
 
     factor = scene.tool.history.factor
+    if scene.tool.is_moved:  # its force is a result, and as a load it has none
+        tool = replace(tool, force=0.0)
     times = np.linspace(0.0, scene.time.duration, scene.time.samples)
     places = scene.control_points or {"tool": scene.tool.place}
     probes = np.array([resolve(place, surface)[0] for place in places.values()])
@@ -49,7 +54,7 @@ def problem_of(scene: Scene) -> Problem:
     observation = Observation(
         times,
         probes,
-        (peak_sample(factor(times)), len(times) - 1),
+        (peak_sample(_extent(scene.tool, tool, times)), len(times) - 1),
         volume_rule.points,
         surface.points,
     )
@@ -63,7 +68,66 @@ def problem_of(scene: Scene) -> Problem:
         volume_rule,
         observation,
         tuple(places),
+        tuple(_rigid(name, one, surface) for name, one in _moved(scene)),
+        tuple(
+            Load(_tool(one, f"tool.{n}", surface), one.history.factor)
+            for n, one in enumerate(scene.further_tools, 2)
+            if not one.is_moved
+        ),
+        scene.gravity.acceleration * OUTWARD[scene.gravity.towards],
+        tuple(_weight(one, n, surface) for n, one in enumerate(scene.weight, 1)),
+        scene.gravity.given == "loaded",
     )
+
+
+def _moved(scene: Scene) -> list[tuple[str, Tool]]:
+    """Tools that are moved, by the names of their tables."""
+    names = ["tool", *(f"tool.{n}" for n in range(2, len(scene.tools) + 1))]
+    return [(name, one) for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
+
+
+def _rigid(name: str, tool: Tool, surface: SurfaceMesh) -> RigidTool:
+    """A tool that starts with its tip off the surface, and faces as it would push."""
+    patch = _tool(tool, name, surface)
+    tip = patch.centre - tool.clearance * patch.direction
+    bonded = tool.contact == BONDED
+    return RigidTool(
+        name,
+        SHAPES[tool.shape],
+        tool.radius,
+        tip,
+        patch.direction,
+        _travel(tool, patch.direction),
+        bonded,
+        tool.friction,
+    )
+
+
+def _extent(tool: Tool, patch: ToolPatch, times: Floats) -> Floats:
+    """How far a tool is moved, or how hard it pushes, at times [s], up to a factor."""
+    if not tool.is_moved:
+        return tool.history.factor(times)
+    return np.asarray(_travel(tool, patch.direction)(times) @ patch.direction)
+
+
+def _travel(tool: Tool, direction: Floats) -> Callable[[Floats], Floats]:
+    """Displacement of a tip [m] (k, 3) at times [s] (k,)."""
+    if tool.displacement is not None:
+        whole, factor = tool.displacement * direction, tool.history.factor
+        return lambda times: np.outer(factor(np.asarray(times)), whole)
+    corners = np.array([point.time for point in tool.path])
+    away = np.array(
+        [
+            (point.travel or 0.0) * direction if point.offset is None else point.offset
+            for point in tool.path
+        ]
+    )
+    return lambda times: np.stack([np.interp(times, corners, column) for column in away.T], axis=1)
+
+
+def _weight(weight: AttachedWeight, number: int, surface: SurfaceMesh) -> Weight:
+    held = Tool(place=weight.place, radius=weight.radius, force=1.0)
+    return Weight(_tool(held, f"weight.{number}", surface), weight.mass)
 
 
 def point_problem_of(scene: Scene) -> PointProblem:
@@ -103,22 +167,22 @@ def _foundation(scene: Scene, surface: SurfaceMesh) -> Foundation:
     return Foundation(outward, level, scene.support.depth, scene.support.stiffness)
 
 
-def _tool(scene: Scene, surface: SurfaceMesh) -> ToolPatch:
+def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
     """Tool pushing along its direction, or straight in from its side, or against the surface."""
-    centre, normal = resolve(scene.tool.place, surface)
-    if scene.tool.direction is not None:
-        direction = np.array(scene.tool.direction)
-    elif scene.tool.place.side is not None:
-        direction = -OUTWARD[scene.tool.place.side]
+    centre, normal = resolve(tool.place, surface)
+    if tool.direction is not None:
+        direction = np.array(tool.direction)
+    elif tool.place.side is not None:
+        direction = -OUTWARD[tool.place.side]
     else:
         direction = -normal
     unit = direction / np.linalg.norm(direction)
     if unit @ normal >= 0.0:
         raise ValueError(
-            "tool.direction: points out of the organ at tool.place; reverse it, or leave it out to "
-            "push straight in"
+            f"{name}.direction: points out of the organ at {name}.place; reverse it, or leave it "
+            "out to push straight in"
         )
-    return ToolPatch(centre, unit, scene.tool.radius, scene.tool.force)
+    return ToolPatch(centre, unit, tool.radius, tool.force)
 
 
 def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...]) -> None:

@@ -93,14 +93,62 @@ class Support:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Waypoint:
+    """Where a tool's tip is at a time: how far along its direction, or how far in x, y and z."""
+
+    time: Annotated[float, Quantity("s", 0.0, 3600.0)]
+    travel: Coordinate | None = None
+    offset: tuple[Coordinate, Coordinate, Coordinate] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Tool:
-    """Blunt tool: where it touches, which way it pushes (inwards by default), how hard."""
+    """A tool: where it touches, which way it faces (inwards by default), and what drives it.
+
+    A blunt one is a smooth pressure of a given `force`, over time as its `history`. The other
+    shapes are rigid and moved: by a `displacement` along the direction, over time as its `history`,
+    or on a `path` of straight pieces; their tip starts at `place`, `clearance` off the surface.
+    `contact`: bonded to what they touch at the start, or pressing only, with `friction` by
+    Coulomb's coefficient.
+    """
 
     place: Place = field(default_factory=lambda: Place(side="anterior", at=(0.3, 0.5)))
     direction: tuple[Component, Component, Component] | None = None
+    shape: Annotated[str, Choice("study.problem.rigid:TOOLS")] = "blunt"
     radius: Length = 0.025
     force: Annotated[float, Quantity("N", 1e-9, 1e3)] = 0.5
+    displacement: Annotated[float, Quantity("m", -10.0, 10.0)] | None = None
+    path: tuple[Waypoint, ...] = ()
+    clearance: Annotated[float, Quantity("m", 0.0, 1.0)] = 0.0
+    contact: Annotated[str, Choice("study.problem.rigid:CONTACTS")] = "sliding"
+    friction: Annotated[float, Quantity("", 0.0, 10.0)] = 0.0
     history: LoadHistory = field(default_factory=LoadHistory)
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether it is a rigid one, whose force is a result."""
+        return self.shape != "blunt"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity:
+    """Of an `acceleration` `towards` a side of the organ.
+
+    `given`: whether the shape is that of the unloaded organ, or that at rest under gravity.
+    """
+
+    acceleration: Annotated[float, Quantity("m/s^2", 0.0, 1000.0)] = 0.0
+    towards: Side = "posterior"
+    given: Literal["unloaded", "loaded"] = "unloaded"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttachedWeight:
+    """A body of a mass fixed on a patch of the surface."""
+
+    place: Place
+    mass: Annotated[float, Quantity("kg", 1e-9, 100.0)]
+    radius: Length = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,6 +319,7 @@ class Require:
 class Scene:
     """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system.
 
+    `tool`: the first, or in a file [[tool]], each of several; `further_tools` are the others.
     `remarks`: sentences that stand among the notes of its results.
     """
 
@@ -281,6 +330,9 @@ class Scene:
     organ: Organ = field(default_factory=Organ)
     support: Support = field(default_factory=Support)
     tool: Tool = field(default_factory=Tool)
+    further_tools: tuple[Tool, ...] = ()
+    gravity: Gravity = field(default_factory=Gravity)
+    weight: tuple[AttachedWeight, ...] = ()
     tissue: Tissue = field(default_factory=Tissue)
     patient: Patient = field(default_factory=Patient)
     fuzzy: Fuzzy = field(default_factory=Fuzzy)
@@ -295,6 +347,22 @@ class Scene:
     require: Require | None = None
     renders: bool = True
     remarks: tuple[str, ...] = ()
+
+    @property
+    def tools(self) -> tuple[Tool, ...]:
+        """All of them."""
+        return (self.tool, *self.further_tools)
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What not every model can follow: names of `study.problem.features.FEATURES`."""
+        asked = {
+            "moved-tools": any(tool.is_moved for tool in self.tools),
+            "several-loads": any(not tool.is_moved for tool in self.further_tools),
+            "gravity": self.gravity.acceleration > 0.0,
+            "weights": bool(self.weight),
+        }
+        return tuple(name for name, present in asked.items() if present)
 
     @property
     def is_graded(self) -> bool:
