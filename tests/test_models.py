@@ -392,7 +392,11 @@ def within(hint):
         yield from within(part)
 
 
-CHOICES = {path: (choice, default) for path, choice, default in choices(Scene)}
+CHOICES = {
+    path: (choice, default)
+    for path, choice, default in choices(Scene)
+    if not path.startswith("further_tools.")  # those of `tool`, in files as entries of its list
+}
 
 
 def test_what_the_code_implements_is_chosen_by_name():

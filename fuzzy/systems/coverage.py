@@ -10,9 +10,11 @@ import numpy as np
 from fuzzy.systems.policy import LEAST_STRENGTH
 from fuzzy.systems.sets import Array, corners, lower_membership, membership, upper_membership
 from fuzzy.systems.spread import spread
-from fuzzy.systems.system import FuzzySystem, Term, Variable, firing_strengths, memberships
+from fuzzy.systems.system import FuzzySystem, Rule, Variable, firing_strengths, memberships
 
 POINTS = 1001
+TOGETHER = 64
+"""Rules whose strengths are found at once, of which each but one is at a reading of no interest."""
 MOST_INPUTS_WITH_CORNERS = 12
 
 
@@ -38,34 +40,33 @@ def unreachable(system: FuzzySystem) -> tuple[int, ...]:
     Each input is searched for the reading that suits the rule's terms on it best; inputs vary
     freely, so these together are the rule's best reading.
     """
-    best = _best_readings(system)
-    return tuple(
-        i
-        for i, rule in enumerate(system.rules)
-        if _strengths(replace(system, rules=(replace(rule, weight=1.0),)), best[i : i + 1])
-        < LEAST_STRENGTH
-    )
+    best, rules = _best_readings(system), [replace(rule, weight=1.0) for rule in system.rules]
+    strongest = np.zeros(len(rules))
+    for first in range(0, len(rules), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        some = replace(system, rules=tuple(rules[part]))
+        strongest[part] = _strengths(some, best[part]).diagonal()
+    return tuple(map(int, np.flatnonzero(strongest < LEAST_STRENGTH)))
 
 
 def _best_readings(system: FuzzySystem) -> Array:
     """Reading at which each rule is strongest, shape (rules, inputs)."""
     best = np.tile(_ends(system)[0], (len(system.rules), 1))
     for i, variable in enumerate(system.inputs):
-        parts = {r: terms for r in range(len(system.rules)) if (terms := _terms_on(system, r, i))}
-        if not parts:
+        alike: dict[Rule, list[int]] = {}  # a few parts of rules recur in thousands of them
+        for r, rule in enumerate(system.rules):
+            if terms := tuple(term for term in rule.antecedents if term.input == i):
+                part = replace(rule, antecedents=terms, consequent=0, weight=1.0)
+                alike.setdefault(part, []).append(r)
+        if not alike:
             continue
         x = _points(variable)
         X = np.tile(_ends(system)[0], (x.size, 1))
         X[:, i] = x
-        rules = tuple(
-            replace(system.rules[r], antecedents=terms, weight=1.0) for r, terms in parts.items()
-        )
-        best[list(parts), i] = x[_strengths(replace(system, rules=rules), X).argmax(axis=1)]
+        strengths = _strengths(replace(system, rules=tuple(alike)), X)
+        for where, rules in zip(strengths.argmax(axis=1), alike.values(), strict=True):
+            best[rules, i] = x[where]
     return best
-
-
-def _terms_on(system: FuzzySystem, rule: int, i: int) -> tuple[Term, ...]:
-    return tuple(term for term in system.rules[rule].antecedents if term.input == i)
 
 
 def _strengths(system: FuzzySystem, X: Array) -> Array:

@@ -6,7 +6,8 @@ it then changes no answer.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term
@@ -78,11 +79,9 @@ def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
             return j < i
         return _never_stronger(forms[i], forms[j])
 
-    alike: dict[int, list[int]] = {}
-    for i, rule in enumerate(system.rules):
-        alike.setdefault(rule.consequent, []).append(i)
+    index = _Index(forms)
     stronger = {
-        i: [j for j in alike[rule.consequent] if gives_way(i, j)]
+        i: [j for j in sorted(index.never_weaker(forms[i])) if gives_way(i, j)]
         for i, rule in enumerate(system.rules)
         if rule.weight
     }
@@ -91,6 +90,35 @@ def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
         for i, others in stronger.items()
         if others
     )
+
+
+class _Index:
+    """Antecedents by their terms, so that those that one gives way to are found among thousands."""
+
+    def __init__(self, forms: Sequence[AntecedentForm]) -> None:
+        self.conjunctions: dict[frozenset[tuple[Term, int]], list[int]] = {}
+        self.alternatives: dict[tuple[Term, int], set[int]] = {}
+        for i, found in enumerate(forms):
+            if found.any_of:
+                for term in found.terms:
+                    self.alternatives.setdefault(term, set()).add(i)
+            else:
+                self.conjunctions.setdefault(found.terms, []).append(i)
+
+    def never_weaker(self, one: AntecedentForm) -> set[int]:
+        """Those that are exceeded by `one` at no reading: see `_never_stronger`."""
+        by_term = [self.alternatives.get(term, set()) for term in one.terms]
+        if one.any_of:
+            return set.intersection(*by_term)
+        return set().union(*by_term, *(self.conjunctions[part] for part in self._parts(one.terms)))
+
+    def _parts(self, terms: frozenset[tuple[Term, int]]) -> Iterable[frozenset[tuple[Term, int]]]:
+        """Subsets that are antecedents; counted up, or looked for among all, as is less work."""
+        if 2 ** len(terms) > len(self.conjunctions):
+            return [part for part in self.conjunctions if part <= terms]
+        sizes = range(len(terms) + 1)
+        parts = (frozenset(part) for size in sizes for part in combinations(terms, size))
+        return [part for part in parts if part in self.conjunctions]
 
 
 def _never_stronger(one: AntecedentForm, other: AntecedentForm) -> bool:

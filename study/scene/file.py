@@ -284,6 +284,8 @@ def _fields(location: Sequence[str]) -> list[str]:
     """Field names of the table at a location of the scene."""
     kind: Any = Scene
     for key in location:
+        if key.isdigit():  # of one of a list of tables
+            continue
         kind = _held(get_type_hints(kind).get(key)) if dataclasses.is_dataclass(kind) else None
         if get_origin(kind) is dict:
             return _place_fields()
@@ -293,7 +295,7 @@ def _fields(location: Sequence[str]) -> list[str]:
 
 
 def _held(hint: Any) -> Any:
-    """The dataclass of a table that may be left out, else the annotation itself."""
+    """The dataclass of a table that may be left out, or of each of a list, else the annotation."""
     tables = [option for option in get_args(hint) if dataclasses.is_dataclass(option)]
     return tables[0] if tables else hint
 
