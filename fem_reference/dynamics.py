@@ -36,7 +36,7 @@ ALPHA = -0.05
 
 @dataclass(frozen=True)
 class Oscillator:
-    """M u'' + C u' + K u = factor(t) load."""
+    """M u'' + C u' + K u = load factor(t), of one load (n,) or of several (n, k)."""
 
     mass: csc_array
     stiffness: Stiffness
@@ -51,6 +51,15 @@ class Oscillator:
         size, more = self.stiffness.size, self.stiffness.unknowns - self.stiffness.size
         return lambda f: solve(np.concatenate([f, np.zeros(more)]))[:size]
 
+    @property
+    def rest(self) -> Floats:
+        """No displacement (n,)."""
+        return np.zeros(len(self.load))
+
+    def pushed(self, factor: Floats) -> Floats:
+        """Nodal forces [N] (n,) at a factor, or one of each load (k,)."""
+        return np.asarray(self.load.reshape(len(self.load), -1) @ np.atleast_1d(factor))
+
     def force(self, u: Floats, v: Floats) -> Floats:
         """C v + K u [N]."""
         a, b = self.damping.mass, self.damping.stiffness
@@ -63,17 +72,17 @@ def march(
     """Displacement and velocity by TR-BDF2, from rest, at 0, step, ..., count * step [s]."""
     theta = 0.5 * GAMMA * step
     M, solve = system.mass, system.shifted(theta, theta**2)
-    u, v = np.zeros_like(system.load), np.zeros_like(system.load)
+    u, v = system.rest, system.rest
     yield u, v
     a = 1.0 / (GAMMA * (2.0 - GAMMA))
     b = (1.0 - GAMMA) ** 2 * a
     for n in range(count):
         start, middle, end = factor(step * (n + np.array([0.0, GAMMA, 1.0])))
-        force = (start + middle) * system.load - system.force(2.0 * u + theta * v, v)
+        force = system.pushed(start + middle) - system.force(2.0 * u + theta * v, v)
         v_mid = solve(M @ v + theta * force)
         u_mid = u + theta * (v + v_mid)
         u_hat, v_hat = a * u_mid - b * u, a * v_mid - b * v
-        v = solve(M @ v_hat + theta * (end * system.load - system.stiffness @ u_hat))
+        v = solve(M @ v_hat + theta * (system.pushed(end) - system.stiffness @ u_hat))
         u = u_hat + theta * v
         yield u, v
 
@@ -94,15 +103,15 @@ def hht(
         raise ValueError(f"alpha of HHT is {alpha:g}; give -1/3 to 0")
     gamma, beta = 0.5 - alpha, 0.25 * (1.0 - alpha) ** 2
     solve = system.shifted((1.0 + alpha) * gamma * step, (1.0 + alpha) * beta * step**2)
-    u, v = np.zeros_like(system.load), np.zeros_like(system.load)
-    before = float(factor(np.zeros(1))[0])
-    a = before * factorised(system.mass)(system.load)
+    u, v = system.rest, system.rest
+    before = factor(np.zeros(1))[0]
+    a = factorised(system.mass)(system.pushed(before))
     yield u, v
     for n in range(count):
-        after = float(factor(np.array([step * (n + 1)]))[0])
+        after = factor(np.array([step * (n + 1)]))[0]
         u_hat = u + step * v + step**2 * (0.5 - beta) * a
         v_hat = v + step * (1.0 - gamma) * a
-        load = ((1.0 + alpha) * after - alpha * before) * system.load
+        load = system.pushed((1.0 + alpha) * after - alpha * before)
         resisted = (1.0 + alpha) * system.force(u_hat, v_hat) - alpha * system.force(u, v)
         a = solve(load - resisted)
         u, v = u_hat + step**2 * beta * a, v_hat + step * gamma * a

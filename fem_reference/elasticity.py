@@ -53,7 +53,8 @@ class Body:
     `nodes`: scikit-fem's basis of one component, vertices first, then edges; `stiffness` [N/m] has
     the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
     [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
-    the stiffness is made of by the tissue's constants.
+    the stiffness is made of by the tissue's constants. `others`: [N] (n,) each, of further loads;
+    `dead` [N] (n,): what acts at all times, and has taken the body to where its motion starts.
     """
 
     mesh: TetrahedralMesh
@@ -64,6 +65,19 @@ class Body:
     support: csc_array
     load: Floats
     gradients: Gradients
+    others: tuple[Floats, ...] = ()
+    dead: Floats | None = None
+
+    @property
+    def loads(self) -> Floats:
+        """Nodal forces [N] (n, loads) of all that have a history, each in full."""
+        return np.column_stack([self.load, *self.others])
+
+    @property
+    def whole_load(self) -> Floats:
+        """Nodal forces [N] (n,) of all loads in full and of what acts at all times."""
+        whole = self.loads.sum(axis=1)
+        return np.asarray(whole if self.dead is None else whole + self.dead)
 
     @property
     def node_count(self) -> int:
@@ -110,13 +124,13 @@ def discretise(
     """
     name, surface = loaded_surface(mesh, tissue, foundation, tool, element, project)
     grid, one = surface.mesh, surface.elem
-    support = _by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
+    support = by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
-    mass = _by_component(tissue.density * _finite(products(nodes, where), "the mass"))
+    mass = by_component(tissue.density * _finite(products(nodes, where), "the mass"))
     integrals = gradients(by_gradient, where)
     stiffness = _held(_elastic(integrals, nodes, name, tissue), support)
-    load = _load(surface, tool)
+    load = patch_load(surface, tool)
     return Body(mesh, name, nodes, stiffness, mass, support, load, integrals)
 
 
@@ -263,7 +277,7 @@ def _isotropic(integrals: Gradients, lame: float, mu: float) -> bsr_array:
     return bsr_array((blocks, integrals.indices, integrals.indptr), shape=(size, size))
 
 
-def _by_component(matrix: csc_array) -> csc_array:
+def by_component(matrix: csc_array) -> csc_array:
     """A matrix of one component for all three."""
     return csc_array(kron(matrix, eye_array(3), format="csc"))
 
@@ -279,7 +293,7 @@ def _foundation_form(foundation: Foundation) -> Any:
     return skfem.BilinearForm(lambda u, v, w: foundation.density(rows(w.x), rows(w.n)) * u * v)
 
 
-def _load(surface: Any, tool: ToolPatch) -> Floats:
+def patch_load(surface: Any, tool: ToolPatch) -> Floats:
     """Nodal forces [N] of the tool's traction, scaled so that they add up to its force."""
     form = skfem.LinearForm(lambda v, w: tool.profile(rows(w.x), rows(w.n)) * v)
     nodal = np.asarray(form.assemble(surface))

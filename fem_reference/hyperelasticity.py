@@ -112,7 +112,7 @@ def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticS
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     return HyperelasticSolid(
-        material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.load
+        material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.whole_load
     )
 
 

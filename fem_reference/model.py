@@ -18,10 +18,11 @@ from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
 from fem_reference.pace import Pace, own_pace
 from fem_reference.recording import Recorder
-from fem_reference.solvers import solve_static
+from fem_reference.solvers import solve_static, solver
 from fem_reference.superposition import (
     LOAD_STEPS,
     Choose,
+    CurveChange,
     Near,
     Superposed,
     enough_modes,
@@ -78,7 +79,9 @@ class Solution:
     superposition was made, and the motion of all nodes; none of steps in time. `largest_strain`:
     largest absolute principal strain in the kept frames, of a superposition also where a control
     point is farthest out, and `largest_rotation` [rad] likewise; linear elasticity is good for a
-    few per cent of either.
+    few per cent of either. `start` [m] (n,): where the motion starts under what acts at all times,
+    None where nothing does. `moving`: displacement [m] and velocity [m/s] (n,) of all unknowns at a
+    sample, counted from the given shape, None of steps in time.
     """
 
     trajectory: Trajectory
@@ -91,10 +94,25 @@ class Solution:
     largest_strain: float
     largest_rotation: float
     superposed: Superposed | None = None
+    start: Floats | None = None
+    moving: Callable[[int], State] | None = None
+
+    @property
+    def truncation(self) -> CurveChange | None:
+        """How far the last quarter of a subspace changes the curves, None of steps in time."""
+        return None if self.superposed is None else self.superposed.truncation
+
+    @property
+    def vectors(self) -> int | None:
+        """Of the subspace, None of steps in time."""
+        return None if self.superposed is None else self.superposed.subspace.load.size
 
     def rest(self, body: Body) -> Floats:
-        """Displacement [m] (n,) of the body at rest under the full load."""
-        return solve_static(body) if self.superposed is None else self.superposed.subspace.rest()
+        """Displacement [m] (n,) of the body at rest under all loads in full."""
+        if self.superposed is None:
+            return solve_static(body)
+        moved = self.superposed.subspace.rest()
+        return moved if self.start is None else moved + self.start
 
 
 MotionMethod = Callable[[Body, RayleighDamping, Factor, Recorder, Method, Near, Advance], Solution]
@@ -116,7 +134,7 @@ def _stepped(
     times = recorder.observation.times
     pace = method.pace(factor, times)
     step, count = pace.length(float(times[1] - times[0])), pace.steps(len(times) - 1)
-    system = Oscillator(body.mass, body.stiffness, body.load, damping)
+    system = Oscillator(body.mass, body.stiffness, body.loads, damping)
     started = time.perf_counter()
     before: State | None = None
     for n, after in enumerate(scheme(system, factor, step, count)):
@@ -217,15 +235,33 @@ def run(
     on_progress: Advance = lambda _: None,
     near: Near = None,
 ) -> Solution:
-    """Motion from rest under `factor` of the body's load.
+    """Motion from rest under `factor` of the body's load, or of each of its loads.
 
     `near` (n, k): vectors near those of its superposition, as those on a coarser mesh, by which
     they are found sooner. ValueError for an unknown method.
     """
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
-    recorded = (Recorder(body, observation), method, near, on_progress)
-    return METHODS[method.name](body, damping, factor, *recorded)
+    start = start_of(body)
+    recorded = (Recorder(body, observation, start), method, near, on_progress)
+    found = METHODS[method.name](body, damping, factor, *recorded)
+    return replace(found, start=start, moving=_moving(found.superposed, recorded[0].start))
+
+
+def _moving(superposed: Superposed | None, start: Floats) -> Callable[[int], State] | None:
+    if superposed is None:
+        return None
+
+    def moving(sample: int) -> State:
+        u, v = superposed.state(sample)
+        return start + u, v
+
+    return moving
+
+
+def start_of(body: Body) -> Floats | None:
+    """Displacement [m] (n,) at rest under what acts at all times; None where nothing does."""
+    return None if body.dead is None else solver(body)(body.dead)
 
 
 def static_field(body: Body, points: Floats) -> Floats:

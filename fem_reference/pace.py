@@ -55,5 +55,9 @@ def _follows(factor: Factor, times: Floats, held: int) -> bool:
         return True
     whole = factor(times)
     nodes = times[0] + (times[1] - times[0]) * np.arange(0, len(times) + held, held)
-    error = np.linalg.norm(np.interp(times, nodes, factor(nodes)) - whole)
-    return bool(error <= LOAD_TOLERANCE * np.linalg.norm(whole))
+    histories = zip(*(np.reshape(f, (len(f), -1)).T for f in (factor(nodes), whole)), strict=True)
+    return all(
+        np.linalg.norm(np.interp(times, nodes, held) - exact)
+        <= LOAD_TOLERANCE * np.linalg.norm(exact)
+        for held, exact in histories
+    )

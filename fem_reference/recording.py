@@ -15,31 +15,38 @@ Floats = NDArray[np.float64]
 class Recorder:
     """Writes what is observed into the arrays of a trajectory.
 
+    `start` [m] (n,): where the body is when its motion starts, which states do not count.
     `strain` and `rotation` [rad]: the largest of the states looked at so far.
     """
 
-    def __init__(self, body: Body, observation: Observation) -> None:
+    def __init__(
+        self, body: Body, observation: Observation, start: Floats | None = None, tools: int = 0
+    ) -> None:
         self.body, self.observation = body, observation
+        self.start = np.zeros(body.load.size) if start is None else start
         self.at_probes = evaluation(body, observation.probes)
         self.in_volume = evaluation(body, observation.volume_points)
         self.on_surface = evaluation(body, observation.surface_points)
-        self.trajectory = empty_trajectory(observation)
+        self.trajectory = empty_trajectory(observation, tools)
+        self._start_of_probes = at_points(self.at_probes, self.start)
         self.strain = self.rotation = 0.0
 
     def motion(self, sample: int, displacement: Floats, velocity: Floats) -> None:
         """Keep displacement [m] and velocity [m/s] (probes, 3) at one sample."""
-        self.trajectory.displacement[sample] = displacement
+        self.trajectory.displacement[sample] = self._start_of_probes + displacement
         self.trajectory.velocity[sample] = velocity
 
     def field(self, sample: int, u: Floats) -> None:
         """Keep the field if the sample is one of the frames."""
         for i, frame in enumerate(self.observation.frames):  # the peak may be the last sample too
             if frame == sample:
-                self.trajectory.volume_field[i] = at_points(self.in_volume, u)
-                self.trajectory.surface_field[i] = at_points(self.on_surface, u)
+                there = self.start + u
+                self.trajectory.volume_field[i] = at_points(self.in_volume, there)
+                self.trajectory.surface_field[i] = at_points(self.on_surface, there)
                 self.look(u)
 
     def look(self, u: Floats) -> None:
         """Take note of how far a state is from small displacements."""
-        self.strain = max(self.strain, largest_strain(self.body, u))
-        self.rotation = max(self.rotation, largest_rotation(self.body, u))
+        there = self.start + u
+        self.strain = max(self.strain, largest_strain(self.body, there))
+        self.rotation = max(self.rotation, largest_rotation(self.body, there))

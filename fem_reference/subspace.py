@@ -39,23 +39,34 @@ DEPENDENT = 1e-10
 
 @dataclass(frozen=True)
 class Subspace:
-    """`vectors` (n, m), orthonormal in the mass; `stiffness` (m, m) and `load` (m,) among them."""
+    """`vectors` (n, m), orthonormal in the mass; `stiffness` (m, m) and `load` (m,) among them.
+
+    `others` (m,) each: of the body's further loads.
+    """
 
     vectors: Floats
     stiffness: Floats
     load: Floats
+    others: tuple[Floats, ...] = ()
+
+    @property
+    def loads(self) -> Floats:
+        """All loads (m, loads), in full."""
+        return np.column_stack([self.load, *self.others])
 
     def rest(self) -> Floats:
-        """Displacement [m] (n,) at rest under the load, exact where it lies in the subspace."""
-        return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, self.load))
+        """Displacement [m] (n,) at rest under all loads, exact where it lies in the subspace."""
+        return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, self.loads.sum(axis=1)))
 
     def leading(self, size: int) -> Subspace:
         """The subspace of the first vectors."""
-        return Subspace(self.vectors[:, :size], self.stiffness[:size, :size], self.load[:size])
+        others = tuple(one[:size] for one in self.others)
+        among = self.stiffness[:size, :size]
+        return Subspace(self.vectors[:, :size], among, self.load[:size], others)
 
 
 def eigenvectors(body: Body, solve: Solve, count: int) -> Floats:
-    """The static displacement and the `count` lowest modes of vibration, (n, count + 1).
+    """The static displacements and the `count` lowest modes of vibration, (n, loads + count).
 
     With the first, a truncated superposition is exact at rest.
     """
@@ -63,7 +74,7 @@ def eigenvectors(body: Body, solve: Solve, count: int) -> Floats:
     operator = LinearOperator(shape, matvec=lambda u: body.stiffness @ u, dtype=np.float64)
     inverse = LinearOperator(shape, matvec=solve, dtype=np.float64)
     found = eigsh(operator, count, M=body.mass, sigma=0.0, OPinv=inverse, v0=np.ones(shape[0]))[1]
-    return np.column_stack([solve(body.load), found])
+    return np.column_stack([*map(solve, body.loads.T), found])
 
 
 def empty(size: int) -> Subspace:
@@ -80,9 +91,10 @@ def extended(body: Body, found: Subspace, vector: Floats) -> Subspace:
     pushed = body.stiffness @ vector
     column = V.T @ pushed
     stiffness = np.block([[found.stiffness, column[:, None]], [column[None], vector @ pushed]])
-    return Subspace(
-        np.column_stack([V, vector]), stiffness, np.append(found.load, vector @ body.load)
-    )
+    known = found.others or tuple(np.zeros(found.load.size) for _ in body.others)
+    others = tuple(np.append(a, vector @ b) for a, b in zip(known, body.others, strict=True))
+    load = np.append(found.load, vector @ body.load)
+    return Subspace(np.column_stack([V, vector]), stiffness, load, others)
 
 
 class Guesses:
@@ -110,17 +122,21 @@ class Guesses:
 
 
 def ritz_subspaces(body: Body, near: Floats | None = None) -> Iterator[Subspace]:
-    """Of one load-dependent Ritz vector, of two, and so on without end.
+    """Of one load-dependent Ritz vector, of two, and so on without end, of all loads in turn.
 
     With vectors `near` them (n, k), which save half of the iterations.
     """
     solve, guesses, found = solver(body), Guesses(body, near), empty(body.load.size)
-    found = extended(body, found, solve(body.load, start=guesses.start(found, body.load)))
+    loads = body.loads.T
+    for load in loads:
+        found = extended(body, found, solve(load, start=guesses.start(found, load)))
+        yield found
     tolerance = LOOSE
     while True:
-        yield found
-        load = body.mass @ found.vectors[:, -1]
-        found = extended(body, found, solve(load, tolerance, guesses.start(found, load)))
+        for _ in loads:  # each has its own sequence, a block of vectors to all of them
+            load = body.mass @ found.vectors[:, -len(loads)]
+            found = extended(body, found, solve(load, tolerance, guesses.start(found, load)))
+            yield found
         tolerance = min(LOOSENED * tolerance, LOOSEST)
 
 
@@ -144,8 +160,8 @@ def modal_subspace(body: Body, count: int) -> Subspace:
 class SubspaceMotion:
     """Motion from rest in a subspace, exact under a load that is linear over a `step` [s].
 
-    `factor`: share of the body's load at times [s]. `displacement` [m] (n,) of all unknowns after
-    the steps taken. `state` (m, 4): displacement, velocity, load and its slope of each mode of the
+    `factor`: share of the body's load at times [s] (t,), or of each of its loads (t, loads).
+    `displacement` [m] (n,) of all unknowns after the steps taken. `state` (m, 4): displacement, velocity, load and its slope of each mode of the
     subspace, whose coordinates there are the columns of `modes` (m, m) and whose squared angular
     frequencies [1/s^2] are `squares` (m,).
     """
@@ -161,7 +177,7 @@ class SubspaceMotion:
         self.subspace, self.factor, self.step, self.time = subspace, factor, step, 0.0
         self.state = np.zeros((len(self.squares), 4))
         self.displacement = np.zeros(len(subspace.vectors))
-        self._load = self.modes.T @ subspace.load
+        self._load = self.modes.T @ subspace.loads
         self._moved = transitions(self.squares, damping, step)
 
     @cached_property
@@ -190,10 +206,11 @@ class SubspaceMotion:
         self.time, self.displacement = 0.0, np.zeros_like(self.displacement)
         self.state[:] = 0.0
 
-    def advance(self, before: float, after: float) -> None:
-        """Take the state over a step with so much of the load at its start and its end."""
+    def advance(self, before: Floats, after: Floats) -> None:
+        """Take the state over a step with so much of the loads at its start and its end."""
         state = self.state
-        state[:, 2], state[:, 3] = self._load * before, self._load * (after - before) / self.step
+        start, end = (self._load @ np.atleast_1d(share) for share in (before, after))
+        state[:, 2], state[:, 3] = start, (end - start) / self.step
         state[:, :2] = np.einsum("mij,mj->mi", self._moved, state)[:, :2]
 
 

@@ -26,7 +26,9 @@ Advance = Callable[[float], None]
 LOAD_STEPS = 16
 """Per step of a motion: the load is linear between them."""
 GROWTH = 4
-MAX_VECTORS = 80
+MAX_VECTORS, MOST_VECTORS = 80, 160
+"""Per load: as a rule, and where the displacement still changes by more than `GOOD`."""
+GOOD = 5e-3
 TINY = 1e-300
 TRUNCATION = 1e-3
 """Relative L2 change of a control point's motion by the last vectors, at which there are enough."""
@@ -39,21 +41,33 @@ class ProbeCurves(NamedTuple):
     velocity: Floats
 
 
+class CurveChange(NamedTuple):
+    """Relative L2 change of displacement and of velocity, the largest of any control point."""
+
+    displacement: float
+    velocity: float
+
+
 @dataclass(frozen=True)
 class Superposed:
     """Motion in a subspace: `coordinates` and their `rates` (samples, m).
 
-    `curves`: at the control points; `truncation_error`: their largest relative L2 change by the
-    last quarter of the vectors; `time_step` [s] and `steps` of the load.
+    `curves`: at the control points; `truncation`: their largest relative L2 changes by the last
+    quarter of the vectors; `time_step` [s] and `steps` of the load.
     """
 
     subspace: Subspace
     coordinates: Floats
     rates: Floats
     curves: ProbeCurves
-    truncation_error: float
+    truncation: CurveChange
     time_step: float
     steps: int
+
+    @property
+    def truncation_error(self) -> float:
+        """The larger of the two."""
+        return max(self.truncation)
 
     def state(self, sample: int) -> tuple[Floats, Floats]:
         """Displacement [m] and velocity [m/s] (n,) of all unknowns at a sample."""
@@ -91,15 +105,28 @@ class Excitation:
             *(np.einsum("pdm,tm->tpd", shapes, y) for y in self.coordinates(subspace))
         )
 
-    def change(self, subspace: Subspace) -> float:
-        """Largest relative L2 change of a curve by the last quarter of the vectors."""
+    def change(self, subspace: Subspace) -> CurveChange:
+        """Largest relative L2 changes of the curves by the last quarter of the vectors."""
         whole = self.curves(subspace)
-        fewer = self.curves(subspace.leading(max(1, (3 * subspace.load.size) // 4)))
-        return max(
-            float(np.linalg.norm(a[:, i] - b[:, i])) / max(float(np.linalg.norm(a[:, i])), TINY)
-            for a, b in zip(whole, fewer, strict=True)
-            for i in range(a.shape[1])
+        return curve_change(whole, self.curves(subspace.leading(fewer(subspace.load.size))))
+
+
+def fewer(vectors: int) -> int:
+    """So many vectors without their last quarter."""
+    return max(1, (3 * vectors) // 4)
+
+
+def curve_change(whole: ProbeCurves, other: ProbeCurves) -> CurveChange:
+    """Of curves by other ones, relative to the whole."""
+    return CurveChange(
+        *(
+            max(
+                float(np.linalg.norm(a[:, i] - b[:, i])) / max(float(np.linalg.norm(a[:, i])), TINY)
+                for i in range(a.shape[1])
+            )
+            for a, b in zip(whole, other, strict=True)
         )
+    )
 
 
 def excitation_of(
@@ -166,10 +193,16 @@ def enough_ritz_vectors(
 ) -> Subspace:
     """Load-dependent Ritz vectors, until the last ones change little."""
     del modes
-    growing, limit = ritz_subspaces(body, near), min(MAX_VECTORS, body.stiffness.size)
-    found, change = next(growing), np.inf
-    while found.load.size < limit and change > TRUNCATION:
+    growing = ritz_subspaces(body, near)
+    loads = body.loads.shape[1]
+    usual, limit = (
+        min(count * loads, body.stiffness.size) for count in (MAX_VECTORS, MOST_VECTORS)
+    )
+    found, change = next(growing), CurveChange(np.inf, np.inf)
+    while found.load.size < limit and max(change) > TRUNCATION:
+        if found.load.size >= usual and change.displacement < GOOD:
+            break  # what is left are waves in the velocity, of which each mesh has its own
         *_, found = islice(growing, min(GROWTH, limit - found.load.size))
         change = excitation.change(found)
-        advance(found.load.size / limit)
+        advance(min(1.0, found.load.size / usual))
     return found

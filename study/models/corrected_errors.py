@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from study.models.deformed import superposed
-from study.models.errors import step_checks, time_step_errors
-from study.models.finite_elements import TRUNCATION_LIMIT
+from study.models.errors import DISPLACEMENT_LIMIT, step_checks, time_step_errors
 from study.models.mesh_error import MeshSolution
 from study.models.remainder import FINER, Remainder, relative_sizes, remainder_errors
 from study.problem.trajectory import Trajectory
@@ -65,7 +64,7 @@ def checks(record: ModelRecord, solved: MeshSolution) -> Iterator[Check]:
     errors = {"elements": superposed(solved).truncation_error, "lattice": found.truncation_error}
     for part, value in errors.items():
         title = f"{record.name}: vectors of the {part}"
-        yield Check(name=title, value=value, limit=TRUNCATION_LIMIT, meaning=meaning)
+        yield Check(name=title, value=value, limit=DISPLACEMENT_LIMIT, meaning=meaning)
     if found.remainder_errors:
         yield Check(
             name=f"{record.name}: spacing",

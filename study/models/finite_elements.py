@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
+from fem_reference.burden import burden_of, laden
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body, of_tissue
 from fem_reference.grid import Projection
@@ -19,7 +20,13 @@ from fem_reference.pace import Pace
 from fem_reference.solvers import solve_static
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
-from study.models.errors import place, step_checks, time_step_errors
+from study.models.errors import (
+    DISPLACEMENT_LIMIT,
+    VELOCITY_LIMIT,
+    place,
+    step_checks,
+    time_step_errors,
+)
 from study.models.grading import is_graded, next_graded
 from study.models.keeping import recorded
 from study.models.large_strain import compare
@@ -59,7 +66,6 @@ GRADED = 3
 """Graded meshes at least, for the same reason."""
 FINER = 12
 """Levels above it that an accuracy may take, if they are not too large."""
-TRUNCATION_LIMIT = 0.01
 FRAME_RATE = 60.0
 """Steps per second [Hz] of a model that is stepped by hand, where it has no rate."""
 
@@ -140,7 +146,8 @@ class PreparedElements:
     def body(self, level: Level | None = None) -> Body:
         """The body on a level, that of the model by default. ValueError if there is no such."""
         found = level or self.own_level()
-        return fem.build(found.mesh, *self._on(), self.model.reference.method)
+        built = fem.build(found.mesh, *self._on(), self.model.reference.method)
+        return laden(built, burden_of(self.problem))
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion on one level, by the table's steps, those of the rate, or equal ones."""
@@ -149,7 +156,7 @@ class PreparedElements:
         if longest is not None:
             every = whole_steps(float(seen.times[1] - seen.times[0]), longest)
             method = replace(method, steps_per_sample=every, times=1)
-        found = fem.run(self.body(), self.model.damping, self.problem.factor, seen, method)
+        found = fem.run(self.body(), self.model.damping, self.problem.factors, seen, method)
         return Simulation(found.trajectory, found.time_step)
 
     def rest(self) -> Floats:
@@ -178,8 +185,8 @@ class PreparedElements:
     def stepper(self) -> Stepper:
         """Steps of TR-BDF2 at the rate, factors made once, whatever the method of a run."""
         body, step = self.body(), 1.0 / (self.model.rate or FRAME_RATE)
-        system = Oscillator(body.mass, body.stiffness, body.load, self.model.damping)
-        motion = SteppedMotion(system, self.problem.factor, step)  # at rest, and the factors
+        system = Oscillator(body.mass, body.stiffness, body.loads, self.model.damping)
+        motion = SteppedMotion(system, self.problem.factors, step)  # at rest, and the factors
 
         def displacement() -> Floats:
             return motion.displacement.reshape(-1, 3)
@@ -218,7 +225,7 @@ class PreparedElements:
 
     def _pace(self) -> Pace:
         problem = self.problem
-        return self.model.method(self._times).pace(problem.factor, problem.observation.times)
+        return self.model.method(self._times).pace(problem.factors, problem.observation.times)
 
     def _solve(
         self, coarsest: MeshSolution, progress: Progress
@@ -339,7 +346,7 @@ class PreparedElements:
             body = self.body(level)
         with progress.stage(name) as advance:
             problem = self.problem
-            arguments = (self.model.damping, problem.factor, problem.observation)
+            arguments = (self.model.damping, problem.factors, problem.observation)
             near = None if coarser is None else coarser.near(body)
             method = self.model.method(self._times)
             return MeshSolution(level, body, fem.run(body, *arguments, method, advance, near))
@@ -348,7 +355,7 @@ class PreparedElements:
         problem = self.problem
         body = self._body_of(solved)
         with progress.stage(f"{self.model.name}: halved steps") as advance:
-            arguments = (self.model.damping, problem.factor, problem.observation)
+            arguments = (self.model.damping, problem.factors, problem.observation)
             return fem.run(body, *arguments, self.model.method(2 * self._times), advance)
 
     def _at_large_strain(
@@ -371,14 +378,14 @@ class PreparedElements:
         keeping = watch.keeping
         if keeping is None or keeping.fields is None:
             return ""
-        superposed, mesh = best.found.superposed, best.level.mesh
-        if superposed is None:
+        moving, mesh = best.found.moving, best.level.mesh
+        if moving is None:
             return "Fields of fem are kept of a superposition only, not of steps in time."
         shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
         afresh = replace(keeping, resume=False)
         with recorded(afresh, self.model.name, shown, times) as on_sample:
             for sample in range(len(times)):
-                u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in superposed.state(sample))
+                u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in moving(sample))
                 on_sample(sample, u, v)
         return ""
 
@@ -412,15 +419,16 @@ class PreparedElements:
         strained: LargeStrain | None,
     ) -> ElementsRecord:
         best, accuracy = solved[-1], self.model.reference.accuracy
-        superposed = best.found.superposed
+        truncation = best.found.truncation
         missed = error is not None and is_too_coarse(accuracy, error)
         return ElementsRecord(
             element=best.found.element,
             elements=best.found.elements,
             unknowns=best.body.unknowns,
             method=self.model.reference.method,
-            subspace_vectors=None if superposed is None else superposed.subspace.load.size,
-            truncation_error=None if superposed is None else superposed.truncation_error,
+            subspace_vectors=best.found.vectors,
+            truncation_error=None if truncation is None else max(truncation),
+            truncation=None if truncation is None else CurveErrors(**truncation._asdict()),
             largest_rotation_rad=best.found.largest_rotation,
             levels=tuple(_level(one, best) for one in solved),
             mesh_error=error,
@@ -439,10 +447,16 @@ def _level(one: MeshSolution, best: MeshSolution) -> MeshLevel:
 
 
 def _subspace_checks(solved: MeshSolution) -> Iterator[Check]:
-    if solved.found.superposed is not None:
-        meaning = "largest relative L2 change of a curve by the last quarter of the subspace"
-        error = solved.found.superposed.truncation_error
-        yield Check(name="fem: subspace", value=error, limit=TRUNCATION_LIMIT, meaning=meaning)
+    truncation = solved.found.truncation
+    if truncation is None:
+        return
+    for kind, limit in (("displacement", DISPLACEMENT_LIMIT), ("velocity", VELOCITY_LIMIT)):
+        yield Check(
+            name=f"fem: {kind} by subspace",
+            value=getattr(truncation, kind),
+            limit=limit,
+            meaning=f"largest relative L2 change of a {kind} curve by the subspace's last quarter",
+        )
 
 
 def reference_of(scene: Scene) -> FiniteElements:
@@ -468,4 +482,6 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True)
+ABLE = frozenset({"several-loads", "gravity", "weights"})
+
+KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)

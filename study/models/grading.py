@@ -49,7 +49,7 @@ def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
 def probe_errors(problem: Problem, body: Body) -> Floats:
     """Share of each cell (cells,) in the relative errors of all control points at rest."""
     solve = solver(body, STEERING)
-    u = solve(body.load)
+    u = solve(body.whole_load)
     at_probes = evaluation(body, problem.observation.probes)
     goals = [
         np.outer(row.toarray().ravel(), moved / np.linalg.norm(moved)).ravel()

@@ -14,6 +14,7 @@ from fem_reference.elasticity import Body, Outline
 from fem_reference.elements import ELEMENTS
 from fem_reference.error_estimate import ErrorEstimate, discretisation_error, graded_error
 from fem_reference.observation import carried
+from fem_reference.superposition import CurveChange
 from study.organ.geometry import Level
 from study.problem.problem import Problem
 from study.results.records import CurveErrors, CurveOrders, DiscretisationError
@@ -63,9 +64,10 @@ def mesh_error(
     for i, probe in enumerate(problem.probes):
         u = _estimate(solved, [run.displacement[:, i] for run in runs], graded)
         v = _estimate(solved, [run.velocity[:, i] for run in runs], graded)
-        errors = (math.hypot(one.error, _truncation(solved[-1])) for one in (u, v))
+        left = _truncation(solved[-1])
         by_probe[probe] = CurveErrors(
-            **dict(zip(("displacement", "velocity"), errors, strict=True))
+            displacement=math.hypot(u.error, left.displacement),
+            velocity=math.hypot(v.error, left.velocity),
         )
         orders[probe] = CurveOrders(displacement=u.observed, velocity=v.observed)
     return DiscretisationError(
@@ -93,9 +95,8 @@ def _formal_order(solved: MeshSolution) -> float:
     return ELEMENTS[solved.found.element].formal_order
 
 
-def _truncation(solved: MeshSolution) -> float:
-    superposed = solved.found.superposed
-    return 0.0 if superposed is None else superposed.truncation_error
+def _truncation(solved: MeshSolution) -> CurveChange:
+    return solved.found.truncation or CurveChange(0.0, 0.0)
 
 
 def locks(problem: Problem, solved: MeshSolution) -> bool:

@@ -53,6 +53,14 @@ class Problem:
         return Response(times, self.probes, self.tool.direction, volumes)
 
     @property
+    def factors(self) -> Callable[[Floats], Floats]:
+        """Share of each load at times [s] (t,): (t, loads), of a single one (t,)."""
+        if not self.loads:
+            return self.factor
+        histories = (self.factor, *(load.factor for load in self.loads))
+        return lambda times: np.column_stack([one(times) for one in histories])
+
+    @property
     def tool_probe(self) -> int:
         """The control point nearest to the tool."""
         away = self.observation.probes - self.tool.centre

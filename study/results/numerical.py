@@ -28,7 +28,8 @@ def numerical_errors(
         return steps
     mesh = elements.mesh_error
     by_mesh = None if mesh is None else _of_curve(curve, mesh.by_probe.get(probe))
-    return [*steps, by_mesh, elements.truncation_error or 0.0]
+    left = _of_curve(curve, elements.truncation)
+    return [*steps, by_mesh, (elements.truncation_error if left is None else left) or 0.0]
 
 
 def whole_error(parts: Sequence[float | None]) -> float | None:

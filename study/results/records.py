@@ -106,9 +106,9 @@ class CertifiedReduction:
 class ElementsRecord:
     """What only finite elements have.
 
-    `subspace_vectors` and `truncation_error` are those of a superposition, and so is `certified`,
-    None where no bound was asked for or found; `accuracy_missed`: the accuracy that was asked for
-    and not reached.
+    `subspace_vectors` and `truncation`, of which `truncation_error` is the larger, are those of a
+    superposition, and so is `certified`, None where no bound was asked for or found;
+    `accuracy_missed`: the accuracy that was asked for and not reached.
     """
 
     element: str
@@ -117,6 +117,7 @@ class ElementsRecord:
     method: str
     subspace_vectors: int | None = None
     truncation_error: float | None = None
+    truncation: CurveErrors | None = None
     certified: CertifiedReduction | None = None
     largest_rotation_rad: float | None = None
     levels: tuple[MeshLevel, ...] = ()

@@ -1,0 +1,80 @@
+"""What a body carries beside the first tool's pressure: further loads, weights, its own weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import skfem
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+
+from fem_reference.elasticity import FACET_ORDER, Body, by_component, patch_load, rows
+from study.problem.contact import ToolPatch, Weight
+from study.problem.problem import Problem
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Burden:
+    """Further `loads`, attached `weights`, and `gravity` [m/s^2] (3,) on these and on the tissue.
+
+    `given_loaded`: whether the given shape is that at rest under gravity. Small displacements from
+    there are those of a weightless body, so that gravity leaves no trace in them.
+    """
+
+    loads: tuple[ToolPatch, ...] = ()
+    weights: tuple[Weight, ...] = ()
+    gravity: Floats = field(default_factory=lambda: np.zeros(3))
+    given_loaded: bool = False
+
+
+def burden_of(problem: Problem) -> Burden:
+    """That of a problem."""
+    loads = tuple(load.tool for load in problem.loads)
+    return Burden(loads, problem.weights, problem.gravity, problem.given_loaded)
+
+
+def laden(body: Body, burden: Burden) -> Body:
+    """The body with a burden: more loads, the mass of weights, and the dead load of gravity.
+
+    ValueError for a load or a weight that touches no surface of the mesh.
+    """
+    nodes = body.nodes
+    surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
+    others = tuple(_placed(surface, patch, f"tool.{n}") for n, patch in enumerate(burden.loads, 2))
+    mass = body.mass
+    for n, weight in enumerate(burden.weights, 1):
+        mass = mass + _attached(surface, weight, f"weight.{n}")
+    mass = csc_array(mass)
+    dead: Floats | None = None
+    if burden.gravity.any() and not burden.given_loaded:
+        dead = np.asarray(mass @ np.tile(burden.gravity, body.node_count))
+    return replace(body, mass=mass, others=others, dead=dead)
+
+
+def _placed(surface: Any, patch: ToolPatch, name: str) -> Floats:
+    """Nodal forces [N] (n,) of a load."""
+    if not patch.profile(rows(surface.global_coordinates()), rows(surface.normals)).any():
+        raise _untouched(surface, name)
+    return patch_load(surface, patch)
+
+
+def _attached(surface: Any, weight: Weight, name: str) -> csc_array:
+    """Mass matrix [kg] (n, n) of a weight that is shared out over its patch."""
+    patch = weight.patch
+    form = skfem.BilinearForm(lambda u, v, w: patch.profile(rows(w.x), rows(w.n)) * u * v)
+    shared = csc_array(form.assemble(surface))
+    whole = float(shared.sum())  # shape functions add up to one
+    if not whole > 0.0:
+        raise _untouched(surface, name)
+    return by_component((weight.mass / whole) * shared)
+
+
+def _untouched(surface: Any, name: str) -> ValueError:
+    return ValueError(
+        f"{name}: touches no surface on a mesh of {surface.mesh.nelements} tetrahedra; enlarge "
+        f"{name}.radius, move {name}.place or reduce reference.element_size"
+    )
