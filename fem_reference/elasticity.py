@@ -14,17 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csc_array, eye_array, hstack, kron
+from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, eye_array, hstack, kron
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
-from fem_reference.forms import Gradients, gradients, pattern, products
+from fem_reference.forms import Gradients, Pattern, gradients, pattern, products
 from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.tissue import Tissue
+from study.problem.varied import Composition, Moduli, barycentric_samples, composition
 
 Floats = NDArray[np.float64]
 # Degrees that the quadrature integrates: squares of quadratic functions; the load and the support
@@ -32,6 +33,8 @@ Floats = NDArray[np.float64]
 CURVED_ORDER = 4
 MASS_ORDER = 4
 FACET_ORDER = 10
+ROUNDING = 1e-9
+"""Of lambda over mu, the difference of two moduli."""
 
 
 class Outline(NamedTuple):
@@ -53,7 +56,8 @@ class Body:
     `nodes`: scikit-fem's basis of one component, vertices first, then edges; `stiffness` [N/m] has
     the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
     [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
-    the stiffness is made of by the tissue's constants.
+    the stiffness is made of by the tissue's constants; `composition`: what each cell is made of,
+    None where all are of one tissue.
     """
 
     mesh: TetrahedralMesh
@@ -64,6 +68,7 @@ class Body:
     support: csc_array
     load: Floats
     gradients: Gradients
+    composition: Composition | None = None
 
     @property
     def node_count(self) -> int:
@@ -113,11 +118,38 @@ def discretise(
     support = _by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
-    mass = _by_component(tissue.density * _finite(products(nodes, where), "the mass"))
+    made = composed(nodes, tissue)
+    mass = _by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
-    stiffness = _held(_elastic(integrals, nodes, name, tissue), support)
+    stiffness = _held(_elastic(integrals, nodes, name, tissue, made), support)
     load = _load(surface, tool)
-    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals)
+    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals, made)
+
+
+def composed(nodes: Any, tissue: Tissue) -> Composition | None:
+    """What the cells of a basis are made of, curved ones as they are; None for one tissue."""
+    inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
+
+    def points(cells: slice) -> Floats:
+        numbers = np.arange(cells.start, cells.stop)
+        return np.moveaxis(np.asarray(nodes.mapping.F(inside, tind=numbers)), 0, -1)
+
+    return composition(tissue, int(nodes.mesh.nelements), points)
+
+
+def _mass(nodes: Any, where: Pattern, tissue: Tissue, made: Composition | None) -> csr_array:
+    """Of one component [kg]."""
+    if made is None:
+        return tissue.density * products(nodes, where)
+    return products(nodes, where, made.density(tissue.density))
+
+
+def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
+    """Lame's constants [Pa] to go with values (cells, q): of one tissue, or of each cell."""
+    if made is None:
+        return Moduli(*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
+    found = made.moduli(tissue)
+    return Moduli(found.lame[:, None], found.shear[:, None])
 
 
 def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
@@ -126,11 +158,12 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
     Mass, support and load stay. ValueError for a Poisson ratio that no solid has, and for an
     element with other nodes.
     """
-    name = chosen_element(element, tissue.poisson_ratio)
+    name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
     if ELEMENTS[name].shapes is not ELEMENTS[body.element].shapes:
         raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
-    own = _elastic(body.gradients, body.nodes, name, tissue, body.stiffness.pressure)
+    pressure = body.stiffness.pressure
+    own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
     return replace(body, element=name, stiffness=_held(own, body.support))
 
 
@@ -159,7 +192,7 @@ def loaded_surface(
 
     All that `discretise` refuses is refused here, where next to nothing is computed.
     """
-    name = chosen_element(element, tissue.poisson_ratio)
+    name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
     _refuse_flat(mesh)
     kind = ELEMENTS[name]
@@ -206,7 +239,7 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
     nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), mapping(grid), intorder=_order(grid, name))
-    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue)
+    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue, composed(nodes, tissue))
 
 
 def _order(grid: Any, name: ElementName) -> int:
@@ -226,9 +259,12 @@ def _elastic(
     nodes: Any,
     name: ElementName,
     tissue: Tissue,
+    made: Composition | None = None,
     pressure: Pressure | None = None,
 ) -> Stiffness:
     """Stiffness without support from its integrals, and from those of a pressure if there are."""
+    if made is not None:
+        return _varied(nodes, name, tissue, made)
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
     mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
     matrix = _isotropic(integrals, 0.0 if mixed else lame, mu)
@@ -238,8 +274,35 @@ def _elastic(
     return Stiffness(matrix, Pressure(*known, lame, mu))
 
 
-def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
-    """One rule for both: the product of a divergence and a pressure, and of two pressures."""
+def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
+    """The same of cells with moduli of their own, by which the integrals are weighed.
+
+    A continuous pressure does not follow one that jumps where tissue changes, and is smeared over
+    the elements there. ValueError beside a pressure for tissue that it says nothing of.
+    """
+    where, by_gradient = pattern(nodes), _by_order(nodes, _order(nodes.mesh, name))
+    lame, mu = made.moduli(tissue)
+    by_shear = gradients(by_gradient, where, mu)
+    if not ELEMENTS[name].mixed:
+        return Stiffness(_isotropic(by_shear, 1.0, 1.0, gradients(by_gradient, where, lame)))
+    if not (lame > ROUNDING * mu).all():
+        raise ValueError(
+            "tissue.inclusion: a Poisson ratio of 0 has no pressure; enlarge its poisson_ratio, or "
+            "set reference.element to p2"
+        )
+    around, shear = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
+    coupling, mass = _pressure(nodes, name, around / lame)
+    _, schur = _pressure(nodes, name, 1.0 / lame + 1.0 / mu)
+    return Stiffness(_isotropic(by_shear, 0.0, 1.0), Pressure(coupling, mass, around, shear, schur))
+
+
+def _pressure(
+    nodes: Any, name: ElementName, density: Floats | None = None
+) -> tuple[csc_array, csc_array]:
+    """One rule for both: the product of a divergence and a pressure, and of two pressures.
+
+    The second times a density (cells,), where one is given.
+    """
     grid, order = nodes.mesh, _order(nodes.mesh, name)
     pressure = skfem.Basis(grid, skfem.ElementTetP1(), nodes.mapping, intorder=order)
     basis = _by_order(nodes, order)
@@ -247,14 +310,19 @@ def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
     parts = [_finite(one.assemble(basis, pressure), "the coupling") for one in forms]
     by_node = np.arange(3 * basis.N).reshape(3, -1).T.ravel()
     coupling = csc_array(csc_array(hstack(parts, format="csc"))[:, by_node])
-    return coupling, csc_array(products(pressure, pattern(pressure)))
+    return coupling, csc_array(products(pressure, pattern(pressure), density))
 
 
-def _isotropic(integrals: Gradients, lame: float, mu: float) -> bsr_array:
-    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well."""
+def _isotropic(
+    integrals: Gradients, lame: float, mu: float, by_lame: Gradients | None = None
+) -> bsr_array:
+    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well.
+
+    `by_lame`: other integrals to go with lambda.
+    """
     D = integrals.values
     blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
-    blocks += lame * D
+    blocks += lame * (integrals if by_lame is None else by_lame).values
     diagonal = np.einsum("nii->ni", blocks)
     diagonal += mu * np.einsum("nii->n", D)[:, None]
     if not np.isfinite(blocks).all():

@@ -13,24 +13,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
-from skfem.models.elasticity import lame_parameters
 
-from fem_reference.elasticity import Body, rows
+from fem_reference.elasticity import Body, cell_moduli, rows
 from fem_reference.elements import ELEMENTS
 from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
 from study.problem.tissue import Tissue
+from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def material(tissue: Tissue, law: str | Law) -> Law:
-    """The tissue's Lame constants in a law, or the law given. ValueError for an unknown name."""
+def material(tissue: Tissue, law: str | Law, made: Composition | None = None) -> Law:
+    """The tissue's Lame constants in a law, or the law given. ValueError for an unknown name.
+
+    Those of each cell where it is made of several tissues.
+    """
     if not isinstance(law, str):
         return law
     if law not in LAWS:
         raise ValueError(f"law: {law!r} is unknown; give {' or '.join(LAWS)}")
-    return LAWS[law](*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
+    return LAWS[law](*cell_moduli(made, tissue))
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,12 @@ def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticS
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     return HyperelasticSolid(
-        material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.load
+        material(tissue, law, body.composition),
+        slopes,
+        nodes.dx,
+        unknowns,
+        body.support,
+        body.load,
     )
 
 

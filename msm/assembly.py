@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +12,9 @@ from scipy.sparse import csr_array, diags_array
 
 from msm import lattice as cells
 from msm import volume as volumes
-from msm.calibration import SPRING_POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO, lame
 from msm.damping import UNDAMPED, NodalDamping
-from msm.lattice import LatticeMesh
+from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
 from msm.springs import Springs, connect
@@ -20,6 +22,8 @@ from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import SolidShape
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.tissue import Tissue
+from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +33,8 @@ class Assembly:
     """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
     `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    `composition`: what each cell is made of, None where all are of one tissue; `connect`: the
+    springs for a stiffness (c,) of each cell relative to that of the law.
     """
 
     lattice: LatticeMesh
@@ -36,6 +42,8 @@ class Assembly:
     mass: Floats
     foundation: csr_array
     load: Floats
+    composition: Composition | None = None
+    connect: Callable[[Floats], Springs] | None = None
 
 
 @dataclass(frozen=True)
@@ -61,18 +69,52 @@ def assemble(
     tool: ToolPatch,
     flexion: float = 0.0,
     body_diagonals: float = 0.0,
+    tissue: Tissue | None = None,
 ) -> Assembly:
-    """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool."""
+    """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool.
+
+    `tissue`: what differs from place to place, if anything; `density` is that around.
+    """
     margin = 1e-9 * np.ptp(surface.points, axis=0).max()
     lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
     lattice = cells.build(body, lower, upper, spacing)
     weights, _ = lattice.interpolation(surface.points)
+    made = cells.composed(lattice, tissue)
     return Assembly(
         lattice,
         connect(lattice, flexion, body_diagonals),
-        density * cells.node_volumes(lattice),
+        _mass(lattice, density, made),
         *contact(weights, surface, foundation, tool),
+        made,
+        partial(connect, lattice, flexion, body_diagonals),
     )
+
+
+def _mass(lattice: CellLattice, density: float, made: Composition | None) -> Floats:
+    """Of the nodes [kg] (n,)."""
+    if made is None:
+        return np.asarray(density * cells.node_volumes(lattice))
+    return cells.at_nodes(lattice, lattice.fill * made.density(density))
+
+
+def of_tissue(
+    assembly: Assembly, material: Material, modulus: float, *, volume_term: bool
+) -> tuple[Assembly, Material]:
+    """The lattice with what its cells are made of, round which the material has a modulus [Pa].
+
+    Springs are as stiff as the mean shear modulus of each cell, whatever their law, which all parts
+    share. With a `volume_term` regions have their own Poisson ratio, without it 1/4 as all springs.
+    The same lattice and material of one tissue. ValueError for a region with a ratio below 1/4.
+    """
+    made, nu = assembly.composition, material.poisson_ratio
+    if made is None or assembly.connect is None:
+        return assembly, material
+    found = made.moduli(Tissue(youngs_modulus=modulus, poisson_ratio=nu), one_ratio=not volume_term)
+    springs = assembly.connect(found.shear / lame(modulus, nu)[1])
+    term = material.volume
+    if volume_term and isinstance(assembly.lattice, CellLattice):
+        term = volumes.of_cells(assembly.lattice, found.lame - found.shear, nu)
+    return replace(assembly, springs=springs), replace(material, volume=term)
 
 
 def contact(

@@ -162,7 +162,7 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
 
 def _check_memory(level: Level, scene: Scene) -> None:
     """Steps in time factor the matrix, here and in CalculiX."""
-    element = chosen_element(scene.reference.element, scene.tissue.poisson_ratio)
+    element = chosen_element(scene.reference.element, scene.tissue.highest_poisson_ratio)
     count = unknowns(level.mesh, element)
     wanted, limit = needed(count, element, stepping=True), SHARE * available()
     if wanted > limit:

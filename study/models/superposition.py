@@ -122,7 +122,7 @@ class PreparedSuperposition:
     def describe(self) -> list[str]:
         """Unknowns and vectors, and those that certify its error."""
         kind = "Ritz vectors" if self.model.vectors == "ritz" else "modes and the rest"
-        element = chosen_element(self.model.element, self.problem.tissue.poisson_ratio)
+        element = chosen_element(self.model.element, self.problem.tissue.highest_poisson_ratio)
         size = unknowns(self.mesh, element)
         lines = [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
         if self.model.certificate:
