@@ -14,7 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, eye_array, hstack, kron
+from scipy.sparse import (
+    bsr_array,
+    coo_array,
+    csc_array,
+    csr_array,
+    diags_array,
+    eye_array,
+    hstack,
+    kron,
+)
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
@@ -23,11 +32,13 @@ from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.varied import Composition, Moduli, barycentric_samples, composition
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 # Degrees that the quadrature integrates: squares of quadratic functions; the load and the support
 # vary inside a facet, so more there. Gradients in curved cells are no polynomials at all.
 CURVED_ORDER = 4
@@ -57,7 +68,8 @@ class Body:
     the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
     [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
     the stiffness is made of by the tissue's constants; `composition`: what each cell is made of,
-    None where all are of one tissue.
+    None where all are of one tissue. `fixed` (3 nodes,): unknowns that do not move, None where all
+    do; they are coupled to nothing and without load, but keep a stiffness and a mass of their own.
     """
 
     mesh: TetrahedralMesh
@@ -69,6 +81,7 @@ class Body:
     load: Floats
     gradients: Gradients
     composition: Composition | None = None
+    fixed: Booleans | None = None
 
     @property
     def node_count(self) -> int:
@@ -102,7 +115,7 @@ class Body:
 def discretise(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
@@ -121,9 +134,37 @@ def discretise(
     made = composed(nodes, tissue)
     mass = _by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
-    stiffness = _held(_elastic(integrals, nodes, name, tissue, made), support)
+    fixed = _fixed(surface, foundation)
+    mass = decoupled(mass, fixed)
+    stiffness = _held(_elastic(integrals, nodes, name, tissue, made), support, fixed)
     load = _load(surface, tool)
-    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals, made)
+    if fixed is not None:
+        load[fixed] = 0.0
+    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals, made, fixed)
+
+
+def _fixed(surface: Any, foundation: Support) -> Booleans | None:
+    """Unknowns (3 nodes,) of all facets whose middle does not move; None if all may move."""
+    points = rows(surface.global_coordinates()).mean(axis=1)
+    held = foundation.fixed(points, rows(surface.normals).mean(axis=1))
+    if not held.any():
+        return None
+    found = np.zeros((surface.N, 3), dtype=np.bool_)
+    for d in range(3):
+        facets = surface.find[held[:, d]]
+        if len(facets):
+            found[surface.get_dofs(facets=facets).flatten(), d] = True
+    return found.ravel()
+
+
+def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
+    """Without the entries that couple fixed unknowns to any other."""
+    if fixed is None:
+        return matrix
+    found = matrix.tocoo()
+    kept = ~(fixed[found.row] | fixed[found.col]) | (found.row == found.col)
+    entries = (found.data[kept], (found.row[kept], found.col[kept]))
+    return csc_array(coo_array(entries, shape=found.shape))
 
 
 def composed(nodes: Any, tissue: Tissue) -> Composition | None:
@@ -164,11 +205,14 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
         raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
     pressure = body.stiffness.pressure
     own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
-    return replace(body, element=name, stiffness=_held(own, body.support))
+    return replace(body, element=name, stiffness=_held(own, body.support, body.fixed))
 
 
-def _held(own: Stiffness, support: csc_array) -> Stiffness:
-    """With the support in it, whose nodes are of cells too; the matrix is changed, not copied."""
+def _held(own: Stiffness, support: csc_array, fixed: Booleans | None) -> Stiffness:
+    """With the support in it, whose nodes are of cells too, and fixed unknowns coupled to nothing.
+
+    The matrix is changed, not copied.
+    """
     matrix, nodal = own.matrix, coo_array(support[::3, ::3])
     rows = np.repeat(np.arange(nodal.shape[0]), np.diff(matrix.indptr))
     places, wanted = (
@@ -177,13 +221,24 @@ def _held(own: Stiffness, support: csc_array) -> Stiffness:
     )
     entries = np.searchsorted(places, wanted)
     matrix.data[entries] += nodal.data[:, None, None] * np.eye(3)
-    return own
+    if fixed is None:
+        return own
+    free = ~fixed.reshape(-1, 3)
+    of_nodes = np.flatnonzero(rows == matrix.indices)
+    own_stiffness = np.einsum("nii->ni", matrix.data[of_nodes])
+    matrix.data *= free[rows][:, :, None] & free[matrix.indices][:, None, :]
+    for d in range(3):
+        matrix.data[of_nodes, d, d] = own_stiffness[:, d]
+    if own.pressure is None:
+        return own
+    divergence = csc_array(own.pressure.divergence @ diags_array(free.ravel().astype(float)))
+    return Stiffness(matrix, replace(own.pressure, divergence=divergence))
 
 
 def loaded_surface(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
@@ -203,11 +258,14 @@ def loaded_surface(
     return name, surface
 
 
-def _refuse_untouched(surface: Any, foundation: Foundation, tool: ToolPatch) -> None:
+def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:
     """ValueError if no integration point of the facets is held, or pushed."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     coarse = f"on a mesh of {surface.mesh.nelements} tetrahedra"
-    if not foundation.density(points, normals).any():
+    if not (
+        foundation.density(points, normals).any()
+        or foundation.fixed(points.mean(axis=1), normals.mean(axis=1)).any()
+    ):
         raise ValueError(
             f"support: holds no surface {coarse}; enlarge support.depth, or reduce "
             "reference.element_size"
@@ -343,7 +401,7 @@ def _finite(matrix: Any, name: str) -> csc_array:
     return csc_array(matrix)
 
 
-def _foundation_form(foundation: Foundation) -> Any:
+def _foundation_form(foundation: Support) -> Any:
     return skfem.BilinearForm(lambda u, v, w: foundation.density(rows(w.x), rows(w.n)) * u * v)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-from fem_reference.elasticity import Body, cell_moduli, rows
+from fem_reference.elasticity import Body, Booleans, cell_moduli, decoupled, rows
 from fem_reference.elements import ELEMENTS
 from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
 from study.problem.tissue import Tissue
@@ -41,7 +41,8 @@ class HyperelasticSolid:
     """The strain and support energy of a body as a function of its displacement u [m] (n,).
 
     `slopes` (t, q, 3, a): derivatives [1/m] of the a shape functions of tetrahedron t at its
-    integration points q, whose `weights` [m^3] are (t, q); `unknowns` (t, a, 3): places in u.
+    integration points q, whose `weights` [m^3] are (t, q); `unknowns` (t, a, 3): places in u, of
+    which those that are `fixed` (n,) feel no force and have a stiffness of their own.
     """
 
     law: Law
@@ -50,6 +51,7 @@ class HyperelasticSolid:
     unknowns: Ints
     support: csc_array
     load: Floats
+    fixed: Booleans | None = None
 
     def deformation(self, u: Floats) -> Floats:
         """Deformation gradient F at the integration points, shape (t, q, 3, 3)."""
@@ -66,7 +68,10 @@ class HyperelasticSolid:
         stress = self.law.stress(self.deformation(u)) * self.weights[..., None, None]
         nodal = _flat(self.slopes).mT @ _flat(stress.mT)
         found = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(u))
-        return np.asarray(found + self.support @ u)
+        force = found + self.support @ u
+        if self.fixed is not None:
+            force[self.fixed] = 0.0
+        return np.asarray(force)
 
     def tangent(self, u: Floats) -> csc_array:
         """Second derivative [N/m] of the energy, shape (n, n)."""
@@ -76,7 +81,8 @@ class HyperelasticSolid:
         unknowns = self.unknowns.reshape(-1, count)
         places = (np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel())
         entries = (blocks.ravel(), places)
-        return csc_array(coo_array(entries, shape=(len(u), len(u)))) + self.support
+        whole = csc_array(coo_array(entries, shape=(len(u), len(u)))) + self.support
+        return decoupled(whole, self.fixed)
 
 
 def _flat(values: Floats) -> Floats:
@@ -121,6 +127,7 @@ def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticS
         unknowns,
         body.support,
         body.load,
+        body.fixed,
     )
 
 

@@ -20,16 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.assembly import Assembly, contact
+from msm.assembly import Assembly, contact, held
 from msm.calibration import reference_stiffness
 from msm.springs import Springs
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import SurfaceRule
 from study.mesh.tetrahedra import EDGES, edges, mean_edge, volumes
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition, barycentric_samples, composition
+from study.problem.varied import of_tetrahedra
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -81,7 +82,7 @@ def assemble(
     mesh: TetrahedralMesh,
     surface: SurfaceRule,
     density: float,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     tissue: Tissue | None = None,
 ) -> Assembly:
@@ -89,10 +90,10 @@ def assemble(
 
     `tissue`: what differs from place to place, if anything; `density` is that around.
     """
-    lattice, made = TetrahedralLattice(mesh), composed(mesh, tissue)
+    lattice, made = TetrahedralLattice(mesh), of_tetrahedra(mesh, tissue)
     weights, _ = lattice.interpolation(surface.points)
     by_volume = density * node_volumes(mesh)
-    return Assembly(
+    whole = Assembly(
         lattice,
         connect(mesh),
         by_volume if made is None else at_nodes(mesh, made.density(density)),
@@ -100,12 +101,7 @@ def assemble(
         made,
         partial(connect, mesh),
     )
-
-
-def composed(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
-    """What each tetrahedron is made of; None for tissue that is the same everywhere."""
-    corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
-    return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
+    return held(whole, weights, surface, foundation)
 
 
 def connect(mesh: TetrahedralMesh, stiffness: Floats | None = None) -> Springs:

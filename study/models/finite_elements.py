@@ -34,9 +34,10 @@ from study.models.mesh_error import (
 )
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.progress import Progress
 from study.results.fields import Mesh
@@ -122,7 +123,7 @@ class PreparedElements:
     def _refuse(self, level: Level) -> None:
         fem.refuse(level.mesh, *self._on(), self.model.reference.method)
 
-    def _on(self) -> tuple[Tissue, Foundation, ToolPatch, str, Projection | None]:
+    def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
         """What a body is made of beside its mesh."""
         problem, element = self.problem, self.model.reference.element
         geometry = problem.geometry
@@ -468,4 +469,9 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True)
+KIND = ModelKind(
+    models=models,
+    assumptions=assumptions,
+    is_reference=True,
+    able=frozenset({"inclusions", "fixed-surfaces"}),
+)

@@ -30,6 +30,7 @@ from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
+from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import Check, CurveErrors, LatticeRecord, ModelRecord
@@ -128,8 +129,7 @@ def on_lattice(
 
     An estimate of stiffness is of the tissue around; inclusions keep theirs.
     """
-    given = plain, made.material, made.modulus
-    assembly, material = msm.of_tissue(*given, volume_term=model.lattice.volume_term)
+    assembly, material = msm.of_tissue(plain, made.material, made.modulus)
     return PreparedLattice(model, problem, assembly, replace(made, material=material), plain)
 
 
@@ -383,7 +383,7 @@ class PreparedLattice:
 def _mass_of(problem: Problem) -> float:
     """Of the organ [kg] on its mesh."""
     density, mesh = problem.tissue.density, problem.geometry.mesh
-    made = tetrahedra.composed(mesh, problem.tissue)
+    made = of_tetrahedra(mesh, problem.tissue)
     if made is None:
         return problem.geometry.volume * density
     return float(volumes(mesh) @ made.density(density))

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from study.mesh.kinds import TetrahedralMesh
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -152,6 +153,12 @@ def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
         inside[cut] = region.distance(points[cut]) < 0.0
         part[inside] = number
     return part
+
+
+def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
+    """What each tetrahedron is made of; None for tissue that is the same everywhere."""
+    corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
+    return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
 
 
 @cache
