@@ -10,7 +10,15 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.elasticity import FACET_ORDER, Body, by_component, patch_load, rows
+from fem_reference.elasticity import (
+    FACET_ORDER,
+    Body,
+    by_component,
+    decoupled,
+    patch_load,
+    rows,
+    without_fixed,
+)
 from study.problem.contact import ToolPatch, Weight
 from study.problem.problem import Problem
 
@@ -44,15 +52,19 @@ def laden(body: Body, burden: Burden) -> Body:
     """
     nodes = body.nodes
     surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
-    others = tuple(_placed(surface, patch, f"tool.{n}") for n, patch in enumerate(burden.loads, 2))
-    mass = body.mass
+    others = tuple(
+        without_fixed(_placed(surface, patch, f"tool.{n}"), body.fixed)
+        for n, patch in enumerate(burden.loads, 2)
+    )
+    mass, nodal = body.mass, body.nodal_mass
     for n, weight in enumerate(burden.weights, 1):
-        mass = mass + _attached(surface, weight, f"weight.{n}")
-    mass = csc_array(mass)
+        attached = _attached(surface, weight, f"weight.{n}")
+        mass = csc_array(mass + decoupled(attached, body.fixed))
+        nodal = nodal + attached.sum(axis=1)
     dead: Floats | None = None
     if burden.gravity.any() and not burden.given_loaded:
-        dead = np.asarray(mass @ np.tile(burden.gravity, body.node_count))
-    return replace(body, mass=mass, others=others, dead=dead)
+        dead = without_fixed(nodal * np.tile(burden.gravity, body.node_count), body.fixed)
+    return replace(body, mass=mass, nodal_mass=nodal, others=others, dead=dead)
 
 
 def _placed(surface: Any, patch: ToolPatch, name: str) -> Floats:

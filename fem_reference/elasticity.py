@@ -14,24 +14,38 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csc_array, eye_array, hstack, kron
+from scipy.sparse import (
+    bsr_array,
+    coo_array,
+    csc_array,
+    csr_array,
+    diags_array,
+    eye_array,
+    hstack,
+    kron,
+)
 from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
-from fem_reference.forms import Gradients, gradients, pattern, products
+from fem_reference.forms import Gradients, Pattern, gradients, pattern, products
 from fem_reference.grid import Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
+from study.problem.varied import Composition, Moduli, barycentric_samples, composition
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 # Degrees that the quadrature integrates: squares of quadratic functions; the load and the support
 # vary inside a facet, so more there. Gradients in curved cells are no polynomials at all.
 CURVED_ORDER = 4
 MASS_ORDER = 4
 FACET_ORDER = 10
+ROUNDING = 1e-9
+"""Of lambda over mu, the difference of two moduli."""
 
 
 class Outline(NamedTuple):
@@ -53,8 +67,12 @@ class Body:
     `nodes`: scikit-fem's basis of one component, vertices first, then edges; `stiffness` [N/m] has
     the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
     [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
-    the stiffness is made of by the tissue's constants. `others`: [N] (n,) each, of further loads;
-    `dead` [N] (n,): what acts at all times, and has taken the body to where its motion starts.
+    the stiffness is made of by the tissue's constants; `composition`: what each cell is made of,
+    None where all are of one tissue. `fixed` (3 nodes,): unknowns that do not move, None where all
+    do; they are coupled to nothing and without load, but keep a stiffness and a mass of their own.
+    `nodal_mass` [kg] (n,): the mass at each unknown, with what is coupled to fixed ones. `others`:
+    [N] (n,) each, of further loads; `dead` [N] (n,): what acts at all times, and has taken the body
+    to where its motion starts.
     """
 
     mesh: TetrahedralMesh
@@ -62,9 +80,12 @@ class Body:
     nodes: Any
     stiffness: Stiffness
     mass: csc_array
+    nodal_mass: Floats
     support: csc_array
     load: Floats
     gradients: Gradients
+    composition: Composition | None = None
+    fixed: Booleans | None = None
     others: tuple[Floats, ...] = ()
     dead: Floats | None = None
 
@@ -111,7 +132,7 @@ class Body:
 def discretise(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
@@ -127,11 +148,81 @@ def discretise(
     support = by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
-    mass = by_component(tissue.density * _finite(products(nodes, where), "the mass"))
+    made = composed(nodes, tissue)
+    whole = by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
-    stiffness = _held(_elastic(integrals, nodes, name, tissue), support)
-    load = patch_load(surface, tool)
-    return Body(mesh, name, nodes, stiffness, mass, support, load, integrals)
+    fixed = _fixed(surface, foundation)
+    mass = decoupled(whole, fixed)
+    stiffness = _held(_elastic(integrals, nodes, name, tissue, made), support, fixed)
+    load = without_fixed(patch_load(surface, tool), fixed)
+    return Body(
+        mesh,
+        name,
+        nodes,
+        stiffness,
+        mass,
+        np.asarray(whole.sum(axis=1)),
+        support,
+        load,
+        integrals,
+        made,
+        fixed,
+    )
+
+
+def without_fixed(force: Floats, fixed: Booleans | None) -> Floats:
+    """Nodal forces [N] (n,) but for those on what does not move."""
+    return force if fixed is None else np.where(fixed, 0.0, force)
+
+
+def _fixed(surface: Any, foundation: Support) -> Booleans | None:
+    """Unknowns (3 nodes,) of all facets whose middle does not move; None if all may move."""
+    points = rows(surface.global_coordinates()).mean(axis=1)
+    held = foundation.fixed(points, rows(surface.normals).mean(axis=1))
+    if not held.any():
+        return None
+    found = np.zeros((surface.N, 3), dtype=np.bool_)
+    for d in range(3):
+        facets = surface.find[held[:, d]]
+        if len(facets):
+            found[surface.get_dofs(facets=facets).flatten(), d] = True
+    return found.ravel()
+
+
+def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
+    """Without the entries that couple fixed unknowns to any other."""
+    if fixed is None:
+        return matrix
+    found = matrix.tocoo()
+    kept = ~(fixed[found.row] | fixed[found.col]) | (found.row == found.col)
+    entries = (found.data[kept], (found.row[kept], found.col[kept]))
+    return csc_array(coo_array(entries, shape=found.shape))
+
+
+def composed(nodes: Any, tissue: Tissue) -> Composition | None:
+    """What the cells of a basis are made of, curved ones as they are; None for one tissue."""
+    inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
+
+    def points(cells: slice) -> Floats:
+        numbers = np.arange(cells.start, cells.stop)
+        return np.moveaxis(np.asarray(nodes.mapping.F(inside, tind=numbers)), 0, -1)
+
+    return composition(tissue, int(nodes.mesh.nelements), points)
+
+
+def _mass(nodes: Any, where: Pattern, tissue: Tissue, made: Composition | None) -> csr_array:
+    """Of one component [kg]."""
+    if made is None:
+        return tissue.density * products(nodes, where)
+    return products(nodes, where, made.density(tissue.density))
+
+
+def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
+    """Lame's constants [Pa] to go with values (cells, q): of one tissue, or of each cell."""
+    if made is None:
+        return Moduli(*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
+    found = made.moduli(tissue)
+    return Moduli(found.lame[:, None], found.shear[:, None])
 
 
 def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
@@ -140,16 +231,20 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
     Mass, support and load stay. ValueError for a Poisson ratio that no solid has, and for an
     element with other nodes.
     """
-    name = chosen_element(element, tissue.poisson_ratio)
+    name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
     if ELEMENTS[name].shapes is not ELEMENTS[body.element].shapes:
         raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
-    own = _elastic(body.gradients, body.nodes, name, tissue, body.stiffness.pressure)
-    return replace(body, element=name, stiffness=_held(own, body.support))
+    pressure = body.stiffness.pressure
+    own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
+    return replace(body, element=name, stiffness=_held(own, body.support, body.fixed))
 
 
-def _held(own: Stiffness, support: csc_array) -> Stiffness:
-    """With the support in it, whose nodes are of cells too; the matrix is changed, not copied."""
+def _held(own: Stiffness, support: csc_array, fixed: Booleans | None) -> Stiffness:
+    """With the support in it, whose nodes are of cells too, and fixed unknowns coupled to nothing.
+
+    The matrix is changed, not copied.
+    """
     matrix, nodal = own.matrix, coo_array(support[::3, ::3])
     rows = np.repeat(np.arange(nodal.shape[0]), np.diff(matrix.indptr))
     places, wanted = (
@@ -158,13 +253,24 @@ def _held(own: Stiffness, support: csc_array) -> Stiffness:
     )
     entries = np.searchsorted(places, wanted)
     matrix.data[entries] += nodal.data[:, None, None] * np.eye(3)
-    return own
+    if fixed is None:
+        return own
+    free = ~fixed.reshape(-1, 3)
+    of_nodes = np.flatnonzero(rows == matrix.indices)
+    own_stiffness = np.einsum("nii->ni", matrix.data[of_nodes])
+    matrix.data *= free[rows][:, :, None] & free[matrix.indices][:, None, :]
+    for d in range(3):
+        matrix.data[of_nodes, d, d] = own_stiffness[:, d]
+    if own.pressure is None:
+        return own
+    divergence = csc_array(own.pressure.divergence @ diags_array(free.ravel().astype(float)))
+    return Stiffness(matrix, replace(own.pressure, divergence=divergence))
 
 
 def loaded_surface(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
@@ -173,7 +279,7 @@ def loaded_surface(
 
     All that `discretise` refuses is refused here, where next to nothing is computed.
     """
-    name = chosen_element(element, tissue.poisson_ratio)
+    name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
     _refuse_flat(mesh)
     kind = ELEMENTS[name]
@@ -184,11 +290,14 @@ def loaded_surface(
     return name, surface
 
 
-def _refuse_untouched(surface: Any, foundation: Foundation, tool: ToolPatch) -> None:
+def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:
     """ValueError if no integration point of the facets is held, or pushed."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     coarse = f"on a mesh of {surface.mesh.nelements} tetrahedra"
-    if not foundation.density(points, normals).any():
+    if not (
+        foundation.density(points, normals).any()
+        or foundation.fixed(points.mean(axis=1), normals.mean(axis=1)).any()
+    ):
         raise ValueError(
             f"support: holds no surface {coarse}; enlarge support.depth, or reduce "
             "reference.element_size"
@@ -220,7 +329,7 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
     nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), mapping(grid), intorder=_order(grid, name))
-    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue)
+    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue, composed(nodes, tissue))
 
 
 def _order(grid: Any, name: ElementName) -> int:
@@ -240,9 +349,12 @@ def _elastic(
     nodes: Any,
     name: ElementName,
     tissue: Tissue,
+    made: Composition | None = None,
     pressure: Pressure | None = None,
 ) -> Stiffness:
     """Stiffness without support from its integrals, and from those of a pressure if there are."""
+    if made is not None:
+        return _varied(nodes, name, tissue, made)
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
     mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
     matrix = _isotropic(integrals, 0.0 if mixed else lame, mu)
@@ -252,8 +364,35 @@ def _elastic(
     return Stiffness(matrix, Pressure(*known, lame, mu))
 
 
-def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
-    """One rule for both: the product of a divergence and a pressure, and of two pressures."""
+def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
+    """The same of cells with moduli of their own, by which the integrals are weighed.
+
+    A continuous pressure does not follow one that jumps where tissue changes, and is smeared over
+    the elements there. ValueError beside a pressure for tissue that it says nothing of.
+    """
+    where, by_gradient = pattern(nodes), _by_order(nodes, _order(nodes.mesh, name))
+    lame, mu = made.moduli(tissue)
+    by_shear = gradients(by_gradient, where, mu)
+    if not ELEMENTS[name].mixed:
+        return Stiffness(_isotropic(by_shear, 1.0, 1.0, gradients(by_gradient, where, lame)))
+    if not (lame > ROUNDING * mu).all():
+        raise ValueError(
+            "tissue.inclusion: a Poisson ratio of 0 has no pressure; enlarge its poisson_ratio, or "
+            "set reference.element to p2"
+        )
+    around, shear = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
+    coupling, mass = _pressure(nodes, name, around / lame)
+    _, schur = _pressure(nodes, name, 1.0 / lame + 1.0 / mu)
+    return Stiffness(_isotropic(by_shear, 0.0, 1.0), Pressure(coupling, mass, around, shear, schur))
+
+
+def _pressure(
+    nodes: Any, name: ElementName, density: Floats | None = None
+) -> tuple[csc_array, csc_array]:
+    """One rule for both: the product of a divergence and a pressure, and of two pressures.
+
+    The second times a density (cells,), where one is given.
+    """
     grid, order = nodes.mesh, _order(nodes.mesh, name)
     pressure = skfem.Basis(grid, skfem.ElementTetP1(), nodes.mapping, intorder=order)
     basis = _by_order(nodes, order)
@@ -261,14 +400,19 @@ def _pressure(nodes: Any, name: ElementName) -> tuple[csc_array, csc_array]:
     parts = [_finite(one.assemble(basis, pressure), "the coupling") for one in forms]
     by_node = np.arange(3 * basis.N).reshape(3, -1).T.ravel()
     coupling = csc_array(csc_array(hstack(parts, format="csc"))[:, by_node])
-    return coupling, csc_array(products(pressure, pattern(pressure)))
+    return coupling, csc_array(products(pressure, pattern(pressure), density))
 
 
-def _isotropic(integrals: Gradients, lame: float, mu: float) -> bsr_array:
-    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well."""
+def _isotropic(
+    integrals: Gradients, lame: float, mu: float, by_lame: Gradients | None = None
+) -> bsr_array:
+    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well.
+
+    `by_lame`: other integrals to go with lambda.
+    """
     D = integrals.values
     blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
-    blocks += lame * D
+    blocks += lame * (integrals if by_lame is None else by_lame).values
     diagonal = np.einsum("nii->ni", blocks)
     diagonal += mu * np.einsum("nii->n", D)[:, None]
     if not np.isfinite(blocks).all():
@@ -289,7 +433,7 @@ def _finite(matrix: Any, name: str) -> csc_array:
     return csc_array(matrix)
 
 
-def _foundation_form(foundation: Foundation) -> Any:
+def _foundation_form(foundation: Support) -> Any:
     return skfem.BilinearForm(lambda u, v, w: foundation.density(rows(w.x), rows(w.n)) * u * v)
 
 

@@ -56,20 +56,25 @@ def pattern(basis: Any) -> Pattern:
     return Pattern(indptr, (keys % basis.N).astype(np.int32), place.reshape(pairs.shape))
 
 
-def products(basis: Any, where: Pattern) -> csr_array:
-    """Integrals [m^3] of u v."""
+def products(basis: Any, where: Pattern, density: Floats | None = None) -> csr_array:
+    """Integrals [m^3] of u v, or of these times a density (cells,)."""
     values = np.stack([np.asarray(one[0])[0] for one in basis.basis], axis=-1)
     pairs = (values[:, :, None] * values[:, None, :]).reshape(len(values), -1)
-    entries = where.summed(basis.dx @ pairs)
+    entries = where.summed(_weighed(basis, density) @ pairs)
     return csr_array((entries, where.indices, where.indptr), shape=(basis.N, basis.N))
 
 
-def gradients(basis: Any, where: Pattern) -> Gradients:
-    """Integrals of the products of all pairs of derivatives."""
+def gradients(basis: Any, where: Pattern, density: Floats | None = None) -> Gradients:
+    """Integrals of the products of all pairs of derivatives, times a density (cells,) if given."""
+    weights = _weighed(basis, density)[..., None]
     slopes = [np.stack([one[0].grad[i] for one in basis.basis], axis=-1) for i in range(3)]
     found = np.empty((len(where.indices), 3, 3))
     for i, tested in enumerate(slopes):
-        weighted = (tested * basis.dx[..., None]).mT
+        weighted = (tested * weights).mT
         for j, tried in enumerate(slopes):
             found[:, i, j] = where.summed(weighted @ tried)
     return Gradients(where.indptr, where.indices, found)
+
+
+def _weighed(basis: Any, density: Floats | None) -> Any:
+    return basis.dx if density is None else basis.dx * density[:, None]

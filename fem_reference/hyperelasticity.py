@@ -13,24 +13,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
-from skfem.models.elasticity import lame_parameters
 
-from fem_reference.elasticity import Body, rows
+from fem_reference.elasticity import Body, Booleans, cell_moduli, decoupled, rows
 from fem_reference.elements import ELEMENTS
 from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
 from study.problem.tissue import Tissue
+from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def material(tissue: Tissue, law: str | Law) -> Law:
-    """The tissue's Lame constants in a law, or the law given. ValueError for an unknown name."""
+def material(tissue: Tissue, law: str | Law, made: Composition | None = None) -> Law:
+    """The tissue's Lame constants in a law, or the law given. ValueError for an unknown name.
+
+    Those of each cell where it is made of several tissues.
+    """
     if not isinstance(law, str):
         return law
     if law not in LAWS:
         raise ValueError(f"law: {law!r} is unknown; give {' or '.join(LAWS)}")
-    return LAWS[law](*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
+    return LAWS[law](*cell_moduli(made, tissue))
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class HyperelasticSolid:
     """The strain and support energy of a body as a function of its displacement u [m] (n,).
 
     `slopes` (t, q, 3, a): derivatives [1/m] of the a shape functions of tetrahedron t at its
-    integration points q, whose `weights` [m^3] are (t, q); `unknowns` (t, a, 3): places in u.
+    integration points q, whose `weights` [m^3] are (t, q); `unknowns` (t, a, 3): places in u, of
+    which those that are `fixed` (n,) feel no force and have a stiffness of their own.
     """
 
     law: Law
@@ -47,6 +51,7 @@ class HyperelasticSolid:
     unknowns: Ints
     support: csc_array
     load: Floats
+    fixed: Booleans | None = None
 
     def deformation(self, u: Floats) -> Floats:
         """Deformation gradient F at the integration points, shape (t, q, 3, 3)."""
@@ -63,7 +68,10 @@ class HyperelasticSolid:
         stress = self.law.stress(self.deformation(u)) * self.weights[..., None, None]
         nodal = _flat(self.slopes).mT @ _flat(stress.mT)
         found = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(u))
-        return np.asarray(found + self.support @ u)
+        force = found + self.support @ u
+        if self.fixed is not None:
+            force[self.fixed] = 0.0
+        return np.asarray(force)
 
     def tangent(self, u: Floats) -> csc_array:
         """Second derivative [N/m] of the energy, shape (n, n)."""
@@ -73,7 +81,8 @@ class HyperelasticSolid:
         unknowns = self.unknowns.reshape(-1, count)
         places = (np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel())
         entries = (blocks.ravel(), places)
-        return csc_array(coo_array(entries, shape=(len(u), len(u)))) + self.support
+        whole = csc_array(coo_array(entries, shape=(len(u), len(u)))) + self.support
+        return decoupled(whole, self.fixed)
 
 
 def _flat(values: Floats) -> Floats:
@@ -112,7 +121,13 @@ def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticS
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     return HyperelasticSolid(
-        material(tissue, law), slopes, nodes.dx, unknowns, body.support, body.whole_load
+        material(tissue, law, body.composition),
+        slopes,
+        nodes.dx,
+        unknowns,
+        body.support,
+        body.whole_load,
+        body.fixed,
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, bsr_matrix, csc_array, csr_array
+from scipy.sparse import bsr_array, bsr_matrix, csr_array
 from scipy.sparse.linalg import LinearOperator, cg, minres
 
 from fem_reference.direct import IMBALANCE, Solve, factorised
@@ -135,8 +135,7 @@ def iterative(body: Body, tolerance: float) -> Solver:
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
         return _solver(cg, body.stiffness.matrix, inner, tolerance)
-    # The Schur complement is equivalent to the pressure's mass over the shear modulus, at any nu.
-    schur = factorised(csc_array((1.0 / pressure.shear + 1.0 / pressure.lame) * pressure.mass))
+    schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
 
     def both(residual: Floats) -> Floats:

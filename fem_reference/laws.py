@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,8 @@ class NeoHookean:
     Poisson ratio near 1/2 does not come near.
     """
 
-    lame: float
-    shear: float
+    lame: Any
+    shear: Any
 
     def energy(self, F: Floats) -> Floats:
         """Energy density."""
@@ -53,15 +53,17 @@ class NeoHookean:
     def stress(self, F: Floats) -> Floats:
         """P = mu F + (lambda ln J - mu) F^-T."""
         pressure = self.lame * np.log(np.linalg.det(F)) - self.shear
-        return np.asarray(self.shear * F + pressure[..., None, None] * _inverse_transpose(F))
+        return np.asarray(
+            _over(self.shear, 2) * F + pressure[..., None, None] * _inverse_transpose(F)
+        )
 
     def tangent(self, F: Floats) -> Floats:
         """d(F^-T)_iJ / dF_kL = -F^-T_iL F^-T_kJ does the rest."""
         G = _inverse_transpose(F)
         pressure = self.lame * np.log(np.linalg.det(F)) - self.shear
         return np.asarray(
-            self.shear * np.einsum("ik,JL->iJkL", IDENTITY, IDENTITY)
-            + self.lame * np.einsum("...iJ,...kL->...iJkL", G, G)
+            _over(self.shear, 4) * np.einsum("ik,JL->iJkL", IDENTITY, IDENTITY)
+            + _over(self.lame, 4) * np.einsum("...iJ,...kL->...iJkL", G, G)
             - pressure[..., None, None, None, None] * np.einsum("...iL,...kJ->...iJkL", G, G)
         )
 
@@ -74,8 +76,8 @@ class StVenantKirchhoff:
     gives way at a stretch of 1/sqrt(3), and a volume squeezed to nothing costs a finite energy.
     """
 
-    lame: float
-    shear: float
+    lame: Any
+    shear: Any
 
     def energy(self, F: Floats) -> Floats:
         """Energy density."""
@@ -92,15 +94,22 @@ class StVenantKirchhoff:
         left = F @ np.swapaxes(F, -2, -1)
         return np.asarray(
             np.einsum("ik,...JL->...iJkL", IDENTITY, self._second_stress(F))
-            + self.lame * np.einsum("...iJ,...kL->...iJkL", F, F)
-            + self.shear * np.einsum("...iL,...kJ->...iJkL", F, F)
-            + self.shear * np.einsum("...ik,JL->...iJkL", left, IDENTITY)
+            + _over(self.lame, 4) * np.einsum("...iJ,...kL->...iJkL", F, F)
+            + _over(self.shear, 4) * np.einsum("...iL,...kJ->...iJkL", F, F)
+            + _over(self.shear, 4) * np.einsum("...ik,JL->...iJkL", left, IDENTITY)
         )
 
     def _second_stress(self, F: Floats) -> Floats:
         strain = _green_lagrange(F)
         volume = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
-        return np.asarray(self.lame * volume * IDENTITY + 2.0 * self.shear * strain)
+        return np.asarray(
+            _over(self.lame, 2) * volume * IDENTITY + 2.0 * _over(self.shear, 2) * strain
+        )
+
+
+def _over(constant: Any, axes: int) -> Floats:
+    """A constant, or one of each cell (cells, 1), to go with so many axes more."""
+    return np.asarray(constant)[(..., *axes * (None,))]
 
 
 def _inverse_transpose(F: Floats) -> Floats:
@@ -111,11 +120,11 @@ def _green_lagrange(F: Floats) -> Floats:
     return np.asarray(0.5 * (np.swapaxes(F, -2, -1) @ F - IDENTITY))
 
 
-LAWS: dict[str, Callable[[float, float], Law]] = {
+LAWS: dict[str, Callable[[Any, Any], Law]] = {
     "neo-hookean": NeoHookean,
     "st-venant-kirchhoff": StVenantKirchhoff,
 }
-"""Laws by name, each from Lame's constants lambda and mu [Pa]."""
+"""Laws by name, each from Lame's constants lambda and mu [Pa], or those of each cell (cells, 1)."""
 DEFAULT = "neo-hookean"
 NONE = "none"
 LARGE_STRAIN = (*LAWS, NONE)

@@ -45,7 +45,7 @@ def refuse_too_large(
     mesh: TetrahedralMesh, tissue: Tissue, element: str, *, stepping: bool
 ) -> None:
     """ValueError with the size of elements that would fit."""
-    name = chosen_element(element, tissue.poisson_ratio)
+    name = chosen_element(element, tissue.highest_poisson_ratio)
     count = unknowns(mesh, name)
     limit, wanted = SHARE * available(), needed(count, name, stepping=stepping)
     if wanted > limit:

@@ -31,8 +31,9 @@ from fem_reference.superposition import (
     superposed,
 )
 from study.mesh.kinds import TetrahedralMesh
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation, Trajectory
 
@@ -201,7 +202,7 @@ METHODS: dict[str, MotionMethod] = {
 def build(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
@@ -215,7 +216,7 @@ def build(
 def refuse(
     mesh: TetrahedralMesh,
     tissue: Tissue,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,

@@ -17,10 +17,9 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import cg
-from skfem.models.elasticity import lame_parameters
 
 from fem_reference.direct import Solve
-from fem_reference.elasticity import Body, rows
+from fem_reference.elasticity import Body, cell_moduli, rows
 from fem_reference.grid import Projection
 from study.problem.tissue import Tissue
 
@@ -105,7 +104,7 @@ def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
     With a pressure of its own the volume's part is left out: it is found as well as the shear, and
     would drown in rounding.
     """
-    lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
+    lame, mu = cell_moduli(body.composition, tissue)
     density = 2.0 * mu * np.einsum("ijcq,ijcq->cq", a, b)
     if body.stiffness.pressure is None:
         density += lame * np.einsum("iicq,jjcq->cq", a, b)

@@ -20,13 +20,27 @@ class Pressure:
     """The pressure p = lambda div u of mixed elements, by its own shape functions.
 
     `divergence` [m^2] (pressures, n) and `mass` [m^3] (pressures, pressures) integrate them with
-    div u and with each other; `lame` is lambda [Pa], `shear` the shear modulus [Pa].
+    div u and with each other; `lame` is lambda [Pa], `shear` the shear modulus [Pa]. Of tissue that
+    differs from place to place these are those of the tissue around; `mass` integrates with
+    `lame` over lambda, and `varied_schur`
+    [m^3/Pa] with 1 / lambda + 1 / mu.
     """
 
     divergence: csc_array
     mass: csc_array
     lame: float
     shear: float
+    varied_schur: csc_array | None = None
+
+    @property
+    def schur(self) -> csc_array:
+        """Integrals of products of pressures over lambda and over the shear modulus, summed.
+
+        The complement of the displacements is equivalent to it at any Poisson ratio.
+        """
+        if self.varied_schur is not None:
+            return self.varied_schur
+        return csc_array((1.0 / self.shear + 1.0 / self.lame) * self.mass)
 
     def of(self, u: Floats) -> Floats:
         """Nodal pressures [Pa]."""

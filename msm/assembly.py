@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +12,22 @@ from scipy.sparse import csr_array, diags_array
 
 from msm import lattice as cells
 from msm import volume as volumes
-from msm.calibration import SPRING_POISSON_RATIO
+from msm.calibration import SPRING_POISSON_RATIO, lame
 from msm.damping import UNDAMPED, NodalDamping
-from msm.lattice import LatticeMesh
+from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import SolidShape
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
+from study.problem.supports import Support
+from study.problem.tissue import Tissue
+from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,9 @@ class Assembly:
     """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
     `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    `composition`: what each cell is made of, None where all are of one tissue; `connect`: the
+    springs for a stiffness (c,) of each cell relative to that of the law; `fixed` (n, 3): which
+    components of nodes do not move, None where all may. They are without load.
     """
 
     lattice: LatticeMesh
@@ -36,6 +45,9 @@ class Assembly:
     mass: Floats
     foundation: csr_array
     load: Floats
+    composition: Composition | None = None
+    connect: Callable[[Floats], Springs] | None = None
+    fixed: Booleans | None = None
 
 
 @dataclass(frozen=True)
@@ -57,38 +69,88 @@ def assemble(
     surface: SurfaceRule,
     density: float,
     spacing: float,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
     flexion: float = 0.0,
     body_diagonals: float = 0.0,
+    tissue: Tissue | None = None,
 ) -> Assembly:
-    """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool."""
+    """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool.
+
+    `tissue`: what differs from place to place, if anything; `density` is that around.
+    """
     margin = 1e-9 * np.ptp(surface.points, axis=0).max()
     lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
     lattice = cells.build(body, lower, upper, spacing)
     weights, _ = lattice.interpolation(surface.points)
-    return Assembly(
+    made = cells.composed(lattice, tissue)
+    whole = Assembly(
         lattice,
         connect(lattice, flexion, body_diagonals),
-        density * cells.node_volumes(lattice),
+        _mass(lattice, density, made),
         *contact(weights, surface, foundation, tool),
+        made,
+        partial(connect, lattice, flexion, body_diagonals),
     )
+    return held(whole, weights, surface, foundation)
+
+
+def held(
+    assembly: Assembly, weights: csr_array, surface: SurfaceRule, support: Support
+) -> Assembly:
+    """With the nodes fixed that are nearest to a fixed point of the surface.
+
+    By weights (q, n) at the points of the surface; a node may lie half a cell from it.
+    """
+    fixed = support.fixed(surface.points, surface.normals)
+    if not fixed.any():
+        return assembly
+    nearest = np.asarray(weights.argmax(axis=1)).ravel()
+    nodes = np.zeros((weights.shape[1], 3), dtype=np.bool_)
+    for d in range(3):
+        nodes[nearest[fixed[:, d]], d] = True
+    return replace(assembly, fixed=nodes, load=np.where(nodes, 0.0, assembly.load))
+
+
+def _mass(lattice: CellLattice, density: float, made: Composition | None) -> Floats:
+    """Of the nodes [kg] (n,)."""
+    if made is None:
+        return np.asarray(density * cells.node_volumes(lattice))
+    return cells.at_nodes(lattice, lattice.fill * made.density(density))
+
+
+def of_tissue(assembly: Assembly, material: Material, modulus: float) -> tuple[Assembly, Material]:
+    """The lattice with what its cells are made of, round which the material has a modulus [Pa].
+
+    Springs are as stiff as the mean shear modulus of each cell, whatever their law, which all parts
+    share. With a volume term regions have their own Poisson ratio, without it 1/4 as all springs.
+    The same lattice and material of one tissue. ValueError for a region with a ratio below 1/4.
+    """
+    made, nu = assembly.composition, material.poisson_ratio
+    term = material.volume
+    if made is None or assembly.connect is None:
+        return assembly, material
+    found = made.moduli(Tissue(youngs_modulus=modulus, poisson_ratio=nu), one_ratio=term is None)
+    springs = assembly.connect(found.shear / lame(modulus, nu)[1])
+    if term is not None and isinstance(assembly.lattice, CellLattice):
+        term = volumes.of_cells(assembly.lattice, found.lame - found.shear, nu)
+    return replace(assembly, springs=springs), replace(material, volume=term)
 
 
 def contact(
-    weights: csr_array, surface: SurfaceRule, foundation: Foundation, tool: ToolPatch
+    weights: csr_array, surface: SurfaceRule, foundation: Support, tool: ToolPatch
 ) -> tuple[csr_array, Floats]:
     """Foundation [N/m] (n, n) and load [N] (n, 3) that nodes take by weights (q, n).
 
     ValueError if nothing is held, or touched by the tool.
     """
-    held = foundation.density(surface.points, surface.normals) * surface.weights
+    resting = foundation.density(surface.points, surface.normals) * surface.weights
     pushed = tool.profile(surface.points, surface.normals) * surface.weights
-    if not held.any():
+    if not (resting.any() or foundation.fixed(surface.points, surface.normals).any()):
         raise ValueError("the support holds no surface; enlarge support.depth")
     if not pushed.any():
         raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
-    support = csr_array(weights.T @ diags_array(held) @ weights)
+    support = csr_array(weights.T @ diags_array(resting) @ weights)
     nodal = weights.T @ (pushed * tool.force / pushed.sum())
     return support, np.outer(nodal, tool.direction)
 
@@ -104,4 +166,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         volume,
         material.damping,
         linear=linear,
+        fixed=assembly.fixed,
     )

@@ -30,6 +30,14 @@ def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
         add_spring_forces(law, net, u, force)
         add_volume_forces(net, u, force)
     add_foundation_forces(net, u, force)
+    hold(net.fixed, force)
+
+
+@inner_kernel()
+def hold(fixed: Any, force: Floats) -> None:
+    """Set to zero what acts on fixed components (f, 2) of nodes."""
+    for f in range(fixed.shape[0]):
+        force[fixed[f, 0], fixed[f, 1]] = 0.0
 
 
 @kernel()

@@ -40,7 +40,7 @@ class Grid(NamedTuple):
     `mass`, `gamma_0`, `gamma_1` as in `Network`, `kept` and `share`, which integrators fill;
     `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement. `beta`
     [s] and `linear` as in `Network`, but None for no: kernels are compiled without what is not
-    wanted.
+    wanted. `fixed` (f, 2): component and place of what does not move.
     """
 
     lanes: Lanes
@@ -70,6 +70,7 @@ class Grid(NamedTuple):
     uneven: bool
     beta: float | None
     linear: Literal[True] | None
+    fixed: Ints
 
 
 def grid_of(
@@ -124,6 +125,7 @@ def grid_of(
         uneven=bool(net.gamma_1.any()),
         beta=net.beta or None,
         linear=True if net.linear else None,
+        fixed=np.stack([net.fixed[:, 1], place[net.fixed[:, 0]]], axis=1).astype(np.int64),
     )
     return _rounded(grid) if single else grid
 

@@ -13,6 +13,8 @@ from scipy.spatial import KDTree
 
 from msm.kinematics import inverted_cells
 from study.organ.occupancy import SolidShape
+from study.problem.tissue import Tissue
+from study.problem.varied import Composition, composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -118,9 +120,29 @@ def _fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: floa
 
 def node_volumes(lattice: CellLattice) -> Floats:
     """Volume [m^3] of the body that each node stands for, shape (n,)."""
-    share = np.repeat(lattice.fill * lattice.spacing**3 / 8.0, 8)
+    return at_nodes(lattice, lattice.fill)
+
+
+def at_nodes(lattice: CellLattice, density: Floats) -> Floats:
+    """An eighth of a density (c,) times a cell's volume, of all cells at a node, shape (n,)."""
+    share = np.repeat(density * lattice.spacing**3 / 8.0, 8)
     volumes = np.bincount(lattice.cells.ravel(), weights=share, minlength=len(lattice.nodes))
     return volumes.astype(np.float64)
+
+
+def composed(lattice: CellLattice, tissue: Tissue | None) -> Composition | None:
+    """What each cell is made of, were it whole; None for tissue that is the same everywhere.
+
+    From as many points of each cell as tell how full it is.
+    """
+    s = SAMPLES_PER_EDGE
+    inside = np.stack(np.meshgrid(*[(np.arange(s) + 0.5) / s] * 3, indexing="ij"), axis=-1)
+
+    def points(cells: slice) -> Floats:
+        corners = lattice.index[cells][:, None, :]
+        return np.asarray(lattice.origin + lattice.spacing * (corners + inside.reshape(-1, 3)))
+
+    return composition(tissue, len(lattice.cells), points)
 
 
 def interpolation(lattice: CellLattice, points: Floats) -> tuple[csr_array, int]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.assembly import Assembly, Material, arrays, assemble
+from msm.assembly import Assembly, Material, arrays, assemble, of_tissue
 from msm.checkpoint import Checkpoint, Keeper, identity, program
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
@@ -38,6 +38,7 @@ __all__ = [
     "arrays",
     "assemble",
     "critical_time_step",
+    "of_tissue",
     "refuse",
     "run",
     "static_displacement",

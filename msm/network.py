@@ -23,7 +23,8 @@ class Network(NamedTuple):
     times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
     [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
     springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
-    `load` [N] (n, 3). `linear`: forces of small displacements.
+    `load` [N] (n, 3). `linear`: forces of small displacements. `fixed` (f, 2) uint32: node and
+    component of each displacement that does not change, on which no force acts.
     """
 
     ends: NDArray[np.uint32]
@@ -42,6 +43,7 @@ class Network(NamedTuple):
     value: Floats
     load: Floats
     linear: bool
+    fixed: NDArray[np.uint32] = np.zeros((0, 2), dtype=np.uint32)
 
 
 def network(
@@ -53,9 +55,14 @@ def network(
     damping: NodalDamping,
     *,
     linear: bool = False,
+    fixed: NDArray[np.bool_] | None = None,
 ) -> Network:
-    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3)."""
+    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
+
+    `fixed` (n, 3): components of the nodes that do not move.
+    """
     length = springs.rest_length
+    held = np.zeros_like(load, dtype=np.bool_) if fixed is None else fixed
     return Network(
         ends=np.ascontiguousarray(springs.ends, dtype=np.uint32),
         rest=np.ascontiguousarray(springs.rest),
@@ -71,6 +78,7 @@ def network(
         row=foundation.indptr.astype(np.uint32),
         column=foundation.indices.astype(np.uint32),
         value=foundation.data.astype(np.float64),
-        load=np.ascontiguousarray(load),
+        load=np.where(held, 0.0, load),
         linear=linear,
+        fixed=np.ascontiguousarray(np.argwhere(held), dtype=np.uint32),
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from msm.forces import (
     add_foundation_forces,
     add_linear_volume_forces,
+    hold,
     scatter_pressure,
     volume_change,
 )
@@ -36,6 +37,7 @@ def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, forc
     else:
         add_volume_damping(net, u, ahead, force)
     add_foundation_forces(net, ahead, force)
+    hold(net.fixed, force)
 
 
 @kernel()

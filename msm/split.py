@@ -22,6 +22,7 @@ from msm.forces import (
     add_linear_spring_forces,
     add_spring_forces,
     damping,
+    hold,
     scatter,
 )
 from msm.kernel import kernel
@@ -66,6 +67,7 @@ def other_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     else:
         add_spring_forces(law, net, u, force)
     add_foundation_forces(net, u, force)
+    hold(net.fixed, force)
 
 
 @kernel()
@@ -143,6 +145,7 @@ def spread_pressure(
     for i in range(out.shape[0]):
         for d in range(3):
             out[i, d] *= share / inertia[i]
+    hold(net.fixed, out)
 
 
 @kernel()

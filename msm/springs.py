@@ -44,12 +44,19 @@ class Springs:
         return np.asarray(np.linalg.norm(self.rest, axis=1))
 
 
-def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 0.0) -> Springs:
+def connect(
+    lattice: CellLattice,
+    flexion: float = 0.0,
+    body_diagonals: float = 0.0,
+    stiffness: Floats | None = None,
+) -> Springs:
     """Springs of the lattice.
 
     `flexion`: share of the axial stiffness in flexion springs; `body_diagonals`: share of the shear
-    stiffness in body diagonals. ValueError outside [0, 1] and [0, LARGEST_BODY_SHARE].
+    stiffness in body diagonals; `stiffness` (c,): of each cell relative to the others, 1 by
+    default. ValueError outside [0, 1] and [0, LARGEST_BODY_SHARE].
     """
+    filled = lattice.fill if stiffness is None else lattice.fill * stiffness
     if not 0.0 <= flexion <= 1.0:
         raise ValueError(f"flexion = {flexion:g}: give a share from 0 to 1")
     if not 0.0 <= body_diagonals <= LARGEST_BODY_SHARE:
@@ -58,9 +65,9 @@ def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 
             "without face diagonals layers of nodes could shift in a chequerboard at no cost"
         )
     axial = 1.0 + body_diagonals
-    structural = _cell_springs(lattice, 1, axial / 4.0)
-    face = _cell_springs(lattice, 2, (1.0 - body_diagonals) / 2.0)
-    body = _cell_springs(lattice, 3, 0.75 * body_diagonals)
+    structural = _cell_springs(lattice, filled, 1, axial / 4.0)
+    face = _cell_springs(lattice, filled, 2, (1.0 - body_diagonals) / 2.0)
+    body = _cell_springs(lattice, filled, 3, 0.75 * body_diagonals)
     families = [structural, face, body]
     if flexion > 0.0:
         families[0], second = _with_flexion(lattice, structural, flexion)
@@ -73,7 +80,9 @@ def connect(lattice: CellLattice, flexion: float = 0.0, body_diagonals: float = 
     return Springs(ends, lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]], weight[order])
 
 
-def _cell_springs(lattice: CellLattice, changes: int, share: float) -> tuple[Ints, Floats]:
+def _cell_springs(
+    lattice: CellLattice, filled: Floats, changes: int, share: float
+) -> tuple[Ints, Floats]:
     """Springs between corners that differ in `changes` coordinates, shares of cells added up."""
     pairs = np.array(
         [
@@ -84,7 +93,7 @@ def _cell_springs(lattice: CellLattice, changes: int, share: float) -> tuple[Int
     )
     all_ends = np.sort(lattice.cells[:, pairs].reshape(-1, 2), axis=1)
     ends, spring = np.unique(all_ends, axis=0, return_inverse=True)
-    weight = np.bincount(spring.ravel(), weights=np.repeat(lattice.fill * share, len(pairs)))
+    weight = np.bincount(spring.ravel(), weights=np.repeat(filled * share, len(pairs)))
     return ends, weight.astype(np.float64)
 
 

@@ -129,12 +129,14 @@ def largest_frequency(
     that `start` has a part along. Zero if nothing resists.
     """
     root = np.sqrt(net.mass)[:, None]
+    free = np.ones_like(u)
+    free[net.fixed[:, 0], net.fixed[:, 1]] = 0.0
     tangent = empty_tangent(net)
     linearise(law, net, u, tangent)
 
     def product(x: Any) -> Any:
         force = np.zeros_like(u)
-        add_product(net, tangent, x.reshape(-1, 3) / root, 1.0, force)
+        add_product(net, tangent, free * x.reshape(-1, 3) / root, 1.0, force)
         return (force / root).ravel()
 
     if start is None:

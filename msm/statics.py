@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array, eye_array, kron
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import cg
 
 from msm import volume as volumes
@@ -41,10 +41,21 @@ def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> 
 
 
 def stiffness_at_rest(assembly: Assembly, material: Material) -> csr_array:
-    """Stiffness [N/m] (3 n, 3 n) of springs, volume term and support at rest."""
+    """Stiffness [N/m] (3 n, 3 n) of springs, volume term and support at rest.
+
+    A fixed unknown is coupled to nothing, and has a stiffness of its own.
+    """
     count = len(assembly.mass)
     springs = stiffness_matrix(assembly.springs, count, initial_stiffness(material.law))
     whole = csr_array(springs + kron(assembly.foundation, eye_array(3)))
-    if material.volume is None:
-        return whole
-    return csr_array(whole + volumes.stiffness_matrix(material.volume, count))
+    if material.volume is not None:
+        whole = csr_array(whole + volumes.stiffness_matrix(material.volume, count))
+    return whole if assembly.fixed is None else _decoupled(whole, assembly.fixed.ravel())
+
+
+def _decoupled(matrix: csr_array, fixed: NDArray[np.bool_]) -> csr_array:
+    """Without the entries that couple fixed unknowns (3 n,) to any other."""
+    found = matrix.tocoo()
+    kept = ~(fixed[found.row] | fixed[found.col]) | (found.row == found.col)
+    entries = (found.data[kept], (found.row[kept], found.col[kept]))
+    return csr_array(coo_array(entries, shape=found.shape))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.forces import scatter
+from msm.forces import hold, scatter
 from msm.kernel import inner_kernel, kernel
 from msm.kinematics import cross, dot, gradient_of
 from msm.linearised import spring_state
@@ -105,13 +105,14 @@ def make_definite(at: Tangent) -> None:
 
 @kernel()
 def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
-    """Add `share` times the stiffness times p (n, 3)."""
+    """Add `share` times the stiffness times p (n, 3), zero where a component is fixed."""
     add_spring_product(net, at, p, share, out)
     add_cell_product(net, at, p, share, out)
     for i in range(p.shape[0]):
         for e in range(net.row[i], net.row[i + 1]):
             for d in range(3):
                 out[i, d] += share * net.value[e] * p[net.column[e], d]
+    hold(net.fixed, out)
 
 
 @inner_kernel()

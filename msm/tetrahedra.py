@@ -14,19 +14,23 @@ Refinement cures neither, and no stiffness does. The tests have the figures.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.assembly import Assembly, contact
+from msm.assembly import Assembly, contact, held
 from msm.calibration import reference_stiffness
 from msm.springs import Springs
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import SurfaceRule
 from study.mesh.tetrahedra import EDGES, edges, mean_edge, volumes
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
+from study.problem.supports import Support
+from study.problem.tissue import Tissue
+from study.problem.varied import of_tetrahedra
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -78,39 +82,56 @@ def assemble(
     mesh: TetrahedralMesh,
     surface: SurfaceRule,
     density: float,
-    foundation: Foundation,
+    foundation: Support,
     tool: ToolPatch,
+    tissue: Tissue | None = None,
 ) -> Assembly:
-    """Springs on a mesh. ValueError if it is not held, or not touched by the tool."""
-    lattice = TetrahedralLattice(mesh)
+    """Springs on a mesh. ValueError if it is not held, or not touched by the tool.
+
+    `tissue`: what differs from place to place, if anything; `density` is that around.
+    """
+    lattice, made = TetrahedralLattice(mesh), of_tetrahedra(mesh, tissue)
     weights, _ = lattice.interpolation(surface.points)
-    return Assembly(
+    by_volume = density * node_volumes(mesh)
+    whole = Assembly(
         lattice,
         connect(mesh),
-        density * node_volumes(mesh),
+        by_volume if made is None else at_nodes(mesh, made.density(density)),
         *contact(weights, surface, foundation, tool),
+        made,
+        partial(connect, mesh),
     )
+    return held(whole, weights, surface, foundation)
 
 
-def connect(mesh: TetrahedralMesh) -> Springs:
-    """One spring per edge, weights relative to the reference stiffness at the mean edge."""
+def connect(mesh: TetrahedralMesh, stiffness: Floats | None = None) -> Springs:
+    """One spring per edge, weights relative to the reference stiffness at the mean edge.
+
+    `stiffness` (c,): of each tetrahedron relative to the others, 1 by default.
+    """
     ends = edges(mesh.tetrahedra)
     rest = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
-    weight = _volume_round(mesh, ends) / (rest**2).sum(axis=1)
+    whole = volumes(mesh) if stiffness is None else volumes(mesh) * stiffness
+    weight = _round(mesh, ends, whole) / (rest**2).sum(axis=1)
     return Springs(ends, rest, weight / reference_stiffness(1.0, mean_edge(mesh)))
 
 
-def _volume_round(mesh: TetrahedralMesh, ends: Ints) -> Floats:
-    """Volume [m^3] of the tetrahedra round each edge."""
+def _round(mesh: TetrahedralMesh, ends: Ints, values: Floats) -> Floats:
+    """Sum of the values (c,) of the tetrahedra round each edge."""
     row_major = np.array([len(mesh.points), 1])
     pairs = np.sort(mesh.tetrahedra[:, EDGES], axis=2) @ row_major
     edge = np.searchsorted(ends @ row_major, pairs)
-    share = np.repeat(volumes(mesh), len(EDGES))
+    share = np.repeat(values, len(EDGES))
     return np.bincount(edge.ravel(), weights=share, minlength=len(ends)).astype(np.float64)
 
 
 def node_volumes(mesh: TetrahedralMesh) -> Floats:
     """Volume [m^3] that each node stands for, a quarter of each tetrahedron; shape (n,)."""
-    share = np.repeat(volumes(mesh) / 4.0, 4)
+    return at_nodes(mesh, np.ones(len(mesh.tetrahedra)))
+
+
+def at_nodes(mesh: TetrahedralMesh, density: Floats) -> Floats:
+    """A quarter of a density (c,) times a tetrahedron's volume, of all at a node, shape (n,)."""
+    share = np.repeat(density * volumes(mesh) / 4.0, 4)
     count = len(mesh.points)
     return np.bincount(mesh.tetrahedra.ravel(), share, count).astype(np.float64)

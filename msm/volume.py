@@ -23,6 +23,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+ROUNDING = 1e-9
+"""Of kappa, the difference of two moduli."""
+
+
 @dataclass(frozen=True)
 class VolumeTerm:
     """Cells (c, 8), their kappa V [J] (c,) and edge [m]; no cells means no volume term.
@@ -60,6 +64,20 @@ def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: floa
         )
     first, mu = lame(youngs_modulus, poisson_ratio)
     bulk = (first - mu) * lattice.fill * lattice.spacing**3
+    return VolumeTerm(lattice.cells, bulk, lattice.spacing, poisson_ratio)
+
+
+def of_cells(lattice: CellLattice, kappa: Floats, poisson_ratio: float) -> VolumeTerm:
+    """The term of cells with a kappa [Pa] (c,) each, whose surrounding tissue has the given ratio.
+
+    ValueError where kappa is negative, and swelling would gain energy.
+    """
+    if kappa.min() < -ROUNDING * np.abs(kappa).max():
+        raise ValueError(
+            "tissue.inclusion: a lattice with a volume term has Poisson ratios from "
+            f"{SPRING_POISSON_RATIO}; raise poisson_ratio of the inclusion or leave the term out"
+        )
+    bulk = kappa * lattice.fill * lattice.spacing**3
     return VolumeTerm(lattice.cells, bulk, lattice.spacing, poisson_ratio)
 
 

@@ -25,6 +25,7 @@ from study.folders import replacing
 from study.mesh.kinds import TetrahedralMesh
 from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
+from study.problem.features import FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.results import folder as results
@@ -82,6 +83,7 @@ def export(request: ExportRequest, progress: Progress) -> Path:
     target = _target(request)
     if target.scene.is_point:
         raise ValueError("organ.shape: a point has no finite elements; use liver, block or a mesh")
+    _refuse_unheld(request.to, target.scene)
     folder = (request.out or target.folder).resolve()
     with replacing(folder, _foreign, "export") as partial:
         if request.to in MESHES:
@@ -90,6 +92,14 @@ def export(request: ExportRequest, progress: Progress) -> Path:
             write = _write_vtu if request.to == "vtu" else _write_calculix
             write(target, partial, progress)
     return folder
+
+
+def _refuse_unheld(to: str, scene: Scene) -> None:
+    """ValueError for what a format of one tissue on an elastic foundation has no place for."""
+    beyond = [name for name in ("inclusions", "fixed-surfaces") if name in scene.features]
+    if beyond and to not in MESHES:
+        what = " and ".join(FEATURES[name] for name in beyond)
+        raise ValueError(f"--to {to}: holds no {what}; use one of {', '.join(MESHES)}")
 
 
 def _target(request: ExportRequest) -> _Target:
@@ -162,7 +172,7 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
 
 def _check_memory(level: Level, scene: Scene) -> None:
     """Steps in time factor the matrix, here and in CalculiX."""
-    element = chosen_element(scene.reference.element, scene.tissue.poisson_ratio)
+    element = chosen_element(scene.reference.element, scene.tissue.highest_poisson_ratio)
     count = unknowns(level.mesh, element)
     wanted, limit = needed(count, element, stepping=True), SHARE * available()
     if wanted > limit:

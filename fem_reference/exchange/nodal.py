@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from fem_reference.elasticity import Body
 from study.mesh.tetrahedra import FACES
-from study.problem.contact import Foundation
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -52,7 +52,7 @@ class NodalProblem:
         return bool((offset > 1e-9 * edge).any())
 
 
-def nodal_problem(body: Body, tissue: Tissue, foundation: Foundation) -> NodalProblem:
+def nodal_problem(body: Body, tissue: Tissue, foundation: Support) -> NodalProblem:
     """The problem that a body is, as plain arrays.
 
     ValueError for Taylor-Hood elements: only the displacement elements have counterparts.
@@ -73,7 +73,7 @@ def nodal_problem(body: Body, tissue: Tissue, foundation: Foundation) -> NodalPr
     )
 
 
-def _density(nodes: Floats, elements: Ints, foundation: Foundation) -> Floats:
+def _density(nodes: Floats, elements: Ints, foundation: Support) -> Floats:
     facets = _boundary_facets(elements)
     a, b, c = (nodes[facets[:, i]] for i in range(3))
     doubled = np.cross(b - a, c - a)

@@ -76,4 +76,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     is_reference=True,
     blind_to=("reference", "superposition"),
+    able=frozenset({"inclusions", "fixed-surfaces"}),
 )

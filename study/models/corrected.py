@@ -300,4 +300,10 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, follows_law=True, any_load=False)
+KIND = ModelKind(
+    models=models,
+    assumptions=assumptions,
+    follows_law=True,
+    any_load=False,
+    able=frozenset({"inclusions", "fixed-surfaces"}),
+)

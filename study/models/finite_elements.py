@@ -41,9 +41,10 @@ from study.models.mesh_error import (
 )
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
 from study.organ.geometry import Level
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.progress import Progress
 from study.results.fields import Mesh
@@ -128,7 +129,7 @@ class PreparedElements:
     def _refuse(self, level: Level) -> None:
         fem.refuse(level.mesh, *self._on(), self.model.reference.method)
 
-    def _on(self) -> tuple[Tissue, Foundation, ToolPatch, str, Projection | None]:
+    def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
         """What a body is made of beside its mesh."""
         problem, element = self.problem, self.model.reference.element
         geometry = problem.geometry
@@ -482,6 +483,6 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-ABLE = frozenset({"several-loads", "gravity", "weights"})
+ABLE = frozenset({"several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"})
 
 KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)

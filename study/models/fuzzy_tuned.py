@@ -68,4 +68,5 @@ KIND = ModelKind(
     of_patient=True,
     follows_law=True,
     blind_to=("patient", "fuzzy", "reference", "superposition", "basafa"),
+    able=frozenset({"inclusions", "fixed-surfaces"}),
 )

@@ -18,6 +18,7 @@ from msm.laws import LAWS, force_law_of
 from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, Step
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
+from study.mesh.tetrahedra import volumes
 from study.models.errors import (
     place,
     rounding_checks,
@@ -29,6 +30,7 @@ from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
+from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import Check, CurveErrors, LatticeRecord, ModelRecord
@@ -82,8 +84,8 @@ class LatticeModel:
 
     def prepare(self, problem: Problem) -> PreparedLattice:
         """The lattice on the organ, and its springs."""
-        assembly = assembled(problem, self.lattice)
-        return PreparedLattice(self, problem, assembly, self.make(self.scene, assembly.lattice))
+        plain = assembled(problem, self.lattice)
+        return on_lattice(self, problem, plain, self.make(self.scene, plain.lattice))
 
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
@@ -97,7 +99,11 @@ def assembled(problem: Problem, lattice: Lattice) -> Assembly:
 def _on_mesh(problem: Problem) -> Assembly:
     where = (problem.foundation, problem.tool)
     return tetrahedra.assemble(
-        problem.geometry.mesh, problem.surface_rule, problem.tissue.density, *where
+        problem.geometry.mesh,
+        problem.surface_rule,
+        problem.tissue.density,
+        *where,
+        problem.tissue,
     )
 
 
@@ -112,17 +118,30 @@ def _cubic(problem: Problem, spacing: float, flexion: float, body_diagonals: flo
         problem.tool,
         flexion,
         body_diagonals,
+        problem.tissue,
     )
+
+
+def on_lattice(
+    model: LatticeModel, problem: Problem, plain: Assembly, made: SpringMaterial
+) -> PreparedLattice:
+    """Springs on a lattice of one tissue, stiffer or softer where that of the problem is.
+
+    An estimate of stiffness is of the tissue around; inclusions keep theirs.
+    """
+    assembly, material = msm.of_tissue(plain, made.material, made.modulus)
+    return PreparedLattice(model, problem, assembly, replace(made, material=material), plain)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedLattice:
-    """A lattice on its organ."""
+    """A lattice on its organ; `plain`: the same of one tissue, which other springs start from."""
 
     model: LatticeModel
     problem: Problem
     assembly: Assembly
     springs: SpringMaterial
+    plain: Assembly
 
     @property
     def linear(self) -> bool:
@@ -157,7 +176,8 @@ class PreparedLattice:
 
     def _with(self, make: Make) -> PreparedLattice:
         """The same lattice of other springs."""
-        return replace(self, springs=make(self.model.scene, self.assembly.lattice))
+        made = make(self.model.scene, self.assembly.lattice)
+        return on_lattice(self.model, self.problem, self.plain, made)
 
     def describe(self) -> list[str]:
         """Nodes and springs, then modulus, critical step and damping."""
@@ -304,7 +324,7 @@ class PreparedLattice:
         )
 
     def _mass(self) -> Check:
-        expected = self.problem.geometry.volume * self.problem.tissue.density
+        expected = _mass_of(self.problem)
         return Check(
             name="lattice: mass",
             value=abs(float(self.assembly.mass.sum()) / expected - 1.0),
@@ -358,6 +378,15 @@ class PreparedLattice:
         if self.model.lattice.springs == "tetrahedra":
             return float(self.assembly.mass.mean())
         return self.problem.tissue.density * self.model.lattice.spacing**3
+
+
+def _mass_of(problem: Problem) -> float:
+    """Of the organ [kg] on its mesh."""
+    density, mesh = problem.tissue.density, problem.geometry.mesh
+    made = of_tetrahedra(mesh, problem.tissue)
+    if made is None:
+        return problem.geometry.volume * density
+    return float(volumes(mesh) @ made.density(density))
 
 
 def asked_step(lattice: Lattice) -> Step:

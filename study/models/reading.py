@@ -56,4 +56,5 @@ KIND = ModelKind(
     of_patient=True,
     follows_law=True,
     blind_to=("fuzzy", "reference", "superposition", "basafa"),
+    able=frozenset({"inclusions", "fixed-surfaces"}),
 )

@@ -29,9 +29,10 @@ from study.models.certified import Certified, bound_on_demand, certified
 from study.models.damping import reference_damping
 from study.models.errors import estimated_run
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.results.records import ElementsRecord
 from study.scene import Scene
@@ -89,7 +90,7 @@ class PreparedSuperposition:
         """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
         fem.refuse(self.mesh, *self._on())
 
-    def _on(self) -> tuple[Tissue, Foundation, ToolPatch, str, Projection | None]:
+    def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
         """What the body is made of beside its mesh."""
         problem, element = self.problem, self.model.element
         geometry = problem.geometry
@@ -122,7 +123,7 @@ class PreparedSuperposition:
     def describe(self) -> list[str]:
         """Unknowns and vectors, and those that certify its error."""
         kind = "Ritz vectors" if self.model.vectors == "ritz" else "modes and the rest"
-        element = chosen_element(self.model.element, self.problem.tissue.poisson_ratio)
+        element = chosen_element(self.model.element, self.problem.tissue.highest_poisson_ratio)
         size = unknowns(self.mesh, element)
         lines = [f"{self.model.name}: {self.model.count} {kind} of {size} unknowns"]
         if self.model.certificate:
@@ -225,4 +226,9 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, any_load=False)
+KIND = ModelKind(
+    models=models,
+    assumptions=assumptions,
+    any_load=False,
+    able=frozenset({"inclusions", "fixed-surfaces"}),
+)

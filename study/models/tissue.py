@@ -63,4 +63,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     blind_to=("reference", "superposition", "basafa"),
+    able=frozenset({"inclusions", "fixed-surfaces"}),
 )

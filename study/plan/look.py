@@ -109,7 +109,7 @@ def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...],
     strain = 0.0
     for level in LEVELS:
         at = problem.geometry.level(level)
-        element = chosen_element(scene.reference.element, problem.tissue.poisson_ratio)
+        element = chosen_element(scene.reference.element, problem.tissue.highest_poisson_ratio)
         if at is None or (found and unknowns(at.mesh, element) > MOST_UNKNOWNS):
             continue
         prepared = reference_of(scene).varied(level=level).prepare(problem)

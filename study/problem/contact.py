@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+SIDEWAYS = 1e-6
+"""Cosine up to which a surface faces to the side of a direction, but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -16,13 +19,15 @@ class Foundation:
     """Winkler foundation of the surface that faces `outward`, near its extreme plane.
 
     `level`: largest coordinate [m] of the organ along `outward`; `depth` [m]: where it ends;
-    `stiffness` [Pa/m]: traction per displacement of a surface that squarely faces `outward`.
+    `stiffness` [Pa/m]: traction per displacement of a surface that squarely faces `outward`. With a
+    `centre` [m] (3,) it is the surface within `depth` of that instead, whichever way it faces.
     """
 
     outward: Floats
     level: float
     depth: float
     stiffness: float
+    centre: Floats | None = None
 
     def density(self, points: Floats, normals: Floats) -> Floats:
         """Stiffness per area [Pa/m] at points (..., 3) with outward normals (..., 3).
@@ -30,10 +35,34 @@ class Foundation:
         Area counts by its projection on the side. Over the deeper half of the depth the stiffness
         fades to zero without a kink, so that integrals converge under refinement.
         """
-        below = np.clip((self.level - points @ self.outward) / self.depth, 0.0, 1.0)
+        below = np.clip(self._below(points), 0.0, 1.0)
         fade = np.clip(2.0 * (1.0 - below), 0.0, 1.0)
         smooth = fade**2 * (3.0 - 2.0 * fade)
-        return np.asarray(self.stiffness * smooth * np.clip(normals @ self.outward, 0.0, None))
+        return np.asarray(self.stiffness * smooth * self._facing(normals))
+
+    def fixed(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
+        """Components (..., 3) along which nothing moves: none, as a foundation is elastic."""
+        return np.zeros(np.broadcast_shapes(points.shape, normals.shape), dtype=np.bool_)
+
+    def scaled(self, times: float) -> Foundation:
+        """So many times as stiff."""
+        return replace(self, stiffness=times * self.stiffness)
+
+    def covers(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
+        """Whether it has points (..., 3) with outward normals (..., 3) of the surface."""
+        return np.asarray((self._below(points) < 1.0) & (self._facing(normals) > SIDEWAYS))
+
+    def _below(self, points: Floats) -> Floats:
+        """How far from where it begins, over how far it goes."""
+        if self.centre is not None:
+            return np.asarray(np.linalg.norm(points - self.centre, axis=-1) / self.depth)
+        return np.asarray((self.level - points @ self.outward) / self.depth)
+
+    def _facing(self, normals: Floats) -> Floats:
+        """How much of an area counts."""
+        if self.centre is not None:
+            return np.ones(normals.shape[:-1])
+        return np.asarray(np.clip(normals @ self.outward, 0.0, None))
 
 
 @dataclass(frozen=True)

@@ -5,5 +5,7 @@ FEATURES = {
     "several-loads": "several loads",
     "gravity": "gravity",
     "weights": "attached weights",
+    "inclusions": "tissue that differs from place to place",
+    "fixed-surfaces": "clamped or sliding supports",
 }
 """Names of what a model must be able to follow, in the words of a message."""

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
-from study.problem.contact import Foundation, Load, ToolPatch, Weight
+from study.problem.contact import Load, ToolPatch, Weight
 from study.problem.response import Response
 from study.problem.rigid import RigidTool
+from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 
@@ -23,8 +24,9 @@ Floats = NDArray[np.float64]
 class Problem:
     """An organ with support, tool, load history, tissue, and what is observed of it.
 
-    `tool` and `factor`: the first tool as a load, and the share of its force at times [s]; a tool
-    that is moved has no force there and stands in `rigid_tools`. `loads`: those of further tools.
+    `foundation`: all that holds it, fixed surfaces too. `tool` and `factor`: the first tool as a
+    load, and the share of its force at times [s]; a tool that is moved has no force there and
+    stands in `rigid_tools`. `loads`: those of further tools.
     `gravity` [m/s^2] (3,) acts on the tissue and on `weights`; with `given_loaded` the geometry is
     the shape at rest under it, and displacements count from there. `probes`: names of the control
     points. Two problems are the same only if they are one object, so that what is assembled for
@@ -32,7 +34,7 @@ class Problem:
     """
 
     geometry: Geometry
-    foundation: Foundation
+    foundation: Support
     tool: ToolPatch
     factor: Callable[[Floats], Floats]
     tissue: Tissue

@@ -18,3 +18,8 @@ class Tissue:
     youngs_modulus: Annotated[float, Quantity("Pa", 100.0, 1e6)] = 9.5e3
     poisson_ratio: Annotated[float, Quantity("", 0.0, 0.49999)] = 0.45
     density: Annotated[float, Quantity("kg/m^3", 500.0, 2000.0)] = 1054.0
+
+    @property
+    def highest_poisson_ratio(self) -> float:
+        """Its own, and of tissue that differs from place to place the largest."""
+        return self.poisson_ratio

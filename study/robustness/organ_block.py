@@ -147,17 +147,21 @@ def _estimate(system: str, modulus: float) -> StiffnessEstimate:
 
 def _posed(draw: OrganDraw, drawn: Scene, problem: Problem) -> Problem:
     """The problem with tool, support and tissue of a draw."""
-    tool, foundation = problem.tool, problem.foundation
+    tool, tissue = problem.tool, drawn.tissue
     return replace(
         problem,
-        foundation=replace(foundation, stiffness=drawn.support.stiffness),
+        foundation=problem.foundation.scaled(draw.support),
         tool=replace(
             tool,
             centre=_moved(draw, problem),
             radius=drawn.tool.radius,
             force=drawn.tool.force,
         ),
-        tissue=drawn.tissue,
+        tissue=replace(
+            problem.tissue,
+            youngs_modulus=tissue.youngs_modulus,
+            poisson_ratio=tissue.poisson_ratio,
+        ),
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from msm.calibration import SPRING_POISSON_RATIO
 from msm.integrators import INTEGRATORS
 from study.models.damping import nodal_damping
-from study.models.lattice import PreparedLattice, SpringMaterial
+from study.models.lattice import PreparedLattice, SpringMaterial, on_lattice
 from study.models.model import ModelRun, Prepared
 from study.models.tissue import of_modulus
 from study.problem.problem import Problem
@@ -143,7 +143,8 @@ def _steps(lattice: PreparedLattice, modulus: float, changes: Changes) -> Iterat
         changed = replace(scene, lattice=asked)
         made = of_modulus(changed, lattice.assembly.lattice, modulus=modulus)
         springs = replace(made, material=replace(made.material, damping=damping))
-        yield replace(lattice, model=replace(lattice.model, scene=changed), springs=springs)
+        model = replace(lattice.model, scene=changed)
+        yield on_lattice(model, lattice.problem, lattice.plain, springs)
 
 
 def _differences(way: Mending) -> Iterator[Difference]:

@@ -13,7 +13,7 @@ from study.annotation.choice import Choice
 from study.problem.features import FEATURES
 from study.problem.rigid import SLIDING
 from study.scene.law import SpringLaw
-from study.scene.schema import Lattice, Require, Scene, Tool, Waypoint
+from study.scene.schema import Inclusion, Lattice, Require, Scene, Tool, Waypoint
 
 if TYPE_CHECKING:
     from study.models.model import ModelKind
@@ -26,6 +26,7 @@ MESH_ONLY = (
     ("organ", "volume"),
     ("organ", "size"),
     ("support",),
+    ("further_supports",),
     ("lattice",),
     ("reference",),
     ("superposition",),
@@ -45,6 +46,8 @@ MESH_ONLY = (
     ("weight",),
     ("tissue", "poisson_ratio"),
     ("tissue", "density"),
+    ("tissue", "inclusion"),
+    ("tissue", "stiffness_map"),
 )
 
 
@@ -77,6 +80,8 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for number, tool in enumerate(scene.tools, 1):
         name = "tool" if number == 1 else f"tool.{number}"
         yield from _tool_contradictions(scene, name, tool)
+    yield from _support_contradictions(scene)
+    yield from _inclusion_contradictions(scene)
     yield from _feature_contradictions(scene)
     if scene.require is not None:
         yield from _require_contradictions(scene, scene.require)
@@ -116,12 +121,16 @@ def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         if organ.mesh is None and _has(table, ("organ", key)):
             yield f"organ.{key}: has no effect without organ.mesh; remove it"
     if organ.axes is not None:
-        from study.mesh.axes import letters_of
+        yield from _axes_problems(organ.axes, "organ.axes")
 
-        try:
-            letters_of(organ.axes)
-        except ValueError as error:
-            yield str(error)
+
+def _axes_problems(axes: str, key: str) -> Iterator[str]:
+    from study.mesh.axes import letters_of
+
+    try:
+        letters_of(axes)
+    except ValueError as error:
+        yield str(error).replace("organ.axes", key)
 
 
 def _model_contradictions(scene: Scene) -> Iterator[str]:
@@ -298,6 +307,48 @@ def _path_contradictions(name: str, path: tuple[Waypoint, ...]) -> Iterator[str]
         yield f"{name}.path: give each point either travel or offset"
     elif path[0].travel or any(path[0].offset or ()):
         yield f"{name}.path: starts elsewhere than at its place; begin with 0 mm"
+
+
+def _support_contradictions(scene: Scene) -> Iterator[str]:
+    """A support is at a side or at a place."""
+    for number, support in enumerate(scene.supports, 1):
+        name = "support" if number == 1 else f"support.{number}"
+        if support.place is not None and not _one_way(support.place):
+            yield f"{name}.place: give either side and at, or fraction, or point"
+        if support.place is not None and support.radius is None:
+            yield f"{name}.radius: give how far it goes from {name}.place"
+        if support.place is None and support.radius is not None:
+            yield f"{name}.radius: goes with {name}.place; give one, or {name}.depth instead"
+    if scene.lattice.integrator == "xpbd" and "fixed-surfaces" in scene.features:
+        yield (
+            "lattice.integrator: xpbd holds by foundations alone; choose another, or make each "
+            "support.kind foundation"
+        )
+
+
+def _inclusion_contradictions(scene: Scene) -> Iterator[str]:
+    """An inclusion has one shape, and a place that does not move to the surface."""
+    for number, one in enumerate(scene.tissue.inclusion, 1):
+        name = f"tissue.inclusion.{number}"
+        shapes = [key for key in ("radius", "semi_axes", "mesh") if getattr(one, key) is not None]
+        if len(shapes) != 1:
+            yield f"{name}: give one of radius, semi_axes and mesh" + (
+                f", not {' and '.join(shapes)}" if shapes else ""
+            )
+        if one.mesh is None:
+            yield from _place_of_inclusion(name, one)
+        elif one.place is not None:
+            yield f"{name}.place: a mesh lies where it lies; remove it"
+        if one.axes is not None and one.mesh is not None:
+            yield from _axes_problems(one.axes, f"{name}.axes")
+
+
+def _place_of_inclusion(name: str, one: Inclusion) -> Iterator[str]:
+    if one.place is None or not _one_way(one.place) or one.place.side is not None:
+        yield f"{name}.place: give fraction or point of its centre"
+    for key in ("unit", "axes"):
+        if getattr(one, key) is not None:
+            yield f"{name}.{key}: has no effect without {name}.mesh; remove it"
 
 
 def _feature_contradictions(scene: Scene) -> Iterator[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from study.annotation.quantity import Quantity
-from study.scene import Organ, Scene, SpringLaw, Tool
+from study.scene import Organ, Scene, SpringLaw, Support, Tool
 from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
 from study.scene.schema import SuitedKey
@@ -24,6 +24,14 @@ BUILT_IN = ("liver", "block", "paper")
 FILES = (("organ", "mesh"), ("fuzzy", "rule_base"))
 """Tables and their keys that name a file."""
 SUITED: tuple[str, ...] = get_args(SuitedKey)
+SEVERAL = {"support": "further_supports", "tool": "further_tools"}
+"""Tables that a file may have several of, [[support]], and where those after the first stand."""
+NUMBERED = {others: (name, 2) for name, others in SEVERAL.items()} | {
+    name: (name, 1) for name in ("weight", "tissue.inclusion")
+}
+"""Lists of tables as they are read, and as they are written with the number of the first."""
+LISTED = {*SEVERAL, "weight", "tissue.inclusion"}
+"""Keys of lists of tables, of which each may be named by its number."""
 
 
 def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
@@ -34,7 +42,7 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     text, base = _load(name)
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_files(table, base)
-    _split_tools(table)
+    _split_lists(table)
     for override in overrides:
         lines[_apply(table, override)] = 0  # on no line
     _resolve_files(table, Path.cwd())
@@ -43,20 +51,22 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     return validate(table, name, lines)
 
 
-def _split_tools(table: Table) -> None:
-    """[[tool]] as the first tool and the further ones."""
-    found = table.get("tool")
-    if isinstance(found, list) and found and "further_tools" not in table:
-        table["tool"], *further = found
+def _split_lists(table: Table) -> None:
+    """[[tool]] as the first tool and the further ones, and so with supports."""
+    for name, others in SEVERAL.items():
+        found = table.get(name)
+        if isinstance(found, list) and found and others not in table:
+            table[name], *further = found
+            if further:
+                table[others] = further
+
+
+def _join_lists(table: Table) -> None:
+    """[[tool]] of the first tool and the further ones, if there are any, and so with supports."""
+    for name, others in SEVERAL.items():
+        further = table.pop(others, [])
         if further:
-            table["further_tools"] = further
-
-
-def _join_tools(table: Table) -> None:
-    """[[tool]] of the first tool and the further ones, where there are any."""
-    further = table.pop("further_tools", [])
-    if further:
-        table["tool"] = [table["tool"], *further]
+            table[name] = [table[name], *further]
 
 
 def _suit_the_rest(table: Table, overrides: Sequence[str]) -> None:
@@ -77,7 +87,7 @@ def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) 
     """
     from pydantic import TypeAdapter, ValidationError
 
-    _split_tools(table)
+    _split_lists(table)
     try:
         scene = TypeAdapter(Scene).validate_python(table)
     except ValidationError as error:
@@ -91,12 +101,15 @@ def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) 
 
 
 def _as_written(problem: str) -> str:
-    """A problem of the second tool and further ones, with the number that it has in the file."""
-    prefix = "further_tools."
-    if not problem.startswith(prefix):
-        return problem
-    number, separator, rest = problem.removeprefix(prefix).partition(".")
-    return f"tool.{int(number) + 2}{separator}{rest}" if number.isdigit() else problem
+    """A problem with a table of several, by the number that it has in the file, from 1."""
+    for name, first in NUMBERED.items():
+        prefix = f"{name}."
+        if problem.startswith(prefix):
+            number, separator, rest = problem.removeprefix(prefix).partition(".")
+            if number.isdigit():
+                written, count = first
+                return f"{written}.{int(number) + count}{separator}{rest}"
+    return problem
 
 
 def _placed(problem: str, lines: Mapping[str, int]) -> str:
@@ -127,7 +140,7 @@ def resolved(scene: Scene) -> Table:
     if scene.is_point:
         for key in MESH_ONLY:
             _remove(table, key)
-    _join_tools(table)
+    _join_lists(table)
     return table
 
 
@@ -140,6 +153,8 @@ def _unused(scene: Scene) -> Iterator[tuple[str | int, ...]]:
     for key in own if scene.fuzzy.rule_base is None else LIVER_ONLY:
         yield "fuzzy", key
     yield from _unused_of_load(scene)
+    yield from _unused_of_supports(scene)
+    yield from _unused_of_tissue(scene)
     if scene.lattice.springs == "tetrahedra":
         for key in ("spacing", "flexion", "body_diagonals"):
             yield "lattice", key
@@ -164,6 +179,33 @@ def _unused_of_load(scene: Scene) -> Iterator[tuple[str | int, ...]]:
         yield ("weight",)
     if not scene.gravity.acceleration:
         yield ("gravity",)
+
+
+def _unused_of_tissue(scene: Scene) -> Iterator[tuple[str | int, ...]]:
+    if not scene.tissue.inclusion:
+        yield "tissue", "inclusion"
+
+
+def _unused_of_supports(scene: Scene) -> Iterator[tuple[str | int, ...]]:
+    for one in _unused_of_support(scene.support):
+        yield "support", one
+    for n, support in enumerate(scene.further_supports):
+        for one in _unused_of_support(support):
+            yield "further_supports", n, one
+    if not scene.further_supports:
+        yield ("further_supports",)
+
+
+def _unused_of_support(support: Support) -> Iterator[str]:
+    """Keys of the other kinds, and of a side where it is at a place."""
+    if support.kind == "foundation":
+        yield "kind"
+    else:
+        yield "stiffness"
+    if support.place is not None:
+        yield "depth"
+        if support.kind != "sliding":
+            yield "side"
 
 
 def _unused_of_tool(tool: Tool) -> Iterator[tuple[str | int, ...]]:
@@ -222,9 +264,18 @@ def _is_file(path: Path) -> bool:
 def _resolve_files(table: Table, base: Path) -> None:
     """Make the paths of files relative to the scene file that names them."""
     for name, key in FILES:
-        group = table.get(name)
-        if isinstance(group, dict) and isinstance(group.get(key), str):
-            group[key] = str((base / group[key]).absolute())
+        _resolve(table.get(name), key, base)
+    tissue = table.get("tissue")
+    if isinstance(tissue, dict):
+        inclusions = tissue.get("inclusion")
+        for one in inclusions if isinstance(inclusions, list) else []:
+            _resolve(one, "mesh", base)
+        _resolve(tissue.get("stiffness_map"), "file", base)
+
+
+def _resolve(table: Any, key: str, base: Path) -> None:
+    if isinstance(table, dict) and isinstance(table.get(key), str):
+        table[key] = str((base / table[key]).absolute())
 
 
 def _apply(table: Table, override: str) -> str:
@@ -233,8 +284,10 @@ def _apply(table: Table, override: str) -> str:
     keys = [key.strip() for key in path.split(".")]
     if not separator or not all(keys):
         raise SceneError(f"--set {override}: write table.key=value, for example tool.force=1 N")
-    if keys[0] == "tool" and len(keys) > 2 and keys[1].isdigit():
-        return _apply_to_tool(table, int(keys[1]), ".".join(keys[2:]) + separator + text)
+    for depth, name in enumerate(keys[1:-1], 1):
+        if name.isdigit() and ".".join(keys[:depth]) in LISTED:
+            rest = ".".join(keys[depth + 1 :]) + separator + text
+            return _apply_to_one(table, keys[:depth], int(name), rest)
     for depth, key in enumerate(keys[:-1]):
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
@@ -243,12 +296,20 @@ def _apply(table: Table, override: str) -> str:
     return ".".join(keys)
 
 
-def _apply_to_tool(table: Table, number: int, override: str) -> str:
-    """Set what an override sets of one of several tools; its key."""
-    tools = [table.get("tool", {}), *table.get("further_tools", [])]
-    if not 1 <= number <= len(tools):
-        raise SceneError(f"--set tool.{number}: there is no such tool; the scene has {len(tools)}")
-    return f"tool.{number}.{_apply(tools[number - 1], override)}"
+def _apply_to_one(table: Table, keys: Sequence[str], number: int, override: str) -> str:
+    """Set what an override sets of one of several tables; its key."""
+    name = ".".join(keys)
+    found: Any = table
+    for key in keys:
+        found = found.get(key, {}) if isinstance(found, dict) else {}
+    if name in SEVERAL:
+        found = [table.setdefault(name, {}), *table.get(SEVERAL[name], [])]
+    listed = found if isinstance(found, list) else []
+    if not 1 <= number <= len(listed) or not isinstance(listed[number - 1], dict):
+        raise SceneError(
+            f"--set {name}.{number}: there is no such {keys[-1]}; the scene has {len(listed)}"
+        )
+    return f"{name}.{number}.{_apply(listed[number - 1], override)}"
 
 
 def _value(text: str) -> object:

@@ -18,15 +18,26 @@ from study.problem.contact import Foundation, Load, ToolPatch, Weight
 from study.problem.history import peak_sample
 from study.problem.problem import PointProblem, Problem
 from study.problem.rigid import BONDED, SHAPES, RigidTool
+from study.problem.supports import (
+    FOUNDATION,
+    SLIDING,
+    FixedSurface,
+    Support,
+    Supports,
+    free_motion,
+)
 from study.problem.trajectory import Observation
 from study.scene.place import OUTWARD, resolve
 from study.scene.schema import AttachedWeight, Organ, Scene, Tool
+from study.scene.schema import Support as SupportTable
+from study.scene.tissue import tissue_of
 
 Floats = NDArray[np.float64]
 
 SURFACE_POINTS = 6
 """Integration points per direction on each facet: the tool covers only a few facets."""
 VOLUME_POINTS = 2
+AXES = "xyz"
 OUTSIDE = -0.1
 """Barycentric coordinate below which a point is not merely off by rounding or a flat facet."""
 
@@ -38,11 +49,12 @@ def problem_of(scene: Scene) -> Problem:
     """
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
-    foundation = _foundation(scene, surface)
+    foundation = _support(scene, surface)
     tool = _tool(scene.tool, "tool", surface)
     surface_rule = over_surface(surface, SURFACE_POINTS)
     volume_rule = over_volume(geometry.mesh, VOLUME_POINTS)
-    _check_touch(foundation, tool, surface_rule)
+    _check_held(foundation, surface_rule)
+    _check_touch(tool, surface_rule)
 
     factor = scene.tool.history.factor
     if scene.tool.is_moved:  # its force is a result, and as a load it has none
@@ -63,7 +75,7 @@ def problem_of(scene: Scene) -> Problem:
         foundation,
         tool,
         factor,
-        scene.tissue,
+        tissue_of(scene.tissue, geometry.mesh, surface),
         surface_rule,
         volume_rule,
         observation,
@@ -161,10 +173,36 @@ def geometry_of(organ: Organ, element_size: float) -> Geometry:
     return shapes.built_in_liver(organ.volume, element_size)
 
 
-def _foundation(scene: Scene, surface: SurfaceMesh) -> Foundation:
-    outward = OUTWARD[scene.support.side]
+def _support(scene: Scene, surface: SurfaceMesh) -> Support:
+    """All supports, a single foundation as it is. ValueError naming one that holds no surface."""
+    parts = []
+    rule = over_surface(surface, SURFACE_POINTS)
+    for number, one in enumerate(scene.supports, 1):
+        extent = _extent_of(one, surface)
+        if not extent.covers(rule.points, rule.normals).any():
+            name = "support" if number == 1 else f"support.{number}"
+            key = "radius" if one.place is not None else "depth"
+            raise ValueError(f"{name}: no surface faces its side within {name}.{key}; enlarge it")
+        parts.append(_held(one, extent))
+    return parts[0] if len(parts) == 1 else Supports(tuple(parts))
+
+
+def _extent_of(support: SupportTable, surface: SurfaceMesh) -> Foundation:
+    """Where a support is, as the foundation that would be there."""
+    outward = OUTWARD[support.side]
     level = float((surface.points @ outward).max())
-    return Foundation(outward, level, scene.support.depth, scene.support.stiffness)
+    if support.place is None:
+        return Foundation(outward, level, support.depth, support.stiffness)
+    centre, _ = resolve(support.place, surface)
+    assert support.radius is not None  # noqa: S101 - as was checked with the scene
+    return Foundation(outward, level, support.radius, support.stiffness, centre)
+
+
+def _held(support: SupportTable, extent: Foundation) -> Support:
+    if support.kind == FOUNDATION:
+        return extent
+    along = np.abs(extent.outward) > 0.5
+    return FixedSurface(extent, along if support.kind == SLIDING else np.ones(3, dtype=np.bool_))
 
 
 def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
@@ -195,9 +233,23 @@ def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...])
         )
 
 
-def _check_touch(foundation: Foundation, tool: ToolPatch, rule: SurfaceRule) -> None:
-    if not (foundation.density(rule.points, rule.normals) > 0).any():
-        raise ValueError("support: no surface faces its side within support.depth; enlarge it")
+def _check_held(support: Support, rule: SurfaceRule) -> None:
+    """A body that may move freely has no rest, and no motion that is of interest."""
+    free = free_motion(support, rule.points, rule.normals, rule.weights)
+    if free is not None:
+        shift, turn = np.abs(free[0]), np.abs(free[1])
+        how = (
+            f"be moved along {AXES[int(shift.argmax())]}"
+            if shift.max() >= turn.max()
+            else f"be turned about {AXES[int(turn.argmax())]}"
+        )
+        raise ValueError(
+            f"support: nothing resists when the organ is to {how}; add a [[support]] on another "
+            "side, or make one a foundation or clamped"
+        )
+
+
+def _check_touch(tool: ToolPatch, rule: SurfaceRule) -> None:
     if not (tool.profile(rule.points, rule.normals) > 0).any():
         raise ValueError(
             "tool: touches no surface that faces it; move tool.place, turn tool.direction or "

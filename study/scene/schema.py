@@ -82,14 +82,67 @@ class Organ:
 
 @dataclass(frozen=True, kw_only=True)
 class Support:
-    """Elastic foundation on the surface that faces `side`, down to `depth` from its extreme point.
+    """What holds the surface that faces `side`, down to `depth` from its extreme point.
 
-    `stiffness` is its traction per displacement [Pa/m].
+    Or, with a `place`, the surface within a `radius` of it, whichever way it faces. A foundation is
+    elastic, its `stiffness` a traction per displacement [Pa/m]; a clamped surface does not move, a
+    sliding one not along the line to `side`.
     """
 
+    kind: Annotated[str, Choice("study.problem.supports:KINDS")] = "foundation"
     side: Side = "posterior"
     depth: Length = 0.03
+    place: Place | None = None
+    radius: Length | None = None
     stiffness: Annotated[float, Quantity("Pa/m", 1.0, 1e12)] = 2e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inclusion:
+    """Tissue of another stiffness than that around it, which an estimate is of.
+
+    A ball of a `radius` or an ellipsoid of `semi_axes` along x, y and z about a `place`, or what a
+    closed `mesh` encloses, in its `unit` and `axes` as of the organ's file. Poisson ratio and
+    density are those of the tissue around unless they are given.
+    """
+
+    youngs_modulus: Annotated[float, Quantity("Pa", 10.0, 1e9)]
+    poisson_ratio: Annotated[float, Quantity("", 0.0, 0.49999)] | None = None
+    density: Annotated[float, Quantity("kg/m^3", 100.0, 20_000.0)] | None = None
+    place: Place | None = None
+    radius: Length | None = None
+    semi_axes: tuple[Length, Length, Length] | None = None
+    mesh: str | None = None
+    unit: str | None = None
+    axes: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessMap:
+    """A modulus at each voxel of a NIfTI image, as elastography gives it.
+
+    `quantity` in a `unit`; of a shear modulus Young's follows with the tissue's Poisson ratio. The
+    image's own affine takes voxels to millimetres in RAS. Where it has no value, or none above
+    zero, the tissue is as around, or the scene is refused, as `elsewhere` says.
+    """
+
+    file: str
+    quantity: Literal["youngs-modulus", "shear-modulus"]
+    unit: Literal["Pa", "kPa", "MPa"]
+    elsewhere: Literal["around", "refused"] = "around"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrganTissue(Tissue):
+    """The tissue of the organ, and what differs from it in places; an inclusion outdoes the map."""
+
+    inclusion: tuple[Inclusion, ...] = ()
+    stiffness_map: StiffnessMap | None = None
+
+    @property
+    def highest_poisson_ratio(self) -> float:
+        """The largest of all parts."""
+        return max([self.poisson_ratio, *(one.poisson_ratio or 0.0 for one in self.inclusion)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,7 +372,8 @@ class Require:
 class Scene:
     """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system.
 
-    `tool`: the first, or in a file [[tool]], each of several; `further_tools` are the others.
+    `tool`: the first, or in a file [[tool]], each of several; `further_tools` are the others;
+    likewise `support`.
     `remarks`: sentences that stand among the notes of its results.
     """
 
@@ -329,11 +383,12 @@ class Scene:
     models: tuple[ModelName, ...] = ("fem", "basafa", "msm")
     organ: Organ = field(default_factory=Organ)
     support: Support = field(default_factory=Support)
+    further_supports: tuple[Support, ...] = ()
     tool: Tool = field(default_factory=Tool)
     further_tools: tuple[Tool, ...] = ()
     gravity: Gravity = field(default_factory=Gravity)
     weight: tuple[AttachedWeight, ...] = ()
-    tissue: Tissue = field(default_factory=Tissue)
+    tissue: OrganTissue = field(default_factory=OrganTissue)
     patient: Patient = field(default_factory=Patient)
     fuzzy: Fuzzy = field(default_factory=Fuzzy)
     lattice: Lattice = field(default_factory=Lattice)
@@ -354,6 +409,11 @@ class Scene:
         return (self.tool, *self.further_tools)
 
     @property
+    def supports(self) -> tuple[Support, ...]:
+        """All of them."""
+        return (self.support, *self.further_supports)
+
+    @property
     def features(self) -> tuple[str, ...]:
         """What not every model can follow: names of `study.problem.features.FEATURES`."""
         asked = {
@@ -361,6 +421,8 @@ class Scene:
             "several-loads": any(not tool.is_moved for tool in self.further_tools),
             "gravity": self.gravity.acceleration > 0.0,
             "weights": bool(self.weight),
+            "inclusions": bool(self.tissue.inclusion) or self.tissue.stiffness_map is not None,
+            "fixed-surfaces": any(one.kind != "foundation" for one in self.supports),
         }
         return tuple(name for name, present in asked.items() if present)
 

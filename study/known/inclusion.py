@@ -1,0 +1,91 @@
+"""A ball in a large body under uniform strain far away, in closed form.
+
+The strain inside is uniform, and the body around moves as if the ball had grown by a uniform
+strain of its own: Eshelby (1957), Proc. R. Soc. A 241:376. Of a ball, the spherical part of the
+strain far away is divided by 1 + a (K'/K - 1), the rest by 1 + b (mu'/mu - 1), with
+a = (1 + nu) / (3 (1 - nu)), b = 2 (4 - 5 nu) / (15 (1 - nu)), K' and mu' those of the ball. The
+displacement around follows from the harmonic and the biharmonic potential of the ball: Mura (1987),
+Micromechanics of Defects in Solids, section 11.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.problem.tissue import Tissue
+
+Floats = NDArray[np.float64]
+
+IDENTITY = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class BallInclusion:
+    """A ball of a `radius` [m] about the origin, of tissue `inside` another one, `around` it.
+
+    `strain` (3, 3): far away.
+    """
+
+    radius: float
+    inside: Tissue
+    around: Tissue
+    strain: Floats
+
+    @property
+    def inner_strain(self) -> Floats:
+        """Strain (3, 3) of the ball."""
+        nu = self.around.poisson_ratio
+        of_volume = (1.0 + nu) / (3.0 * (1.0 - nu))
+        of_shape = 2.0 * (4.0 - 5.0 * nu) / (15.0 * (1.0 - nu))
+        bulk, shear = self._contrast
+        mean = np.trace(self.strain) / 3.0 * IDENTITY
+        shape = self.strain - mean
+        return np.asarray(
+            mean / (1.0 + of_volume * (bulk - 1.0)) + shape / (1.0 + of_shape * (shear - 1.0))
+        )
+
+    def displacement(self, points: Floats) -> Floats:
+        """Displacement [m] (n, 3) at points [m] (n, 3), where the ball's centre rests."""
+        r = np.linalg.norm(points, axis=1)
+        inside = r <= self.radius
+        outside = np.where(inside, self.radius, r)[:, None]
+        around = points @ self.strain + self._beyond(points, outside)
+        return np.asarray(np.where(inside[:, None], points @ self.inner_strain, around))
+
+    def _beyond(self, x: Floats, r: Floats) -> Floats:
+        """What the ball adds around it, by the eigenstrain e of a ball of the tissue around.
+
+        8 pi (1 - nu) u_i = psi,ijk e_jk - 2 nu e_kk phi,i - 4 (1 - nu) e_ik phi,k.
+        """
+        nu, e, a = self.around.poisson_ratio, self._eigenstrain, self.radius
+        ex, trace = x @ e, np.trace(e)
+        along = (x * ex).sum(axis=1, keepdims=True)
+        # phi = V / r and psi = V (r + a^2 / (5 r)), of the volume V.
+        of_r = -(trace * x + 2.0 * ex) / r**3 + 3.0 * along * x / r**5
+        of_inverse = 3.0 * (trace * x + 2.0 * ex) / r**5 - 15.0 * along * x / r**7
+        potential = of_r + a**2 / 5.0 * of_inverse
+        found = potential + 2.0 * nu * trace * x / r**3 + 4.0 * (1.0 - nu) * ex / r**3
+        return np.asarray(4.0 / 3.0 * np.pi * a**3 / (8.0 * np.pi * (1.0 - nu)) * found)
+
+    @property
+    def _eigenstrain(self) -> Floats:
+        """Strain (3, 3) free of stress, of tissue as around, that would stress the ball alike."""
+        inner = self.inner_strain
+        bulk, shear = (1.0 - one for one in self._contrast)
+        mean = np.trace(inner) / 3.0 * IDENTITY
+        return np.asarray(bulk * mean + shear * (inner - mean))
+
+    @property
+    def _contrast(self) -> tuple[float, float]:
+        """Bulk and shear modulus of the ball over those around."""
+        inside, around = _moduli(self.inside), _moduli(self.around)
+        return inside[0] / around[0], inside[1] / around[1]
+
+
+def _moduli(tissue: Tissue) -> tuple[float, float]:
+    """Bulk and shear modulus [Pa]."""
+    E, nu = tissue.youngs_modulus, tissue.poisson_ratio
+    return E / (3.0 * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))

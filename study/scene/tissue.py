@@ -1,0 +1,196 @@
+"""The tissue of a scene placed on its organ: inclusions, and a map of stiffness from an image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.mesh.axes import to_scene
+from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
+from study.mesh.signed_distance import SignedDistance
+from study.mesh.tetrahedra import boundary, volumes
+from study.problem.tissue import Tissue
+from study.problem.varied import Ellipsoid, Region, VariedTissue, of_tetrahedra
+from study.scene.place import resolve
+from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
+
+Floats = NDArray[np.float64]
+Distance = Callable[[Floats], Floats]
+
+PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
+"""By the units that a map may be in."""
+RANGE = (10.0, 1e9)
+"""Young's moduli [Pa] that a map may have."""
+
+
+def tissue_of(table: OrganTissue, mesh: TetrahedralMesh, surface: SurfaceMesh) -> Tissue:
+    """The tissue with what differs in it; a plain one where nothing does.
+
+    ValueError naming an inclusion that lies outside the organ, or what is wrong with a file.
+    """
+    base = Tissue(
+        youngs_modulus=table.youngs_modulus,
+        poisson_ratio=table.poisson_ratio,
+        density=table.density,
+    )
+    if not table.inclusion and table.stiffness_map is None:
+        return base
+    found = VariedTissue(
+        youngs_modulus=base.youngs_modulus,
+        poisson_ratio=base.poisson_ratio,
+        density=base.density,
+        regions=tuple(
+            _region(one, f"tissue.inclusion.{number}", surface)
+            for number, one in enumerate(table.inclusion, 1)
+        ),
+        mapped=None if table.stiffness_map is None else _mapped(table.stiffness_map, base),
+    )
+    _check(found, table, mesh)
+    return found
+
+
+def notes_of(tissue: Tissue, mesh: TetrahedralMesh) -> tuple[str, ...]:
+    """How much of the organ is of other tissue than around."""
+    made = of_tetrahedra(mesh, tissue)
+    if made is None or not isinstance(tissue, VariedTissue):
+        return ()
+    size = volumes(mesh)
+    found = [
+        f"{region.name}: {1e6 * float(size @ share):.3g} ml of "
+        f"{region.youngs_modulus / 1e3:.3g} kPa"
+        for region, share in zip(tissue.regions, made.share.T, strict=True)
+    ]
+    if tissue.mapped is not None:
+        part = float(size @ made.mapped_share)
+        modulus = part / max(float(size @ made.mapped), 1e-300)
+        found.append(
+            f"tissue.stiffness_map: {100 * part / size.sum():.0f} % of the organ, Young's modulus "
+            f"{modulus / 1e3:.3g} kPa in the mean (harmonic); the rest is as around"
+        )
+    return tuple(found)
+
+
+def _region(one: Inclusion, name: str, surface: SurfaceMesh) -> Region:
+    return Region(
+        name=name,
+        distance=_distance(one, name, surface),
+        youngs_modulus=one.youngs_modulus,
+        poisson_ratio=one.poisson_ratio,
+        density=one.density,
+    )
+
+
+def _distance(one: Inclusion, name: str, surface: SurfaceMesh) -> Distance:
+    if one.mesh is not None:
+        from study.mesh.load import load_mesh
+
+        try:
+            loaded, _ = load_mesh(one.mesh, one.unit, one.axes)
+        except ValueError as error:
+            raise ValueError(f"{name}.mesh: {error}") from error
+        closed = loaded if isinstance(loaded, SurfaceMesh) else boundary(loaded)
+        return SignedDistance(closed)
+    assert one.place is not None  # noqa: S101 - as was checked with the scene
+    centre, _ = resolve(_unmoved(one.place), surface)
+    semi_axes = one.semi_axes or (one.radius, one.radius, one.radius)
+    return Ellipsoid(centre, np.array(semi_axes, dtype=float))
+
+
+def _unmoved(place: Place) -> Place:
+    """The place itself, which would move to the surface."""
+    return Place(fraction=place.fraction, point=place.point, snap=False)
+
+
+def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> None:
+    made = of_tetrahedra(mesh, tissue)
+    assert made is not None  # noqa: S101 - of varied tissue
+    for region, share in zip(tissue.regions, made.share.T, strict=True):
+        if not share.any():
+            raise ValueError(
+                f"{region.name}: nothing of it lies in the organ, or it is far smaller than an "
+                "element; move its place, enlarge it or reduce reference.element_size"
+            )
+    if table.stiffness_map is None:
+        return
+    if not made.mapped_share.any():
+        raise ValueError(
+            "tissue.stiffness_map: no voxel with a value lies in the organ; its affine, or "
+            "organ.axes and organ.unit, are of another frame"
+        )
+    if table.stiffness_map.elsewhere == "refused" and (made.around > 0.0).any():
+        share = float(volumes(mesh) @ made.around) / float(volumes(mesh).sum())
+        raise ValueError(
+            f"tissue.stiffness_map: {100 * share:.2g} % of the organ has no value in it; set its "
+            "elsewhere to around, or give an image of all of the organ"
+        )
+
+
+def _mapped(given: StiffnessMap, tissue: Tissue) -> Distance:
+    """Young's modulus [Pa] at points of the scene, NaN where the image has none."""
+    voxels, affine = _image(Path(given.file))
+    of_young = 1.0 if given.quantity == "youngs-modulus" else 2.0 * (1.0 + tissue.poisson_ratio)
+    modulus = voxels * PASCALS[given.unit] * of_young
+    known = np.isfinite(modulus) & (modulus > 0.0)
+    low, high = RANGE
+    if known.any() and not (low <= modulus[known].min() and modulus[known].max() <= high):
+        raise ValueError(
+            f"tissue.stiffness_map.unit: in {given.unit} Young's modulus goes from "
+            f"{modulus[known].min():.3g} to {modulus[known].max():.3g} Pa, beyond {low:g} to "
+            f"{high:g}; give the unit of the image"
+        )
+    inverse = np.asarray(np.linalg.inv(affine), dtype=np.float64)
+    return _Sampled(np.where(known, modulus, 0.0), known.astype(np.float64), inverse)
+
+
+class _Sampled:
+    """Values of voxels between their centres: the mean of those that are known round a point."""
+
+    def __init__(self, values: Floats, known: Floats, to_voxels: Floats) -> None:
+        self.values, self.known, self.to_voxels = values, known, to_voxels
+
+    def __call__(self, points: Floats) -> Floats:
+        """At points [m] (..., 3), NaN where less than half of a voxel's weight is known."""
+        from scipy.ndimage import map_coordinates
+
+        millimetres = 1e3 * points @ to_scene("RAS")  # which is its own inverse
+        place = millimetres @ self.to_voxels[:3, :3].T + self.to_voxels[:3, 3]
+        at = np.moveaxis(place, -1, 0)
+        known = map_coordinates(self.known, at, order=1, mode="constant", cval=0.0)
+        values = map_coordinates(self.values, at, order=1, mode="constant", cval=0.0)
+        return np.where(known >= 0.5, values / np.maximum(known, 0.5), np.nan)
+
+
+def _image(path: Path) -> tuple[Floats, Floats]:
+    """Voxels (i, j, k), and the affine (4, 4) that takes their numbers to millimetres in RAS."""
+    try:
+        import nibabel  # type: ignore[import-not-found,unused-ignore] # an extra
+    except ImportError:
+        raise ValueError(
+            "tissue.stiffness_map: needs nibabel, which is not installed; install "
+            "liver-study[images]"
+        ) from None
+    try:
+        image = nibabel.load(path)
+        voxels = np.asarray(image.get_fdata(dtype=np.float64))
+    except FileNotFoundError:
+        raise ValueError(f"tissue.stiffness_map.file: {path}: no such file") from None
+    except (OSError, ValueError, EOFError, nibabel.filebasedimages.ImageFileError) as error:
+        raise ValueError(
+            f"tissue.stiffness_map.file: {path} is no NIfTI image ({error}); name a .nii or "
+            ".nii.gz file"
+        ) from error
+    voxels = (
+        voxels.reshape(voxels.shape[:3]) if voxels.size == np.prod(voxels.shape[:3]) else voxels
+    )
+    if voxels.ndim != 3:
+        raise ValueError(
+            f"tissue.stiffness_map.file: {path} has {voxels.ndim} axes of {voxels.shape}; give one "
+            "volume"
+        )
+    affine = np.asarray(image.affine, dtype=float)
+    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-12:
+        raise ValueError(f"tissue.stiffness_map.file: {path} has no usable affine; write one")
+    return voxels, affine
