@@ -66,7 +66,7 @@ class HyperelasticSolid:
     def internal_force(self, u: Floats) -> Floats:
         """Gradient [N] of the energy, shape (n,)."""
         stress = self.law.stress(self.deformation(u)) * self.weights[..., None, None]
-        nodal = _flat(self.slopes).mT @ _flat(stress.mT)
+        nodal = flat(self.slopes).mT @ flat(stress.mT)
         found = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(u))
         force = found + self.support @ u
         if self.fixed is not None:
@@ -76,7 +76,7 @@ class HyperelasticSolid:
     def tangent(self, u: Floats) -> csc_array:
         """Second derivative [N/m] of the energy, shape (n, n)."""
         moduli = self.law.tangent(self.deformation(u)) * self.weights[..., None, None, None, None]
-        blocks = _element_stiffness(moduli, self.slopes)
+        blocks = element_stiffness(moduli, self.slopes)
         count = blocks.shape[-1]
         unknowns = self.unknowns.reshape(-1, count)
         places = (np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel())
@@ -85,12 +85,12 @@ class HyperelasticSolid:
         return decoupled(whole, self.fixed)
 
 
-def _flat(values: Floats) -> Floats:
+def flat(values: Floats) -> Floats:
     """(t, q, 3, a) as (t, 3 q, a): sums over points and directions are one matrix product."""
     return values.reshape(len(values), -1, values.shape[-1])
 
 
-def _element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
+def element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
     """K_(ai)(bk) = sum_q dN_a/dX_J A_iJkL dN_b/dX_L, shape (t, 3 a, 3 a).
 
     Batched products of small matrices; as a scikit-fem form, called for each of the 900 pairs of
@@ -98,10 +98,10 @@ def _element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
     """
     count = slopes.shape[-1]
     found = np.empty((len(slopes), count, 3, count, 3))
-    left = _flat(slopes).mT
+    left = flat(slopes).mT
     for i in range(3):
         for k in range(i + 1):
-            block = left @ _flat(moduli[..., i, :, k, :] @ slopes)
+            block = left @ flat(moduli[..., i, :, k, :] @ slopes)
             found[:, :, i, :, k] = block
             found[:, :, k, :, i] = block.mT
     return found.reshape(-1, 3 * count, 3 * count)

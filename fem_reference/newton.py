@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from fem_reference.driven import Drive, DrivenState, solve_driven
 from fem_reference.elasticity import Body
+from fem_reference.elements import ELEMENTS
 from fem_reference.hyperelasticity import HyperelasticSolid, largest_log_strain, solid
 from fem_reference.laws import DEFAULT, Law
+from fem_reference.mixed_strain import on_nodes
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -96,10 +99,14 @@ def solve(
 ) -> Path:
     """States of rest under multiples of the body's load, reached from none in the order given.
 
-    ValueError for an unknown law, a body with a pressure field, or a load factor of zero.
+    A body with a pressure of its own keeps it, in the neo-Hookean law (`fem_reference.driven`).
+    ValueError for an unknown law, one that has no form with a pressure where the body has one, or
+    a load factor of zero.
     """
     if not (np.isfinite(load_factors).all() and np.all(load_factors)):
         raise ValueError(f"load_factors: {tuple(load_factors)} must be finite and not zero")
+    if ELEMENTS[body.element].mixed:
+        return _with_pressure(body, tissue, law, load_factors)
     problem = solid(body, tissue, law)
     at = _Rest(0.0, np.zeros(len(body.load)), (0.0,))
     states: list[State] = []
@@ -109,6 +116,33 @@ def solve(
             return Path(tuple(states), at.load_factor, failure)
         states.append(_state(problem, at, iterations))
     return Path(tuple(states), at.load_factor, "")
+
+
+def _with_pressure(
+    body: Body, tissue: Tissue, law: str | Law, load_factors: Sequence[float]
+) -> Path:
+    """The same of elements with a pressure of their own."""
+    if law != "neo-hookean":
+        raise ValueError(
+            f"law: of elements with a pressure of their own, {law!r} is not worked out; give "
+            "neo-hookean, or discretise with element 'p2', good to a Poisson ratio of 0.48"
+        )
+    mixed = on_nodes(body.nodes, tissue, body.support)
+    held_nowhere = np.full((body.node_count, 3), np.nan)
+    found = solve_driven(mixed, Drive(held_nowhere, body.load), load_factors)
+    return Path(tuple(map(_of_driven, found.states)), found.reached, found.failure)
+
+
+def _of_driven(state: DrivenState) -> State:
+    return State(
+        state.factor,
+        state.displacement.ravel(),
+        state.largest_strain,
+        state.smallest_volume,
+        state.energy,
+        state.residuals,
+        state.iterations,
+    )
 
 
 def _state(problem: HyperelasticSolid, at: _Rest, iterations: int) -> State:

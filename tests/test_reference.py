@@ -392,6 +392,14 @@ def test_a_strained_reference_is_compared_with_a_hyperelastic_solid(short, usual
     assert gentle.large_strain is None
 
 
+def test_a_nearly_incompressible_reference_is_compared_with_one_of_large_strain(short):
+    pressed = changed(short, tool={"force": 1.0}, tissue={"poisson_ratio": 0.499})
+    record, elements, _ = run(with_reference(pressed, element_size=0.02))
+    assert record.largest_strain > 0.05
+    assert elements.element == "taylor-hood"
+    assert 0.005 < elements.large_strain.field_difference < 0.3
+
+
 def test_a_hyperelastic_solid_that_gives_way_is_a_note_and_no_number(short):
     crushed = changed(short, tool={"force": 20.0})
     _, elements, found = run(

@@ -27,6 +27,7 @@ from study.commands.run import run
 from study.commands.scenes import scenes
 from study.commands.stability import stability
 from study.commands.tradeoff import tradeoff
+from study.commands.validate import validate
 from study.commands.verify import verify
 
 app = App(
@@ -121,7 +122,7 @@ def _say(message: str) -> None:
 
 
 for command in (
-    *(run, scenes, check, report, compare, export, verify),
+    *(run, scenes, check, report, compare, export, verify, validate),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

@@ -1,0 +1,176 @@
+"""The silicone beam under its weight and with 101 g on its tip: one modulus, the rest predicted.
+
+The modulus is fitted to how far the tip goes down with the weight, on average of the markers; all
+else is predicted. A body at rest under dead loads depends on load over modulus alone, so the fit is
+the place on a path of growing load. Markers stand off the surface and turn with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from study.progress import Progress
+from study.validation.answers import KINDS, Answer, Kind
+from study.validation.bodies import BEAM, beam
+from study.validation.measured import Markers, beam_markers
+from study.validation.rows import Comparison, own_error
+
+Floats = NDArray[np.float64]
+
+NAME = "cantilever"
+MODULUS = 263.8e3
+"""[Pa], near which the modulus is looked for: the value of the beam's authors."""
+FACTORS = (0.4, 0.7, 0.85, 1.0, 1.15, 1.4, 1.8, 2.4, 3.2)
+"""Times the load, which is the modulus over the one that is looked for."""
+INWARDS = 2e-3
+"""[m] over which the turn of the surface is seen."""
+FITTED = "modulus, to the tip's way with 101 g"
+TIP, EACH = "tip down, mean of markers", "markers, rms of the difference"
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a model says: tip down and rms of markers under its weight and with 101 g [m], E [Pa].
+
+    `failure`: why there is no more.
+    """
+
+    down: tuple[float, float]
+    apart: tuple[float, float]
+    modulus: float
+    failure: str = ""
+
+
+def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:
+    """Of each kind of model, under the weight alone and with 101 g."""
+    cases = beam_markers()
+    for name in kinds:
+        kind = KINDS[name]
+        with progress.stage(f"{NAME}: {kind.label}"):
+            sizes, seen = _on_levels(kind, cases, levels)
+        yield from _rows(kind, cases, seen, sizes)
+
+
+def _on_levels(
+    kind: Kind, cases: tuple[Markers, ...], levels: int
+) -> tuple[list[float], list[_Seen]]:
+    body = beam(0.0, np.zeros((0, 3)))
+    sizes = [mesh.size for mesh in body.meshes] if kind.elements else list(body.spacings)
+    sizes = sizes[:levels]
+    return sizes, [_seen(kind, cases, level) for level in range(len(sizes))]
+
+
+def _seen(kind: Kind, cases: tuple[Markers, ...], level: int) -> _Seen:
+    """Fit the modulus with the weight on the tip, then look at both cases."""
+    alone, weighted = cases
+    path = _answer(kind, weighted, level, FACTORS)
+    ways = np.array([_down(weighted, moved) for moved in path.displacement])
+    target = -weighted.moved[..., 2].mean()
+    factor = _factor_at(path.factors, ways, float(target))
+    if np.isnan(factor):
+        return _Seen((np.nan, np.nan), (np.nan, np.nan), np.nan, path.failure or "too stiff")
+    found = [_answer(kind, case, level, (factor,)) for case in (alone, weighted)]
+    failure = "; ".join(filter(None, (one.failure for one in found)))
+    if failure:
+        return _Seen((np.nan, np.nan), (np.nan, np.nan), MODULUS / factor, failure)
+    pairs = [(case, one.displacement[0]) for case, one in zip(cases, found, strict=True)]
+    down = [_down(*pair) for pair in pairs]
+    apart = [_apart(*pair) for pair in pairs]
+    return _Seen((down[0], down[1]), (apart[0], apart[1]), MODULUS / factor)
+
+
+def _factor_at(factors: Floats, ways: Floats, target: float) -> float:
+    """Where a growing way reaches a target; nan if it does not."""
+    if len(ways) < 3 or not ways[0] < target < ways[-1]:
+        return float("nan")
+    path = CubicSpline(np.concatenate([[0.0], factors]), np.concatenate([[0.0], ways]))
+    return float(brentq(lambda s: float(path(s)) - target, factors[0], factors[-1]))
+
+
+def _answer(kind: Kind, case: Markers, level: int, factors: tuple[float, ...]) -> Answer:
+    watched, _ = _watched(case)
+    return kind.solve(beam(case.force, watched.reshape(-1, 3)), level, MODULUS, factors)
+
+
+def _watched(case: Markers) -> tuple[Floats, Floats]:
+    """Places (m, 4, 3) on the surface and inwards of it in the half computed, and the signs of y.
+
+    Its y is from the plane of symmetry.
+    """
+    length, width, height = BEAM
+    upper, lower = np.array([0.0, 0.5 * width, height]), np.array([-length, -0.5 * width, 0.0])
+    surface = np.clip(case.places - [0.0, 0.5 * width, 0.0], lower, upper)
+    sign = np.where(surface[:, 1] < 0.0, -1.0, 1.0)
+    folded = surface * np.stack([np.ones_like(sign), sign, np.ones_like(sign)], axis=1)
+    inwards = INWARDS * np.where(folded > 0.5 * np.array([-length, width, height]), -1.0, 1.0)
+    steps = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    return folded[:, None] + steps * inwards[:, None], sign
+
+
+def _moved(case: Markers, displacement: Floats) -> Floats:
+    """Displacement [m] (m, 3) of the markers, which turn with the surface they stand on."""
+    watched, sign = _watched(case)
+    u = displacement.reshape(watched.shape)
+    rise = (u[:, 1:] - u[:, :1]) / np.diagonal(watched[:, 1:] - watched[:, :1], 0, 1, 2)[..., None]
+    F = np.swapaxes(rise, 1, 2) + np.eye(3)
+    left, _, right = np.linalg.svd(F)
+    mirror = np.stack([np.ones_like(sign), sign, np.ones_like(sign)], axis=1)
+    surface = watched[:, 0] * mirror + [0.0, 0.5 * BEAM[1], 0.0]
+    offset = (case.places - surface) * mirror
+    turned = np.einsum("mij,mj->mi", left @ right - np.eye(3), offset)
+    return np.asarray((u[:, 0] + turned) * mirror)
+
+
+def _down(case: Markers, displacement: Floats) -> float:
+    return -float(_moved(case, displacement)[:, 2].mean())
+
+
+def _apart(case: Markers, displacement: Floats) -> float:
+    off = _moved(case, displacement) - case.moved.mean(axis=0)
+    return float(np.sqrt((off**2).sum(axis=1).mean()))
+
+
+def _uncertainty(case: Markers) -> tuple[float, float]:
+    """Of the mean way down and of a marker [m]: half of what repeats differ by, and the clamp's.
+
+    The clamped end is not quite still.
+    """
+    clamp = np.sqrt((case.base**2).sum(axis=2).mean())
+    down = 0.5 * np.ptp(case.moved[..., 2].mean(axis=1))
+    each = np.sqrt((0.25 * np.ptp(case.moved, axis=0) ** 2).sum(axis=1).mean())
+    return float(np.hypot(down, clamp)), float(np.hypot(each, clamp))
+
+
+def _rows(
+    kind: Kind, cases: tuple[Markers, ...], seen: list[_Seen], sizes: list[float]
+) -> Iterator[Comparison]:
+    best = seen[-1]
+    for i, (case, name) in enumerate(zip(cases, ("weight alone", "101 g"), strict=True)):
+        measured = -1e3 * float(case.moved[..., 2].mean())
+        quantities = (
+            (TIP, measured, [one.down[i] for one in seen]),
+            (EACH, 0.0, [one.apart[i] for one in seen]),
+        )
+        spread = _uncertainty(case)
+        for (quantity, value, found), uncertainty in zip(quantities, spread, strict=True):
+            yield Comparison(
+                problem=NAME,
+                case=name,
+                faces="clamped",
+                model=kind.label,
+                quantity=quantity,
+                unit="mm",
+                measured=value,
+                uncertainty=1e3 * uncertainty,
+                found=1e3 * float(found[-1]),
+                numerical=1e3 * own_error(found, sizes),
+                modulus=best.modulus,
+                fitted=FITTED if i else "nothing: the modulus is that of 101 g",
+                note=best.failure,
+            )

@@ -1,0 +1,60 @@
+"""`validate` as the command line asks for it: which problems, which models, how fine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from study.progress import Progress
+from study.validation import cantilever, cube, cylinders
+from study.validation.answers import KINDS
+from study.validation.rows import Comparison
+
+Compare = Callable[[tuple[str, ...], int, Progress], Iterable[Comparison]]
+
+PROBLEMS: dict[str, Compare] = {
+    cylinders.NAME: cylinders.comparisons,
+    cantilever.NAME: cantilever.comparisons,
+    cube.NAME: cube.comparisons,
+}
+"""Measured bodies by name."""
+QUICK, ALL = 2, 3
+"""Meshes and spacings of each model."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValidationRequest:
+    """Problems and kinds of models by name, all by default; `quick`: on two meshes, not three.
+
+    ValueError for a name that is none.
+    """
+
+    names: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    quick: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse unknown names before anything is solved."""
+        _refuse_unknown(self.names, PROBLEMS, "problem")
+        _refuse_unknown(self.kinds, KINDS, "--models")
+
+    def comparisons(self, progress: Progress) -> Iterator[Comparison]:
+        """All that was measured of the problems beside each model."""
+        kinds = self.kinds or tuple(KINDS)
+        for name in self.names or tuple(PROBLEMS):
+            yield from PROBLEMS[name](kinds, QUICK if self.quick else ALL, progress)
+
+
+def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{what}: {name} is not one of {', '.join(known)}")
+
+
+def all_answered(found: Sequence[Comparison]) -> bool:
+    """Whether the finite elements gave a number for all that was measured.
+
+    That a lattice gives way is an outcome, and stands in the table.
+    """
+    elements = {kind.label for kind in KINDS.values() if kind.elements}
+    return all(one.answered for one in found if one.model in elements)

@@ -1,0 +1,65 @@
+"""What a model says beside what was measured, each with its uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.error_estimate import discretisation_error
+
+COVERAGE = 2.0
+"""Standard uncertainties within which a difference counts as explained by them."""
+ORDER = 2.0
+"""Highest order of convergence that is believed: edges of faces that are held are singular."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A quantity in its `unit`: measured with its standard uncertainty, and found by a model.
+
+    `numerical`: error of the model's own by its meshes or spacings, nan of one alone. `modulus`:
+    Young's modulus [Pa] it was found with, nan where none matters. `fitted`: what of the model was
+    fitted to the measurement. `note`: why a number is missing, or what else is to know.
+    """
+
+    problem: str
+    case: str
+    faces: str
+    model: str
+    quantity: str
+    unit: str
+    measured: float
+    uncertainty: float
+    found: float
+    numerical: float
+    modulus: float = math.nan
+    fitted: str = ""
+    note: str = ""
+
+    @property
+    def difference(self) -> float:
+        """Model minus measurement."""
+        return self.found - self.measured
+
+    @property
+    def within(self) -> bool:
+        """Whether the difference is explained by both uncertainties."""
+        own = 0.0 if math.isnan(self.numerical) else self.numerical
+        return abs(self.difference) <= COVERAGE * self.uncertainty + own
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is a number at all."""
+        return math.isfinite(self.found)
+
+
+def own_error(values: Sequence[float], sizes: Sequence[float]) -> float:
+    """Error of the last of values on meshes coarse to fine, in their unit; nan if not known."""
+    if len(values) < 2 or not np.isfinite(values).all() or values[-1] == 0.0:
+        return math.nan
+    used = slice(-3, None)
+    fields = [np.array([[value, 0.0, 0.0]]) for value in values[used]]
+    return abs(values[-1]) * discretisation_error(fields, sizes[used], ORDER).error
