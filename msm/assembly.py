@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from msm import graded
 from msm import lattice as cells
 from msm import volume as volumes
 from msm.calibration import SPRING_POISSON_RATIO
@@ -15,6 +16,7 @@ from msm.damping import UNDAMPED, NodalDamping
 from msm.lattice import LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
+from msm.octree import Grading
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
@@ -29,6 +31,7 @@ class Assembly:
     """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
     `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    `masters` (n, n): how hanging nodes, which have none of these, move with the others, if any.
     """
 
     lattice: LatticeMesh
@@ -36,6 +39,7 @@ class Assembly:
     mass: Floats
     foundation: csr_array
     load: Floats
+    masters: csr_array | None = None
 
 
 @dataclass(frozen=True)
@@ -63,9 +67,7 @@ def assemble(
     body_diagonals: float = 0.0,
 ) -> Assembly:
     """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool."""
-    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
-    lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
-    lattice = cells.build(body, lower, upper, spacing)
+    lattice = cells.build(body, *_box(surface), spacing)
     weights, _ = lattice.interpolation(surface.points)
     return Assembly(
         lattice,
@@ -73,6 +75,33 @@ def assemble(
         density * cells.node_volumes(lattice),
         *contact(weights, surface, foundation, tool),
     )
+
+
+def assemble_graded(
+    body: SolidShape,
+    surface: SurfaceRule,
+    density: float,
+    grading: Grading,
+    foundation: Foundation,
+    tool: ToolPatch,
+    flexion: float = 0.0,
+) -> Assembly:
+    """Graded lattice over the body. ValueError if empty, not held, or not touched by the tool."""
+    lattice = graded.build(body, *_box(surface), grading)
+    weights, _ = lattice.interpolation(surface.points)
+    return Assembly(
+        lattice,
+        graded.springs(lattice, flexion),
+        graded.node_masses(lattice, density),
+        *contact(weights, surface, foundation, tool),
+        masters=lattice.masters if lattice.hanging else None,
+    )
+
+
+def _box(surface: SurfaceRule) -> tuple[Floats, Floats]:
+    """Lower and upper corner [m] of the box of a body, a little larger."""
+    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
+    return surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
 
 
 def contact(
@@ -104,4 +133,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         volume,
         material.damping,
         linear=linear,
+        masters=assembly.masters,
     )

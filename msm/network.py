@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from msm.hanging import tied
+
 if TYPE_CHECKING:
     from msm.damping import NodalDamping
     from msm.springs import Springs
@@ -20,10 +22,13 @@ class Network(NamedTuple):
     """What the force and integrator kernels are given.
 
     Springs: `ends` (s, 2) uint32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight
-    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
+    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] and `edges` [m], each (c,);
+    `spacing` [m]: that of the lattice. Nodes: `mass`
     [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
     springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
-    `load` [N] (n, 3). `linear`: forces of small displacements.
+    `load` [N] (n, 3). `linear`: forces of small displacements. Hanging nodes, see `msm.hanging`:
+    the node `hanging[k]` moves as its masters `master[p]` by the shares `part[p]`, p from
+    `first_master[k]` to `first_master[k + 1]`; its mass is theirs, and a scale only.
     """
 
     ends: NDArray[np.uint32]
@@ -42,6 +47,11 @@ class Network(NamedTuple):
     value: Floats
     load: Floats
     linear: bool
+    edges: Floats
+    hanging: NDArray[np.uint32]
+    first_master: NDArray[np.uint32]
+    master: NDArray[np.uint32]
+    part: Floats
 
 
 def network(
@@ -53,8 +63,14 @@ def network(
     damping: NodalDamping,
     *,
     linear: bool = False,
+    masters: csr_array | None = None,
 ) -> Network:
-    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3)."""
+    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
+
+    `masters` (n, n): how all nodes move with those that are free, None if all are.
+    """
+    ties = tied(masters)
+    mass = mass if masters is None else mass + (mass == 0.0) * (masters @ mass)
     length = springs.rest_length
     return Network(
         ends=np.ascontiguousarray(springs.ends, dtype=np.uint32),
@@ -73,4 +89,9 @@ def network(
         value=foundation.data.astype(np.float64),
         load=np.ascontiguousarray(load),
         linear=linear,
+        edges=np.ascontiguousarray(volume.edges),
+        hanging=ties.hanging,
+        first_master=ties.first,
+        master=ties.master,
+        part=ties.part,
     )
