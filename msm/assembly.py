@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from msm import graded
 from msm import lattice as cells
 from msm import volume as volumes
 from msm.calibration import SPRING_POISSON_RATIO, lame
@@ -17,6 +18,7 @@ from msm.damping import UNDAMPED, NodalDamping
 from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
+from msm.octree import Grading
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
@@ -38,6 +40,7 @@ class Assembly:
     `composition`: what each cell is made of, None where all are of one tissue; `connect`: the
     springs for a stiffness (c,) of each cell relative to that of the law; `fixed` (n, 3): which
     components of nodes do not move, None where all may. They are without load.
+    `masters` (n, n): how hanging nodes, which have none of these, move with the others, if any.
     """
 
     lattice: LatticeMesh
@@ -48,6 +51,7 @@ class Assembly:
     composition: Composition | None = None
     connect: Callable[[Floats], Springs] | None = None
     fixed: Booleans | None = None
+    masters: csr_array | None = None
 
 
 @dataclass(frozen=True)
@@ -79,9 +83,7 @@ def assemble(
 
     `tissue`: what differs from place to place, if anything; `density` is that around.
     """
-    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
-    lower, upper = surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
-    lattice = cells.build(body, lower, upper, spacing)
+    lattice = cells.build(body, *_box(surface), spacing)
     weights, _ = lattice.interpolation(surface.points)
     made = cells.composed(lattice, tissue)
     whole = Assembly(
@@ -137,6 +139,33 @@ def of_tissue(assembly: Assembly, material: Material, modulus: float) -> tuple[A
     return replace(assembly, springs=springs), replace(material, volume=term)
 
 
+def assemble_graded(
+    body: SolidShape,
+    surface: SurfaceRule,
+    density: float,
+    grading: Grading,
+    foundation: Support,
+    tool: ToolPatch,
+    flexion: float = 0.0,
+) -> Assembly:
+    """Graded lattice over the body. ValueError if empty, not held, or not touched by the tool."""
+    lattice = graded.build(body, *_box(surface), grading)
+    weights, _ = lattice.interpolation(surface.points)
+    return Assembly(
+        lattice,
+        graded.springs(lattice, flexion),
+        graded.node_masses(lattice, density),
+        *contact(weights, surface, foundation, tool),
+        masters=lattice.masters if lattice.hanging else None,
+    )
+
+
+def _box(surface: SurfaceRule) -> tuple[Floats, Floats]:
+    """Lower and upper corner [m] of the box of a body, a little larger."""
+    margin = 1e-9 * np.ptp(surface.points, axis=0).max()
+    return surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
+
+
 def contact(
     weights: csr_array, surface: SurfaceRule, foundation: Support, tool: ToolPatch
 ) -> tuple[csr_array, Floats]:
@@ -167,4 +196,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         material.damping,
         linear=linear,
         fixed=assembly.fixed,
+        masters=assembly.masters,
     )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import damping, internal_forces
+from msm.hanging import interpolate, interpolate_both
 from msm.kernel import kernel
 from msm.network import Network
 from msm.rayleigh import add_stiffness_damping
@@ -39,6 +40,7 @@ def symplectic_euler(
                 pushed = force[i, d] + factors[n, 0] * net.load[i, d]
                 v[i, d] = kept * v[i, d] + share * pushed
                 u[i, d] += dt * v[i, d]
+        interpolate_both(net, u, v)
 
 
 @kernel(nogil=True)
@@ -56,6 +58,7 @@ def velocity_verlet(
                 pushed = force[i, d] + factors[n, 0] * net.load[i, d]
                 v[i, d] = kept * v[i, d] + share * pushed
                 u[i, d] += dt * v[i, d]
+        interpolate_both(net, u, v)
         internal_forces(law, net, u, force)
         for i in range(u.shape[0]):
             share = 0.5 * dt / net.mass[i]
@@ -63,6 +66,7 @@ def velocity_verlet(
             for d in range(3):
                 pushed = force[i, d] + factors[n, 1] * net.load[i, d]
                 v[i, d] += share * (pushed - c * v[i, d])
+        interpolate(net, v)
 
 
 @kernel(nogil=True)
@@ -88,5 +92,7 @@ def runge_kutta_4(law: Any, net: Network, factors: Floats, dt: float, u: Floats,
                     if stage < 3:
                         at[i, d] = u[i, d] + ahead * speed[i, d]
                         speed[i, d] = v[i, d] + ahead * rate
+            interpolate_both(net, at, speed)
         u += du
         v += dv
+        interpolate_both(net, u, v)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.hanging import share_out
 from msm.kernel import inner_kernel, kernel
 from msm.kinematics import gradient_of
 from msm.laws import tension
@@ -30,6 +31,7 @@ def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
         add_spring_forces(law, net, u, force)
         add_volume_forces(net, u, force)
     add_foundation_forces(net, u, force)
+    share_out(net, force)
     hold(net.fixed, force)
 
 
@@ -130,8 +132,8 @@ def scatter_pressure(cell: Any, force: Floats, pressure: float, x: Any, y: Any, 
 @inner_kernel()
 def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
-    to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         swelling, x, y, z = volume_change(net.cells[c], u, to_gradient)
         scatter_pressure(net.cells[c], force, net.bulk[c] * swelling * to_gradient, x, y, z)
 
@@ -139,8 +141,8 @@ def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
 @inner_kernel()
 def add_linear_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     """Add -kappa V div(u) B_a for each corner a of each cell."""
-    to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         cell = net.cells[c]
         x, _, _ = gradient_of(cell, u, 0, to_gradient)
         _, y, _ = gradient_of(cell, u, 1, to_gradient)

@@ -55,10 +55,13 @@ def dot(a: Any, b: Any) -> Any:
 
 
 @kernel()
-def inverted_cells(cells: NDArray[np.int64], spacing: float, u: Floats) -> int:
-    """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F."""
+def inverted_cells(cells: NDArray[np.int64], edges: Floats, u: Floats) -> int:
+    """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F.
+
+    `edges` [m] (c,): of the cells.
+    """
     count = 0
     for c in range(cells.shape[0]):
-        f, g, h = deformation(cells[c], spacing, u)
+        f, g, h = deformation(cells[c], edges[c], u)
         count += 0 if dot(f, cross(g, h)) > 0.0 else 1
     return count

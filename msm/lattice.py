@@ -68,13 +68,18 @@ class CellLattice:
     fill: Floats
     dropped: float
 
+    @property
+    def edges(self) -> Floats:
+        """Edge [m] of each cell (c,), alike."""
+        return np.full(len(self.cells), self.spacing)
+
     def interpolation(self, points: Floats) -> tuple[csr_array, int]:
         """Trilinear weights (q, n), see `interpolation`."""
         return interpolation(self, points)
 
     def inverted_cells(self, displacement: Floats) -> int:
         """How many cells a displacement [m] (n, 3) turns inside out: J <= 0 of the mean F."""
-        return int(inverted_cells(self.cells, self.spacing, displacement))
+        return int(inverted_cells(self.cells, self.edges, displacement))
 
 
 def build(body: SolidShape, lower: Floats, upper: Floats, spacing: float) -> CellLattice:
@@ -89,7 +94,7 @@ def build(body: SolidShape, lower: Floats, upper: Floats, spacing: float) -> Cel
             f"lattice.spacing: {1e3 * spacing:.3g} mm makes {np.prod(shape.astype(float)):.3g} "
             f"cells in the organ's box, the limit is {MAX_CELLS:.0e}; enlarge it"
         )
-    fill = _fill_fractions(body, lower, shape, spacing)
+    fill = fill_fractions(body, lower, shape, spacing)
     pieces, _ = label(fill >= SMALLEST_FILL)
     sizes = np.bincount(pieces.ravel(), weights=fill.ravel())
     if len(sizes) < 2:
@@ -109,7 +114,7 @@ def _strides(shape: Ints) -> Ints:
     return np.array([shape[1] * shape[2], shape[2], 1])
 
 
-def _fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: float) -> Floats:
+def fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: float) -> Floats:
     """Share of each cell inside the body, from a regular grid of points in it."""
     s = SAMPLES_PER_EDGE
     axes = [origin[i] + spacing * (np.arange(shape[i] * s) + 0.5) / s for i in range(3)]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.hanging import share_out_values
 from msm.kernel import inner_kernel, kernel
 from msm.kinematics import cross, deformation, dot
 from msm.laws import stiffness, tension
@@ -46,7 +47,7 @@ def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
     Each part of the energy is bounded by squares of the motions of its nodes: a spring by
     sigma |x_i - x_j|^2 <= 2 sigma (|x_i|^2 + |x_j|^2), sigma its larger stiffness; a cell by
     kappa V (|cof F|^2 + sqrt(3) |J - 1| |F|) |G|^2 with |G|^2 <= sum |x_a|^2 / (2 h^2); the
-    foundation by its row sums.
+    foundation by its row sums; the square of a hanging node's motion by the mean of its masters'.
     """
     bound[:] = 0.0
     for s in range(net.ends.shape[0]):
@@ -55,12 +56,14 @@ def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
         bound[net.ends[s, 0]] += stiffer
         bound[net.ends[s, 1]] += stiffer
     for c in range(net.cells.shape[0]):
-        stiffer = net.bulk[c] * cell_growth(net, c, u) / (2.0 * net.spacing**2)
+        stiffer = net.bulk[c] * cell_growth(net, c, u) / (2.0 * net.edges[c] ** 2)
         for a in range(8):
             bound[net.cells[c, a]] += stiffer
     for i in range(u.shape[0]):
         for p in range(net.row[i], net.row[i + 1]):
             bound[i] += abs(net.value[p])
+    share_out_values(net, bound)
+    for i in range(u.shape[0]):
         bound[i] /= net.mass[i]
 
 
@@ -69,7 +72,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     """Largest slope of a cell's stress in F over kappa: 3 at rest."""
     if net.linear:
         return 3.0
-    f, g, h = deformation(net.cells[c], net.spacing, u)
+    f, g, h = deformation(net.cells[c], net.edges[c], u)
     gh, hf, fg = cross(g, h), cross(h, f), cross(f, g)
     cofactor = dot(gh, gh) + dot(hf, hf) + dot(fg, fg)
     size = np.sqrt(dot(f, f) + dot(g, g) + dot(h, h))

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from msm.hanging import tied
+
 if TYPE_CHECKING:
     from msm.damping import NodalDamping
     from msm.springs import Springs
@@ -20,11 +22,14 @@ class Network(NamedTuple):
     """What the force and integrator kernels are given.
 
     Springs: `ends` (s, 2) uint32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight
-    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
+    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] and `edges` [m], each (c,);
+    `spacing` [m]: that of the lattice. Nodes: `mass`
     [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
     springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
-    `load` [N] (n, 3). `linear`: forces of small displacements. `fixed` (f, 2) uint32: node and
-    component of each displacement that does not change, on which no force acts.
+    `load` [N] (n, 3). `linear`: forces of small displacements. Hanging nodes, see `msm.hanging`:
+    the node `hanging[k]` moves as its masters `master[p]` by the shares `part[p]`, p from
+    `first_master[k]` to `first_master[k + 1]`; its mass is theirs, and a scale only. `fixed` (f, 2)
+    uint32: node and component of each displacement that does not change, on which no force acts.
     """
 
     ends: NDArray[np.uint32]
@@ -43,6 +48,11 @@ class Network(NamedTuple):
     value: Floats
     load: Floats
     linear: bool
+    edges: Floats
+    hanging: NDArray[np.uint32]
+    first_master: NDArray[np.uint32]
+    master: NDArray[np.uint32]
+    part: Floats
     fixed: NDArray[np.uint32] = np.zeros((0, 2), dtype=np.uint32)
 
 
@@ -55,12 +65,16 @@ def network(
     damping: NodalDamping,
     *,
     linear: bool = False,
+    masters: csr_array | None = None,
     fixed: NDArray[np.bool_] | None = None,
 ) -> Network:
     """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
 
-    `fixed` (n, 3): components of the nodes that do not move.
+    `masters` (n, n): how all nodes move with those that are free, None if all are; `fixed` (n, 3):
+    components of the nodes that do not move.
     """
+    ties = tied(masters)
+    mass = mass if masters is None else mass + (mass == 0.0) * (masters @ mass)
     length = springs.rest_length
     held = np.zeros_like(load, dtype=np.bool_) if fixed is None else fixed
     return Network(
@@ -81,4 +95,9 @@ def network(
         load=np.where(held, 0.0, load),
         linear=linear,
         fixed=np.ascontiguousarray(np.argwhere(held), dtype=np.uint32),
+        edges=np.ascontiguousarray(volume.edges),
+        hanging=ties.hanging,
+        first_master=ties.first,
+        master=ties.master,
+        part=ties.part,
     )

@@ -20,6 +20,7 @@ from msm.forces import (
     scatter_pressure,
     volume_change,
 )
+from msm.hanging import share_out
 from msm.kernel import kernel
 from msm.kinematics import dot, gradient_of
 from msm.laws import stiffness
@@ -37,6 +38,7 @@ def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, forc
     else:
         add_volume_damping(net, u, ahead, force)
     add_foundation_forces(net, ahead, force)
+    share_out(net, force)
     hold(net.fixed, force)
 
 
@@ -69,8 +71,8 @@ def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: 
 @kernel()
 def add_volume_damping(net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add -beta kappa V (dJ/dt) cof(F) B_a for each corner a of a cell; dJ/dt = cof(F) : dF/dt."""
-    to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         cell = net.cells[c]
         _, x, y, z = volume_change(cell, u, to_gradient)
         growth = (

@@ -26,7 +26,7 @@ from msm.laws import Hooke
 from msm.network import Network, network
 from msm.springs import Springs
 from msm.stability import longest_step
-from msm.statics import TOLERANCE, solved, stiffness_at_rest
+from msm.statics import TOLERANCE, extended, solved, stiffness_at_rest
 from msm.timestep import ALLOWED, whole_steps
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def reduced(assembly: Assembly, material: Material, vectors: Floats) -> ReducedL
     """The lattice, linear about rest, among the modes of the span of vectors (3 n, m)."""
     pushed = stiffness_at_rest(assembly, material) @ vectors
     squares, modes = eigh(vectors.T @ pushed)
-    shapes = np.asarray(vectors @ modes)
+    shapes = extended(assembly, np.asarray(vectors @ modes))
     load = shapes.T @ assembly.load.ravel()
     return ReducedLattice(shapes.reshape(-1, 3, len(squares)), squares, load)
 

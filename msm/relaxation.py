@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import internal_forces
+from msm.hanging import interpolate
 from msm.kernel import kernel
 from msm.laws import Law
 from msm.linearised import nodal_bounds
@@ -89,6 +90,7 @@ def move_to_rest(
             energy = 0.0
             set_inertia(law, net, u, inertia)
         u += v
+        interpolate(net, u)
     return step, residual
 
 

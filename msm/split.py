@@ -135,9 +135,9 @@ def spread_pressure(
     net: Network, at: Tangent, q: Floats, inertia: Floats, share: float, out: Floats
 ) -> None:
     """Set out (n, 3) to share M^-1 G^T s q, the velocities [m/s] that the pressures give."""
-    to_gradient = 0.25 / net.spacing
     out[:] = 0.0
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         g = at.cofactor[c]
         push = -to_gradient * np.sqrt(net.bulk[c]) * q[c]
         for d in range(3):
@@ -151,8 +151,8 @@ def spread_pressure(
 @kernel()
 def set_rates(net: Network, at: Tangent, v: Floats, share: float, rates: Floats) -> None:
     """Set rates (c,) to share G v."""
-    to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         rates[c] = 0.0
         for d in range(3):
             g = at.cofactor[c, d]
@@ -166,6 +166,6 @@ def set_diagonal(net: Network, at: Tangent, inertia: Floats, dt: float, out: Flo
     for c in range(net.cells.shape[0]):
         out[c] = 1.0
         for a in range(8):
-            share = dt * dt * net.bulk[c] / (inertia[net.cells[c, a]] * net.spacing**2)
+            share = dt * dt * net.bulk[c] / (inertia[net.cells[c, a]] * net.edges[c] ** 2)
             for d in range(3):
                 out[c] += share * corner_slope(at.cofactor[c], a, d) ** 2

@@ -25,6 +25,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from msm.assembly import Assembly, Material, arrays
 from msm.calibration import lame
+from msm.hanging import interpolate
 from msm.integrators import INTEGRATORS, Integrator
 from msm.laws import Law, stiffness_at_rest
 from msm.linearised import largest_turn, nodal_bounds
@@ -135,8 +136,9 @@ def largest_frequency(
     linearise(law, net, u, tangent)
 
     def product(x: Any) -> Any:
-        force = np.zeros_like(u)
-        add_product(net, tangent, free * x.reshape(-1, 3) / root, 1.0, force)
+        force, motion = np.zeros_like(u), free * x.reshape(-1, 3) / root
+        interpolate(net, motion)
+        add_product(net, tangent, motion, 1.0, force)
         return (force / root).ravel()
 
     if start is None:

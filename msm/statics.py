@@ -9,6 +9,7 @@ from scipy.sparse.linalg import cg
 
 from msm import volume as volumes
 from msm.assembly import Assembly, Material
+from msm.hanging import hanging_nodes
 from msm.laws import initial_stiffness
 from msm.springs import stiffness_matrix
 
@@ -23,7 +24,7 @@ def static_displacement(assembly: Assembly, material: Material) -> Floats:
     ValueError if the support does not hold the lattice.
     """
     stiffness = stiffness_at_rest(assembly, material)
-    return solved(stiffness, assembly.load.ravel()).reshape(-1, 3)
+    return extended(assembly, solved(stiffness, assembly.load.ravel())).reshape(-1, 3)
 
 
 def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> Floats:
@@ -43,14 +44,28 @@ def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> 
 def stiffness_at_rest(assembly: Assembly, material: Material) -> csr_array:
     """Stiffness [N/m] (3 n, 3 n) of springs, volume term and support at rest.
 
-    A fixed unknown is coupled to nothing, and has a stiffness of its own.
+    A fixed unknown is coupled to nothing, and has a stiffness of its own. Hanging nodes are held at
+    zero in it, each by itself; see `extended`.
     """
     count = len(assembly.mass)
     springs = stiffness_matrix(assembly.springs, count, initial_stiffness(material.law))
     whole = csr_array(springs + kron(assembly.foundation, eye_array(3)))
     if material.volume is not None:
         whole = csr_array(whole + volumes.stiffness_matrix(material.volume, count))
-    return whole if assembly.fixed is None else _decoupled(whole, assembly.fixed.ravel())
+    if assembly.fixed is not None:
+        whole = _decoupled(whole, assembly.fixed.ravel())
+    if assembly.masters is None:
+        return whole
+    spread = kron(assembly.masters, eye_array(3))
+    alone = np.repeat(hanging_nodes(assembly.masters), 3)
+    return csr_array(spread.T @ whole @ spread + diags_array(alone * whole.diagonal().mean()))
+
+
+def extended(assembly: Assembly, motion: Floats) -> Floats:
+    """A motion (3 n, ...) of which that of hanging nodes is left out, with it."""
+    if assembly.masters is None:
+        return motion
+    return np.asarray(kron(assembly.masters, eye_array(3), format="csr") @ motion)
 
 
 def _decoupled(matrix: csr_array, fixed: NDArray[np.bool_]) -> csr_array:

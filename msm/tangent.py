@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import hold, scatter
+from msm.hanging import share_out
 from msm.kernel import inner_kernel, kernel
 from msm.kinematics import cross, dot, gradient_of
 from msm.linearised import spring_state
@@ -75,7 +76,7 @@ def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
 def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
     """Set F and its cofactors (3, 3) of a cell; J - 1. At rest, and div u, if the net is linear."""
     for d in range(3):
-        f[d, 0], f[d, 1], f[d, 2] = gradient_of(net.cells[c], u, d, 0.25 / net.spacing)
+        f[d, 0], f[d, 1], f[d, 2] = gradient_of(net.cells[c], u, d, 0.25 / net.edges[c])
     swelling = f[0, 0] + f[1, 1] + f[2, 2]
     if net.linear:
         f[:] = 0.0
@@ -112,6 +113,7 @@ def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats)
         for e in range(net.row[i], net.row[i + 1]):
             for d in range(3):
                 out[i, d] += share * net.value[e] * p[net.column[e], d]
+    share_out(net, out)
     hold(net.fixed, out)
 
 
@@ -136,8 +138,8 @@ def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: 
 @inner_kernel()
 def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add that of the cells."""
-    to_gradient = 0.25 / net.spacing
     for c in range(net.cells.shape[0]):
+        to_gradient = 0.25 / net.edges[c]
         cell, f, g = net.cells[c], at.deformation[c], at.cofactor[c]
         swelling = 0.0
         rate = (
@@ -170,7 +172,7 @@ def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
     for c in range(net.cells.shape[0]):
         for a in range(8):
             for d in range(3):
-                slope = corner_slope(at.cofactor[c], a, d) / net.spacing
+                slope = corner_slope(at.cofactor[c], a, d) / net.edges[c]
                 out[net.cells[c, a], d] += share * net.bulk[c] * slope * slope
     for i in range(out.shape[0]):
         for e in range(net.row[i], net.row[i + 1]):

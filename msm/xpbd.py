@@ -83,7 +83,7 @@ def project_cells(net: Network, inertia: Floats, dt: float, u: Floats, work: Flo
         give = 1.0 / (net.bulk[c] * dt * dt)
         for a in range(8):
             for d in range(3):
-                slope[a, d] = corner_slope(g, a, d) / net.spacing
+                slope[a, d] = corner_slope(g, a, d) / net.edges[c]
                 give += slope[a, d] ** 2 / inertia[net.cells[c, a]]
         for a in range(8):
             i = net.cells[c, a]

@@ -347,7 +347,7 @@ def test_inverted_cells_are_counted_by_their_determinant(rng):
     gradient = np.einsum("cad,ae->cde", u[lattice.cells], toward)
     expected = int((np.linalg.det(np.eye(3) + gradient) <= 0).sum())
     assert 0 < expected < len(lattice.cells)
-    assert inverted_cells(lattice.cells.astype(np.int32), H, u) == expected
+    assert inverted_cells(lattice.cells.astype(np.int32), lattice.edges, u) == expected
 
 
 def test_a_state_that_is_not_finite_counts_as_beyond_all_bounds():

@@ -66,9 +66,11 @@ class CorrectedLattice:
     label: str = "Corrected lattice"
 
     def varied(self, **settings: Any) -> Self:
-        """With another level of the mesh, or other keys of the scene's table `lattice`."""
+        """With another level of the mesh, `coarse` lattice, or other keys of its table."""
         own = {key: settings.pop(key) for key in ("level",) if key in settings}
-        coarse = self.coarse.varied(**settings) if settings else self.coarse
+        graded = settings.pop("coarse", "graded" if self.coarse.graded else "uniform") == "graded"
+        coarse = replace(self.coarse, graded=graded)
+        coarse = coarse.varied(**settings) if settings else coarse
         return replace(self, fine=self.fine.varied(**own), coarse=coarse)
 
     def prepare(self, problem: Problem) -> PreparedCorrected:
@@ -191,7 +193,7 @@ class PreparedCorrected:
         return replace(
             record,
             time_step_errors=errors.by_steps(order, half, record.time_step_errors),
-            correction=errors.by_spacing(lattice.spacing, compared),
+            correction=errors.by_spacing(self.model.coarse.spacing, compared),
         )
 
     def _halved(
@@ -204,7 +206,7 @@ class PreparedCorrected:
     def _compared(self, found: Remainder, progress: Progress) -> Trajectory | str:
         """The remainder of a lattice of FINER times the spacing, or why there is none."""
         coarse = self.model.coarse
-        spacing = FINER * coarse.lattice.spacing
+        spacing = FINER * coarse.spacing
         try:
             other = coarse.varied(spacing=spacing).prepare(self.problem)
             remainder = PreparedRemainder(other, found.vectors)
@@ -267,6 +269,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[CorrectedLattice]:
 
 def _coarse(scene: Scene) -> LatticeModel:
     """Nonlinear, over the organ, with the volume term where the Poisson ratio asks for it."""
+    graded = scene.corrected.coarse == "graded"
     spacing = scene.corrected.spacing or TIMES * scene.lattice.spacing
     lattice = replace(
         scene.lattice,
@@ -276,8 +279,15 @@ def _coarse(scene: Scene) -> LatticeModel:
         volume_term=scene.tissue.poisson_ratio > SPRING_POISSON_RATIO,
     )
     make = partial(_springs, damping=reference_damping(scene))
-    changed = replace(scene, lattice=lattice)
-    return LatticeModel(name="corrected", label="Coarse lattice", scene=changed, make=make)
+    region = replace(
+        scene.region,
+        spacing=scene.region.spacing or 0.5 * scene.lattice.spacing,
+        radius=scene.region.radius or scene.tool.radius,  # displacements are large at the tool
+    )
+    changed = replace(scene, lattice=lattice, region=region)
+    return LatticeModel(
+        name="corrected", label="Coarse lattice", scene=changed, make=make, graded=graded
+    )
 
 
 def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> SpringMaterial:
@@ -289,14 +299,15 @@ def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> Sp
 
 def assumptions(scene: Scene) -> list[str]:
     """On what the sum takes for granted."""
-    coarse = _coarse(scene).lattice
+    coarse = _coarse(scene)
+    sizes = " and more" if coarse.graded else ""
     return [
         "The corrected lattice is the linear finite elements plus what a lattice of "
-        f"{1e3 * coarse.spacing:.3g} mm does beyond itself linear, for this place of the load "
-        "only. Its errors are estimates, none of them a bound: of what the spacing leaves out of "
-        f"the nonlinear part, from a lattice of {FINER:.2g} times the spacing and an assumed order "
-        f"of {ORDER:g}; of the linear part by its mesh and by its vectors.",
-        *springs(_coarse(scene).scene),
+        f"{1e3 * coarse.spacing:.3g} mm{sizes} does beyond itself linear, for this place of the "
+        "load only. Its errors are estimates, none of them a bound: of what the spacing leaves out "
+        f"of the nonlinear part, from a lattice of {FINER:.2g} times the spacing and an assumed "
+        f"order of {ORDER:g}; of the linear part by its mesh and by its vectors.",
+        *springs(coarse.scene),
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, Self
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from msm import model as msm
 from msm import tetrahedra
+from msm.graded import GradedLattice
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import LAWS, force_law_of
@@ -28,17 +29,19 @@ from study.models.errors import (
 )
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
+from study.models.region_size import Sized, Wanted, sized
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import Check, CurveErrors, LatticeRecord, ModelRecord
-from study.scene import Lattice, Scene
+from study.scene import Lattice, Scene, graded
 
 Floats = NDArray[np.float64]
 
 MASS_LIMIT = 0.05
+REGION_KEYS = ("spacing", "levels", "radius", "tolerance")
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,8 @@ Make = Callable[[Scene, LatticeMesh], SpringMaterial]
 class LatticeModel:
     """Springs over the organ of a scene, which `make` makes; `bounds` at two other stiffnesses.
 
-    `system`: the fuzzy system whose estimate they have.
+    `system`: the fuzzy system whose estimate they have; `graded`: on cells of several sizes, as the
+    scene's table `region` has them.
     """
 
     name: str
@@ -66,6 +70,14 @@ class LatticeModel:
     make: Make
     bounds: tuple[Make, Make] | None = None
     system: str | None = None
+    graded: bool = False
+
+    @property
+    def spacing(self) -> float:
+        """Edge [m] of its cells, of graded ones the finest."""
+        if not self.graded:
+            return self.lattice.spacing
+        return self.scene.region.spacing or 0.5 * self.lattice.spacing
 
     @property
     def lattice(self) -> Lattice:
@@ -73,19 +85,38 @@ class LatticeModel:
         return self.scene.lattice
 
     def varied(self, **settings: Any) -> Self:
-        """With other keys of the scene's table `lattice`.
+        """With other keys of the scene's table `lattice`, or `region` where it has them.
 
         A step is left out, and precision is double, unless it is given.
         """
+        scene = self.scene
+        if self.graded:
+            own = {key: settings.pop(key) for key in REGION_KEYS if key in settings}
+            scene = replace(scene, region=replace(scene.region, **own))
         free = replace(
             self.lattice, springs="lattice", precision="double", time_step=None, step_rate=None
         )
-        return replace(self, scene=replace(self.scene, lattice=replace(free, **settings)))
+        return replace(self, scene=replace(scene, lattice=replace(free, **settings)))
 
     def prepare(self, problem: Problem) -> PreparedLattice:
         """The lattice on the organ, and its springs."""
+        if self.graded:
+            for unfit in graded.unfit(self.lattice):
+                raise ValueError(unfit)
+            found = sized(problem, self._wanted(), self._material)
+            springs = self.make(self.scene, found.assembly.lattice)
+            return PreparedLattice(self, problem, found.assembly, springs, found.assembly, found)
         plain = assembled(problem, self.lattice)
         return on_lattice(self, problem, plain, self.make(self.scene, plain.lattice))
+
+    def _wanted(self) -> Wanted:
+        """Where its cells are small."""
+        region = self.scene.region
+        how = region.levels, region.radius, region.tolerance, region.at
+        return Wanted(self.spacing, *how, self.lattice.flexion)
+
+    def _material(self, assembly: Assembly) -> Material:
+        return self.make(self.scene, assembly.lattice).material
 
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
@@ -135,13 +166,17 @@ def on_lattice(
 
 @dataclass(frozen=True, eq=False)
 class PreparedLattice:
-    """A lattice on its organ; `plain`: the same of one tissue, which other springs start from."""
+    """A lattice on its organ; `plain`: the same of one tissue, which other springs start from.
+
+    `region`: how far its finest cells reach, if it is graded.
+    """
 
     model: LatticeModel
     problem: Problem
     assembly: Assembly
     springs: SpringMaterial
     plain: Assembly
+    region: Sized | None = None
 
     @property
     def linear(self) -> bool:
@@ -189,9 +224,29 @@ class PreparedLattice:
         limit = f"{1e3 * step:.3g} ms" if np.isfinite(step) else "none"
         return [
             f"{where}: {nodes} nodes, {count} springs",
+            *self._sizes(),
             f"{self.model.name}: law {self._law()}, modulus {self.springs.modulus / 1e3:.2f} kPa, "
             f"critical step {limit}, damping {damping.gamma_0:.4g} 1/s{dashpots}",
         ]
+
+    def _sizes(self) -> Iterator[str]:
+        """Of cells of several sizes, how many of each, and what their radius is based on."""
+        found, lattice = self.region, self.assembly.lattice
+        if found is None:
+            return
+        assert isinstance(lattice, GradedLattice)  # noqa: S101 - which has a size
+        cells = ", ".join(
+            f"{len(one.cells)} of {1e3 * one.spacing:.3g} mm" for one in lattice.levels
+        )
+        apart = (
+            "as given"
+            if found.apart is None
+            else f"at rest {100 * found.apart:.2g} % off the finest cells throughout"
+        )
+        yield (
+            f"{self.model.name}: cells {cells}, {lattice.hanging} nodes hang; the finest reach "
+            f"{1e3 * found.radius:.3g} mm, {apart}"
+        )
 
     def _law(self) -> str:
         """Name in the table of the law that the springs have."""
@@ -377,7 +432,7 @@ class PreparedLattice:
         """Of an inner node of the cubic lattice, or the mean of a mesh [kg]."""
         if self.model.lattice.springs == "tetrahedra":
             return float(self.assembly.mass.mean())
-        return self.problem.tissue.density * self.model.lattice.spacing**3
+        return self.problem.tissue.density * self.model.spacing**3
 
 
 def _mass_of(problem: Problem) -> float:

@@ -16,6 +16,7 @@ MODELS = {
     "msm": "study.models.fuzzy_tuned:KIND",
     "reading": "study.models.reading:KIND",
     "tissue": "study.models.tissue:KIND",
+    "region": "study.models.region:KIND",
     "superposition": "study.models.superposition:KIND",
     "corrected": "study.models.corrected:KIND",
 }

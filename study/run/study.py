@@ -50,7 +50,7 @@ from study.stages.lanes import lanes
 SUITED, FUZZY, SIMILARITY = "scene suited to the organ", "fuzzy systems", "similarity"
 NO_FUZZY = (
     *("organ", "support", "tool", "lattice", "damping", "basafa", "reference"),
-    *("superposition", "corrected"),
+    *("superposition", "corrected", "region"),
     *("time", "control_points"),
 )
 """Tables of a scene that its fuzzy systems do not read."""

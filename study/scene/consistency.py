@@ -12,6 +12,7 @@ from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
 from study.problem.features import FEATURES
 from study.problem.rigid import SLIDING
+from study.scene import graded
 from study.scene.law import SpringLaw
 from study.scene.schema import Inclusion, Lattice, Require, Scene, Tool, Waypoint
 
@@ -31,6 +32,7 @@ MESH_ONLY = (
     ("reference",),
     ("superposition",),
     ("corrected",),
+    ("region",),
     ("control_points",),
     ("renders",),
     ("tool", "place"),
@@ -150,6 +152,7 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
         yield from _mesh_springs_contradictions(lattice, table)
     if lattice.precision == "single":
         yield from _precision_contradictions(lattice)
+    yield from graded.contradictions(scene)
     if lattice.law is not None:
         yield from _law_contradictions(scene, lattice.law)
     if lattice.volume_term and nu < SPRING_POISSON_RATIO:

@@ -14,6 +14,7 @@ from study.annotation.quantity import Quantity
 from study.scene import Organ, Scene, SpringLaw, Support, Tool
 from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
+from study.scene.graded import has_graded
 from study.scene.schema import SuitedKey
 from study.scene.text import key_lines, parsed, read_text
 
@@ -165,6 +166,8 @@ def _unused(scene: Scene) -> Iterator[tuple[str | int, ...]]:
     for name in ("superposition", "corrected"):
         if name not in scene.models:
             yield (name,)
+    if not has_graded(scene):
+        yield ("region",)
 
 
 def _unused_of_load(scene: Scene) -> Iterator[tuple[str | int, ...]]:

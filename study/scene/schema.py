@@ -339,9 +339,29 @@ class Superposition:
 
 @dataclass(frozen=True, kw_only=True)
 class Corrected:
-    """Of the model of that name: `spacing` of its coarse lattice, else twice `lattice.spacing`."""
+    """Of the model of that name: `spacing` of its coarse lattice, else twice `lattice.spacing`.
+
+    `coarse`: that lattice, or a graded one as the table `region` has it, in place of a `spacing`.
+    """
 
     spacing: Length | None = None
+    coarse: Literal["uniform", "graded"] = "uniform"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Of the model of that name: `spacing` of its finest cells, else half of `lattice.spacing`.
+
+    They reach out to `radius` from the tools and from the control points `at`, or as far as
+    `tolerance` asks for, a relative difference from the finest cells throughout. Beyond, cells
+    double up to `levels` sizes in all.
+    """
+
+    spacing: Length | None = None
+    levels: Annotated[int, Quantity("", 1, 6)] = 3
+    radius: Length | None = None
+    tolerance: Annotated[float, Quantity("", 1e-4, 1.0)] = 0.02
+    at: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -397,6 +417,7 @@ class Scene:
     reference: Reference = field(default_factory=Reference)
     superposition: Superposition = field(default_factory=Superposition)
     corrected: Corrected = field(default_factory=Corrected)
+    region: Region = field(default_factory=Region)
     time: Time = field(default_factory=Time)
     control_points: dict[str, Place] = field(default_factory=dict)
     require: Require | None = None

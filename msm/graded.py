@@ -1,0 +1,194 @@
+"""A lattice of cells of several sizes: fine round places of interest, coarse elsewhere.
+
+Each cell has springs and volume term as in a uniform lattice of its size, weighted so that one
+spring law serves all: the stiffness of a spring grows with the edge of its cell. Where sizes meet,
+nodes hang (`msm.hanging`), so that the displacement is continuous. In a uniform strain, however
+large, edges and face diagonals of a cell push on its corners as the trilinear shape functions would
+have a uniform stress do, whence the lattice is at rest in it, across the sizes too. Body diagonals
+do not: where a region of small cells has corners, what they leave under shear is not in balance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+from scipy.spatial import KDTree
+
+from msm.hanging import hanging_nodes
+from msm.kinematics import inverted_cells
+from msm.lattice import CORNERS, CellLattice, interpolation, node_volumes
+from msm.octree import Grading, Leaves, leaves
+from msm.springs import Springs, connect
+from study.organ.occupancy import SolidShape
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class GradedLattice:
+    """Nodes [m] (n, 3) of all cells, those that hang included.
+
+    `levels`: the cells of each size, the finest first, all of them over the same nodes. `masters`
+    (n, n): how all nodes move with those that do not hang. `dropped`: share of the body's volume in
+    cells left out.
+    """
+
+    levels: tuple[CellLattice, ...]
+    masters: csr_array
+    dropped: float
+
+    @property
+    def nodes(self) -> Floats:
+        """Nodes [m] (n, 3)."""
+        return self.levels[0].nodes
+
+    @property
+    def spacing(self) -> float:
+        """Edge [m] of the finest cells, at which springs of relative stiffness 1 have k_ref."""
+        return self.levels[0].spacing
+
+    @property
+    def cells(self) -> Ints:
+        """Node numbers (c, 8), corners in the order of CORNERS, the finest cells first."""
+        return np.concatenate([one.cells for one in self.levels])
+
+    @property
+    def edges(self) -> Floats:
+        """Edge [m] of each cell (c,)."""
+        return np.concatenate([one.edges for one in self.levels])
+
+    @property
+    def fill(self) -> Floats:
+        """Share of each cell (c,) inside the body."""
+        return np.concatenate([one.fill for one in self.levels])
+
+    @property
+    def hanging(self) -> int:
+        """How many nodes hang."""
+        return int(hanging_nodes(self.masters).sum())
+
+    def interpolation(self, points: Floats) -> tuple[csr_array, int]:
+        """Trilinear weights (q, n) at points [m] (q, 3), and how many lie outside all cells.
+
+        Those are extrapolated from the nearest cell. Hanging nodes have no weight: their masters
+        have it.
+        """
+        apart = np.array([_outside(one, points) for one in self.levels])
+        nearest, outside = apart.argmin(axis=0), 0
+        whole = csr_array((len(points), len(self.nodes)))
+        for level, one in enumerate(self.levels):
+            chosen = np.flatnonzero(nearest == level)
+            if len(chosen):
+                weights, count = interpolation(one, points[chosen])
+                place = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
+                whole += csr_array(place, shape=(len(points), len(chosen))) @ weights
+                outside += count
+        return csr_array(whole @ self.masters), outside
+
+    def inverted_cells(self, displacement: Floats) -> int:
+        """How many cells a displacement [m] (n, 3) turns inside out: J <= 0 of the mean F."""
+        return int(inverted_cells(self.cells, self.edges, displacement))
+
+
+def _outside(level: CellLattice, points: Floats) -> Floats:
+    """How far [m] points (q, 3) lie outside the nearest cell of a level; 0 inside."""
+    if len(level.index) == 0:
+        return np.full(len(points), np.inf)
+    centres = level.origin + level.spacing * (level.index + 0.5)
+    away, _ = KDTree(centres).query(points, p=np.inf)
+    rounding = 1e-9 * level.spacing
+    return np.asarray(np.maximum(away - 0.5 * level.spacing - rounding, 0.0))
+
+
+def build(body: SolidShape, lower: Floats, upper: Floats, grading: Grading) -> GradedLattice:
+    """Graded lattice of a body within the box `lower`, `upper` [m], cells from the lower corner on.
+
+    ValueError for too many cells, or none.
+    """
+    found, finest, dropped = leaves(body, lower, upper, grading)
+    shape = finest + 1
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    corner = [
+        ((one.index[:, None, :] + CORNERS) * 2**level) @ strides for level, one in enumerate(found)
+    ]
+    used = np.unique(np.concatenate([one.ravel() for one in corner]))
+    nodes = lower + grading.spacing * np.stack(np.unravel_index(used, shape), axis=1)
+    levels = tuple(
+        CellLattice(
+            grading.edge(level),
+            lower,
+            nodes,
+            np.searchsorted(used, corner[level]),
+            one.index,
+            one.fill,
+            0.0,
+        )
+        for level, one in enumerate(found)
+    )
+    return GradedLattice(levels, _masters(found, used, strides), dropped)
+
+
+def _masters(found: list[Leaves], used: Ints, strides: Ints) -> csr_array:
+    """How all nodes move with those that do not hang, from the places `used` (n,) of all."""
+    count = len(used)
+    pairs = [
+        tie for level, one in enumerate(found) if level for tie in _ties(level, one, used, strides)
+    ]
+    rows, columns = (np.concatenate([np.zeros(0, int), *(tie[k] for tie in pairs)]) for k in (0, 1))
+    tied = csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    # Each cell that shares an edge ties its middle alike; the shares of a node add up to one.
+    free = np.ones(count, dtype=bool)
+    free[rows] = False
+    sums = np.asarray(tied.sum(axis=1)).ravel() + free
+    tied = csr_array(diags_array(1.0 / sums) @ tied + diags_array(free.astype(float)))
+    for _ in found:  # a master may hang on the next level
+        tied = csr_array(tied @ tied)
+    tied.eliminate_zeros()
+    return tied
+
+
+def _ties(level: int, of: Leaves, used: Ints, strides: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Nodes in the middle of edges and faces of a level's cells, each with all of its masters."""
+    lowest, half = of.index * 2**level, 2 ** (level - 1)
+    for at in product((0, 1, 2), repeat=3):
+        middle = [d for d in range(3) if at[d] == 1]
+        if len(middle) not in {1, 2}:
+            continue
+        place = (lowest + half * np.array(at)) @ strides
+        node = np.minimum(np.searchsorted(used, place), len(used) - 1)
+        there = used[node] == place
+        for ends in product((0, 2), repeat=len(middle)):
+            corner = np.array(at)
+            corner[middle] = ends
+            yield node[there], np.searchsorted(used, ((lowest + half * corner) @ strides)[there])
+
+
+def springs(lattice: GradedLattice, flexion: float = 0.0) -> Springs:
+    """Springs of all cells, relative to k_ref at the finest edge; `flexion` as in `msm.springs`.
+
+    Flexion springs span cells of one size.
+    """
+    parts = [connect(one, flexion) for one in lattice.levels if len(one.cells)]
+    levels = [one for one in lattice.levels if len(one.cells)]
+    ends = np.concatenate([one.ends for one in parts])
+    rest = np.concatenate([one.rest for one in parts])
+    weight = np.concatenate(
+        [
+            one.weight * (level.spacing / lattice.spacing)
+            for one, level in zip(parts, levels, strict=True)
+        ]
+    )
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    return Springs(ends[order], rest[order], weight[order])
+
+
+def node_masses(lattice: GradedLattice, density: float) -> Floats:
+    """Mass [kg] (n,) of the nodes, that of hanging ones with their masters."""
+    volumes = sum(node_volumes(one) for one in lattice.levels)
+    return np.asarray(density * (lattice.masters.T @ volumes))

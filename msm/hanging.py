@@ -1,0 +1,97 @@
+"""Hanging nodes: where a small cell meets a large one, nodes that move as the large one's corners.
+
+On an edge of the large cell such a node moves as the mean of its two ends, on a face as that of its
+four corners, so that the displacement is continuous. Motion goes from the masters to it, force back
+by the same shares, which conserves linear and angular momentum and does no work. A master may hang
+itself; the shares are those of nodes that do not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from msm.kernel import inner_kernel, kernel
+
+if TYPE_CHECKING:
+    from msm.network import Network
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+class Ties(NamedTuple):
+    """Hanging nodes (h,), and the masters of each with their shares, in compressed rows."""
+
+    hanging: NDArray[np.uint32]
+    first: NDArray[np.uint32]
+    master: NDArray[np.uint32]
+    part: Floats
+
+
+def hanging_nodes(masters: csr_array) -> Bools:
+    """Which nodes (n,) hang, by how all nodes move with those that do not (n, n)."""
+    return np.asarray(masters.diagonal() == 0.0)
+
+
+def tied(masters: csr_array | None) -> Ties:
+    """The hanging nodes as the kernels read them."""
+    if masters is None:
+        rows = csr_array((0, 0))
+        nodes = np.zeros(0, dtype=np.int64)
+    else:
+        nodes = np.flatnonzero(hanging_nodes(masters))
+        rows = csr_array(masters[nodes])
+    return Ties(
+        nodes.astype(np.uint32),
+        rows.indptr.astype(np.uint32),
+        rows.indices.astype(np.uint32),
+        rows.data.astype(np.float64),
+    )
+
+
+@kernel()
+def interpolate(net: Network, x: Floats) -> None:
+    """Set what hanging nodes have of x (n, 3) to that of their masters."""
+    for k in range(net.hanging.shape[0]):
+        i = net.hanging[k]
+        for d in range(3):
+            x[i, d] = 0.0
+        for p in range(net.first_master[k], net.first_master[k + 1]):
+            for d in range(3):
+                x[i, d] += net.part[p] * x[net.master[p], d]
+
+
+@inner_kernel()
+def interpolate_both(net: Network, u: Floats, v: Floats) -> None:
+    """Set the motion of hanging nodes, displacements and velocities (n, 3)."""
+    interpolate(net, u)
+    interpolate(net, v)
+
+
+@kernel()
+def share_out(net: Network, force: Floats) -> None:
+    """Give the forces (n, 3) on hanging nodes to their masters."""
+    for k in range(net.hanging.shape[0]):
+        i = net.hanging[k]
+        for p in range(net.first_master[k], net.first_master[k + 1]):
+            for d in range(3):
+                force[net.master[p], d] += net.part[p] * force[i, d]
+        for d in range(3):
+            force[i, d] = 0.0
+
+
+@kernel()
+def share_out_values(net: Network, values: Floats) -> None:
+    """Give values (n,) of hanging nodes to their masters; they keep a mean of the masters'."""
+    for k in range(net.hanging.shape[0]):
+        for p in range(net.first_master[k], net.first_master[k + 1]):
+            values[net.master[p]] += net.part[p] * values[net.hanging[k]]
+    for k in range(net.hanging.shape[0]):
+        mean = 0.0
+        for p in range(net.first_master[k], net.first_master[k + 1]):
+            mean += net.part[p] * values[net.master[p]]
+        values[net.hanging[k]] = mean

@@ -1,0 +1,52 @@
+"""What of a scene is not for a lattice of cells of several sizes, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from study.scene.schema import Lattice, Scene
+
+
+def has_graded(scene: Scene) -> bool:
+    """Whether a model of a scene has cells of several sizes."""
+    return "region" in scene.models or (
+        "corrected" in scene.models and scene.corrected.coarse == "graded"
+    )
+
+
+def contradictions(scene: Scene) -> Iterator[str]:
+    """Keys that contradict each other where a model has cells of several sizes."""
+    if scene.corrected.coarse == "graded" and scene.corrected.spacing is not None:
+        yield "corrected.spacing: a graded lattice has that of the table region; remove it"
+    if not has_graded(scene):
+        return
+    yield from unfit(scene.lattice)
+    for name in scene.region.at:
+        if name not in (scene.control_points or ("tool",)):
+            yield (
+                f"region.at: {name!r} is no control point; there are "
+                f"{', '.join(scene.control_points or ('tool',))}"
+            )
+
+
+def unfit(lattice: Lattice) -> Iterator[str]:
+    """Settings of lattices that one of cells of several sizes does not have."""
+    from msm.integrators import INTEGRATORS
+
+    if lattice.springs == "tetrahedra":
+        yield "lattice.springs: a graded lattice has cubic cells; set it to lattice"
+    if lattice.body_diagonals > 0.0:
+        yield (
+            "lattice.body_diagonals: of a graded lattice they push in shear where cells of two "
+            "sizes meet; set it to 0"
+        )
+    if lattice.precision == "single":
+        yield (
+            "lattice.precision: a graded lattice is stepped in double precision only; leave it out"
+        )
+    able = [name for name, method in INTEGRATORS.items() if method.on_grid is not None]
+    if lattice.integrator not in able:
+        yield (
+            f"lattice.integrator: {lattice.integrator} takes cells of one size only; for a graded "
+            f"lattice set it to {', '.join(able[:-1])} or {able[-1]}"
+        )

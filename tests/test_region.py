@@ -1,0 +1,174 @@
+"""The region of interest as a model of a scene: its size, its motion, its refusals, its record."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.models.region_size import places
+from study.models.table import kind, model
+from study.problem.rigid import SPHERE, RigidTool
+from study.run.study import run
+from study.scene import SceneError
+from study.scene.file import read_scene, write_scene
+from study.scene.problem import problem_of
+
+BLOCK = (
+    'organ.size=["60 mm", "40 mm", "30 mm"]',
+    "tool.radius=10 mm",
+    "support.depth=10 mm",
+    "reference.element_size=15 mm",
+    "lattice.spacing=5 mm",
+    "lattice.volume_term=true",
+    "time.duration=0.4 s",
+    "time.samples=33",
+    "tool.history.ramp=0.2 s",
+    'models=["tissue", "region"]',
+)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return read_scene("block", BLOCK)
+
+
+@pytest.fixture(scope="module")
+def problem(scene):
+    return problem_of(scene)
+
+
+def at_tool(problem, prepared):
+    """The curve (samples, 3) of the control point at the tool."""
+    return prepared.simulate().trajectory.displacement[:, problem.tool_probe]
+
+
+def apart(one, other):
+    return np.linalg.norm(one - other) / np.linalg.norm(other)
+
+
+def test_one_level_moves_as_the_plain_lattice(scene, problem):
+    """By list and by grid; what differs is rounding."""
+    plain = model(scene, "tissue").prepare(problem)
+    found = model(scene, "region").varied(spacing=scene.lattice.spacing, levels=1, volume_term=True)
+    np.testing.assert_allclose(
+        at_tool(problem, found.prepare(problem)), at_tool(problem, plain), rtol=1e-9, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.01])
+def test_the_size_follows_from_the_tolerance_and_holds_in_motion(scene, problem, tolerance):
+    region = model(scene, "region")
+    found = region.varied(tolerance=tolerance, volume_term=True).prepare(problem)
+    assert 0.0 < found.region.apart <= tolerance
+    throughout = model(scene, "tissue").varied(spacing=region.spacing, volume_term=True)
+    whole = throughout.prepare(problem)
+    assert len(found.assembly.mass) < 0.7 * len(whole.assembly.mass)
+    left = apart(at_tool(problem, found), at_tool(problem, whole))
+    assert left < 1.5 * tolerance
+    assert left > 0.2 * found.region.apart  # or the rest tells nothing of the motion
+
+
+def test_a_smaller_radius_is_farther_off(scene, problem):
+    region = model(scene, "region")
+    whole = at_tool(problem, region.varied(levels=1, volume_term=True).prepare(problem))
+    errors = [
+        apart(at_tool(problem, region.varied(radius=r, volume_term=True).prepare(problem)), whole)
+        for r in (0.004, 0.012)
+    ]
+    assert errors[0] > 2.0 * errors[1]
+
+
+def test_cells_are_small_at_a_wanted_control_point(problem, scene):
+    other = next(name for name in problem.probes if name != problem.probes[problem.tool_probe])
+    wanted = replace(scene, region=replace(scene.region, at=(other,), radius=0.004))
+    lattice = model(wanted, "region").prepare(problem).assembly.lattice
+    there = problem.observation.probes[problem.probes.index(other)]
+    (weights, _), finest = lattice.interpolation(there[None]), lattice.levels[0]
+    masters = np.unique(weights.indices[weights.data > 1e-9])
+    assert np.isin(masters, finest.cells).all()
+
+
+def test_cells_are_small_along_the_path_of_a_moved_tool(problem):
+    start, across = problem.tool.centre, np.array([0.01, 0.0, 0.0])
+
+    def travel(times):
+        return np.outer(times / problem.observation.times[-1], across)
+
+    rigid = RigidTool("tool", SPHERE, 0.005, start, problem.tool.direction, travel)
+    found = places(replace(problem, rigid_tools=(rigid,)))
+    assert np.abs(found - start).max() == pytest.approx(0.01)
+    gaps = np.diff(np.sort(found[:, 0]))
+    assert gaps.max() < 0.001
+
+
+def test_the_step_is_that_of_the_finest_cells(scene, problem):
+    found = model(scene, "region").varied(radius=0.008, volume_term=True).prepare(problem)
+    finest = model(scene, "region").varied(levels=1, volume_term=True).prepare(problem)
+    assert found.critical_time_step == pytest.approx(finest.critical_time_step, rel=0.25)
+    stepper = found.stepper()
+    assert stepper.step == pytest.approx(0.8 * found.critical_time_step, rel=0.02)
+
+
+def test_a_run_states_sizes_and_errors(scene):
+    given = replace(scene, models=("region",), renders=False)
+    found = run(given)
+    (one,) = found.models
+    assert one.name == "region"
+    assert one.status == "finished"
+    assert one.lattice.inverted_cells == 0
+    assert one.time_step_errors
+    (words,) = [text for text in kind("region").assumptions(given) if "within 2 %" in text]
+    assert "2.5 mm" in words
+    lines = model(given, "region").prepare(problem_of(given)).describe()
+    assert any("nodes hang" in text and "at rest" in text for text in lines)
+
+
+def test_a_graded_lattice_is_corrected(scene, problem):
+    """The sum follows large displacements as that of a uniform lattice of the finest cells does."""
+    given = replace(scene, models=("corrected",), tool=replace(scene.tool, force=1.0))
+    loaded = problem_of(given)
+    corrected = model(given, "corrected")
+    graded, fine, coarse = (
+        at_tool(loaded, one.prepare(loaded))
+        for one in (
+            corrected.varied(coarse="graded", spacing=0.0025, radius=0.008),
+            corrected.varied(spacing=0.0025),
+            corrected.varied(spacing=0.010),
+        )
+    )
+    assert apart(graded, fine) < 0.5 * apart(coarse, fine)
+    assert apart(coarse, fine) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("words", "key"),
+    [
+        ("lattice.body_diagonals=0.2", "lattice.body_diagonals"),
+        ("lattice.integrator=implicit-euler", "lattice.integrator"),
+        ("lattice.precision=single", "lattice.precision"),
+        ('region.at=["nowhere"]', "region.at"),
+        ("region.levels=0", "region.levels"),
+    ],
+)
+def test_what_a_graded_lattice_has_not_is_refused_by_its_key(words, key):
+    with pytest.raises(SceneError, match=key.replace(".", r"\.")):
+        read_scene("block", (*BLOCK, words))
+
+
+def test_a_spacing_beside_a_graded_corrected_lattice_is_refused():
+    words = ('models=["corrected"]', "corrected.coarse=graded", "corrected.spacing=5 mm")
+    with pytest.raises(SceneError, match=r"corrected\.spacing: a graded lattice"):
+        read_scene("block", (*BLOCK, *words))
+
+
+def test_varied_settings_that_do_not_fit_are_refused(scene, problem):
+    with pytest.raises(ValueError, match=r"lattice\.integrator: xpbd"):
+        model(scene, "region").varied(integrator="xpbd").prepare(problem)
+
+
+def test_the_table_is_written_only_where_it_is_used(scene, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(write_scene(scene))
+    assert "[region]" in path.read_text()
+    assert read_scene(str(path)).region == scene.region
+    assert "[region]" not in write_scene(replace(scene, models=("tissue",)))
