@@ -28,6 +28,7 @@ from study.commands.scenes import scenes
 from study.commands.stability import stability
 from study.commands.tradeoff import tradeoff
 from study.commands.verify import verify
+from study.commands.view import view
 
 app = App(
     name="liver-study",
@@ -121,7 +122,7 @@ def _say(message: str) -> None:
 
 
 for command in (
-    *(run, scenes, check, report, compare, export, verify),
+    *(run, scenes, check, report, view, compare, export, verify),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)
