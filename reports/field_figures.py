@@ -86,8 +86,8 @@ def views(results: Results) -> Views | None:
     fields, named = results.fields, labels(results)
     rest, triangles = fields["points"], fields["triangles"]
     peak = {name: fields[name][PEAK] for name in names}
-    limit = _limit([_length(u) for u in peak.values()])
-    factor = _round_down(SHOWN_DEFORMATION * float(np.ptp(rest, axis=0).max()) / limit)
+    lengths = [_length(u) for u in peak.values()]
+    limit, factor = _limit(lengths), exaggeration(rest, lengths)
     panels = [Panel(named[n], rest + factor * u, _length(u)) for n, u in peak.items()]
     sheets = [Sheet(panels, limit, "displacement [mm]", "YlGnBu")]
     if "fem" in peak and len(peak) > 1:
@@ -106,6 +106,12 @@ def views(results: Results) -> Views | None:
         probes=results.record.probes,
         sheets=sheets,
     )
+
+
+def exaggeration(rest: Floats, lengths: list[Floats]) -> float:
+    """By which displacements of these lengths [m] (s,) are drawn larger on points [m] (s, 3)."""
+    extent = float(np.ptp(rest, axis=0).max())
+    return _round_down(SHOWN_DEFORMATION * extent / _limit(lengths))
 
 
 def _differences(rest: Floats, peak: dict[str, Floats], named: dict[str, str]) -> Sheet:

@@ -51,12 +51,18 @@ MILLI = 1e3
 
 
 def glance(results: Results) -> dict[str, list[str] | Table]:
-    """Table of the first page, a row per model; a column that no model fills is left out."""
+    """Table of the first page as the template takes it; see `glance_table`."""
+    header, rows = glance_table(results)
+    return {"header": header, "rows": rows}
+
+
+def glance_table(results: Results) -> tuple[list[str], Table]:
+    """Header and rows, one per model; a column that no model fills is left out."""
     rows = [_glance_row(results, model) for model in results.record.models]
     kept = [
         i for i, name in enumerate(GLANCE) if name in ALWAYS or any(row[i] != DASH for row in rows)
     ]
-    return {"header": [GLANCE[i] for i in kept], "rows": [[row[i] for i in kept] for row in rows]}
+    return [GLANCE[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
 def _glance_row(results: Results, model: ModelRecord) -> list[str]:

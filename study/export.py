@@ -1,4 +1,4 @@
-"""The finite-element problem of a scene in the files of another code, for `export`."""
+"""The problem of a scene in the files of another code, for `export`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.model import Method
 from fem_reference.solvers import solve_static
 from study.folders import replacing
+from study.handover import write as handover
 from study.mesh.kinds import TetrahedralMesh
 from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
@@ -41,7 +42,8 @@ MESHES = {
     "nastran": ("mesh.bdf", "nastran"),
 }
 """File of the mesh alone by the program that reads it, and meshio's name of its format."""
-FORMATS = ("calculix", "vtu", *MESHES)
+LATTICE = "lattice"
+FORMATS = ("calculix", "vtu", LATTICE, *MESHES)
 MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
@@ -52,7 +54,7 @@ FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     for deck in ("static", "dynamic")
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
-FILES |= {file for file, _ in MESHES.values()}
+FILES |= {file for file, _ in MESHES.values()} | handover.FILES
 FRAMES = 4
 """Times, equally spaced, at which the motion of all nodes is compared."""
 
@@ -69,11 +71,12 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class _Target:
-    """The scene, the folder to write if none is given, and how many elements its results have."""
+    """The scene, the folder to write if none is given, and of results elements and curves."""
 
     scene: Scene
     folder: Path
     elements: int | None = None
+    curves: results.Results | None = None
 
 
 def export(request: ExportRequest, progress: Progress) -> Path:
@@ -82,15 +85,16 @@ def export(request: ExportRequest, progress: Progress) -> Path:
         raise ValueError(f"--to {request.to}: use one of {', '.join(FORMATS)}")
     target = _target(request)
     if target.scene.is_point:
-        raise ValueError("organ.shape: a point has no finite elements; use liver, block or a mesh")
+        raise ValueError(
+            "organ.shape: a point has no finite elements nor lattice; use liver, block or a mesh"
+        )
     _refuse_unheld(request.to, target.scene)
     folder = (request.out or target.folder).resolve()
     with replacing(folder, _foreign, "export") as partial:
         if request.to in MESHES:
             _write_mesh(request.to, target, partial, progress)
         else:
-            write = _write_vtu if request.to == "vtu" else _write_calculix
-            write(target, partial, progress)
+            WRITERS[request.to](target, partial, progress)
     return folder
 
 
@@ -113,7 +117,7 @@ def _target(request: ExportRequest) -> _Target:
     found = results.read(path)
     elements = next((one.elements for one in found.record.models if one.elements), None)
     count = None if elements is None else elements.elements
-    return _Target(found.scene, path / "export", count)
+    return _Target(found.scene, path / "export", count, found)
 
 
 # --- what is written ---------------------------------------------------------------------------
@@ -168,6 +172,19 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
         folder,
         files | {MARK: _about_calculix(scene, given, motion, differences) + _noted(scene, problem)},
     )
+
+
+def _write_lattice(target: _Target, folder: Path, progress: Progress) -> None:
+    from study.handover.lattice import check_curves, lattices
+
+    found = lattices(target.scene, progress)
+    if target.curves is not None:
+        check_curves(found, target.curves)
+    handover.write(found, folder)
+    _write(folder, {MARK: handover.about(found)})
+
+
+WRITERS = {"vtu": _write_vtu, "calculix": _write_calculix, LATTICE: _write_lattice}
 
 
 def _check_memory(level: Level, scene: Scene) -> None:
@@ -342,4 +359,5 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _foreign(present: set[str]) -> str | None:
-    return min(present - FILES, default=None)
+    others = (name for name in present - FILES if not handover.OF_A_MODEL.fullmatch(name))
+    return min(others, default=None)

@@ -29,6 +29,7 @@ from study.commands.stability import stability
 from study.commands.tradeoff import tradeoff
 from study.commands.validate import validate
 from study.commands.verify import verify
+from study.commands.view import view
 
 app = App(
     name="liver-study",
@@ -122,7 +123,7 @@ def _say(message: str) -> None:
 
 
 for command in (
-    *(run, scenes, check, report, compare, export, verify, validate),
+    *(run, scenes, check, report, view, compare, export, verify, validate),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

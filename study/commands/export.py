@@ -1,4 +1,4 @@
-"""`export`: the finite-element problem for another code."""
+"""`export`: the problem for another code."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def export(
     out: Path | None = None,
     set_: Overrides = None,
 ) -> None:
-    """Write the finite-element problem of a scene or of results for another code.
+    """Write the finite-element problem or the lattices of a scene or of results for another code.
 
     Parameters
     ----------
     target
         A built-in scene, a TOML file, or a results folder.
     to
-        calculix (input decks, and our displacement to compare with), vtu (for ParaView), or for
-        the mesh alone gmsh, medit or nastran.
+        calculix (input decks, and our displacement to compare with), vtu (for ParaView), lattice
+        (arrays, a stepper in NumPy, scenes for SOFA), or for the mesh alone gmsh, medit or nastran.
     out
         Folder to write; export in the results folder, or NAME-export here, by default.
     set_

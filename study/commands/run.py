@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
 from study.folders import tell
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from study.scene import Scene
     from study.stages.store import Store
 
+REPORT, PAGE = "report.pdf", "report.html"
+
 
 def run(
     scene: str = "liver",
@@ -23,6 +27,8 @@ def run(
     set_: Overrides = None,
     out: Path | None = None,
     report: bool = True,
+    html: bool = True,
+    open_: Annotated[bool, Parameter(name="--open", negative=())] = False,
     fields: Switch = False,
     resume: Switch = False,
     fresh: Switch = False,
@@ -41,7 +47,11 @@ def run(
     out
         Results folder; results/NAME by default. Earlier results in it are replaced.
     report
-        Whether to make report.pdf.
+        Whether to make report.pdf and report.html.
+    html
+        Whether to make report.html.
+    open_
+        Open report.html once it is made.
     fields
         Keep the motion of all nodes of lattices and fem as MODEL.vtkhdf, which ParaView reads.
     resume
@@ -76,8 +86,14 @@ def run(
                 print("\n".join(planned.at_rest(found, at, progress)))
                 return
         chosen = found.scene
-    how = _How(folder, report, fields, resume, fresh, workers)
+    if open_ and not (report and html):
+        raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
+    how = _How(folder, report, report and html, fields, resume, fresh, workers)
     results = _results(chosen, how, user_store())
+    if open_:
+        from study.commands.view import show
+
+        show(folder / PAGE)
     if any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
 
@@ -88,6 +104,7 @@ class _How:
 
     folder: Path
     report: bool
+    page: bool
     fields: bool
     resume: bool
     fresh: bool
@@ -105,9 +122,10 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
         tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")
     with on_stderr() as progress:
         results = _computed(scene, how, store, progress) if left is None else left.results
-        wanted = how.report and not (left and left.has_report)
-        failure = _report_failure(how, store, progress) if wanted else None
-    if store is not None and (left is None or wanted):
+        report = how.report and not (left and left.has_report)
+        page = how.page and not (left and left.has_page)
+        failure = _report_failure(_Wanted(report, page), how, store, progress)
+    if store is not None and (left is None or report or page):
         unchanged.note(store, key, how.folder)
     _print_summary(results, how.folder)
     if failure is not None:
@@ -119,6 +137,14 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
         )
         sys.exit(EXIT_MACHINE)
     return results
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """Which reports are to be made."""
+
+    report: bool
+    page: bool
 
 
 def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
@@ -145,21 +171,23 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
 
 
 def _report_failure(
-    how: _How, store: Store | None, progress: Progress
+    wanted: _Wanted, how: _How, store: Store | None, progress: Progress
 ) -> Exception | KeyboardInterrupt | None:
-    """Make the report; neither a fault in it nor a signal must cost a finished run."""
+    """Make the reports; neither a fault in them nor a signal must cost a finished run."""
     from study.folders import claimed
     from study.stages.once import keeping_in
 
+    if not (wanted.report or wanted.page):
+        return None
     try:
         with (
             progress.stage("report"),
             claimed(how.folder),
             keeping_in(store, readable=not how.fresh),
         ):
-            from reports.report import make_report
+            from study.commands.report import make
 
-            make_report(how.folder)
+            make(how.folder, report=wanted.report, page=wanted.page)
     except (Exception, KeyboardInterrupt) as error:  # whatever it is, the results stay
         return error
     return None
@@ -181,5 +209,5 @@ def _print_summary(results: Results, folder: Path) -> None:
         if row.quantity == "field-relative-l2-peak":
             share = resolved(row.value, own_error(results, row.reference))
             print(f"{row.model} against {row.reference}: field difference {share}")
-    pdf = folder / "report.pdf"
-    print(f"results in {folder}" + (f", report {pdf}" if pdf.exists() else ""))
+    made = [str(folder / name) for name in (REPORT, PAGE) if (folder / name).exists()]
+    print(f"results in {folder}" + (f", report {' and '.join(made)}" if made else ""))

@@ -57,8 +57,8 @@ if TYPE_CHECKING:
 __all__ = ["Arrays", "Results", "ResultsError", "read", "replacing", "write"]
 
 MARK, SCENE = "results.json", "scene.toml"
-FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, "export"}
-OURS, FIELDS = (".report.pdf", ".export."), manifest.FIELDS  # the first, of killed programs
+FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, manifest.PAGE, "export"}
+OURS, FIELDS = (".report.", ".export."), manifest.FIELDS  # the first, of killed programs
 CHECKSUMS = "sha256"
 """Where results.json has the checksums of the other files, so that two runs are not mixed."""
 

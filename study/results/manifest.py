@@ -1,6 +1,6 @@
 """SHA256SUMS: checksums of a results folder, which `sha256sum -c SHA256SUMS` verifies too.
 
-The report is not among them, for it can be made again.
+The reports are not among them, for they can be made again.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from study.results.errors import ResultsError
 
 NAME = "SHA256SUMS"
-REPORT = "report.pdf"
+REPORT, PAGE = "report.pdf", "report.html"
 FIELDS = ".vtkhdf"
 DATA = frozenset(
     {

@@ -21,14 +21,18 @@ from study.stages.store import Store
 from study.sweep.canonical import digest
 from study.sweep.program import everything
 
+REPORTS = {"report": manifest.REPORT, "page": manifest.PAGE}
+"""What is made of the results, by what a note calls it."""
+
 
 @dataclass(frozen=True)
 class Left:
-    """What a run left in a folder: when [UTC], in short, and whether it has the run's report."""
+    """What a run left in a folder: when [UTC], in short, and which reports of the run it has."""
 
     at: str
     results: Results
     has_report: bool
+    has_page: bool
 
 
 def run_key(scene: Scene, folder: Path, *, fields: bool) -> str:
@@ -50,14 +54,17 @@ def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
     if results is None:
         return None
     at = datetime.fromtimestamp(found.measured, UTC).isoformat(timespec="seconds")
-    report = _sha256(folder / manifest.REPORT)
-    return Left(at, results, report is not None and found.value["report"] == report)
+    report, page = (
+        (digest := _sha256(folder / name)) is not None and found.value.get(kind) == digest
+        for kind, name in REPORTS.items()
+    )
+    return Left(at, results, report, page)
 
 
 def note(store: Store, key: str, folder: Path) -> None:
     """Note what a run has left in a folder."""
-    sums, report = (_sha256(folder / name) for name in (manifest.NAME, manifest.REPORT))
-    store.put(key, {"sums": sums, "report": report}, {}, wall=0.0)
+    reports = {kind: _sha256(folder / name) for kind, name in REPORTS.items()}
+    store.put(key, {"sums": _sha256(folder / manifest.NAME), **reports}, {}, wall=0.0)
 
 
 def _sha256(path: Path) -> str | None:

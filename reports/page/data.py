@@ -1,0 +1,401 @@
+"""What the page draws, as records that become JSON; arrays as base64 of 32-bit numbers."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports import fuzzy_figures, tradeoff
+from reports.appearance import labels, looks, reference_name, system_colour, system_name
+from reports.digits import short, words
+from reports.field_figures import drawable, exaggeration
+from reports.motion_figures import ProbeMotion, motions
+from reports.page.answer import nearest
+from reports.ranking import columns, references, score_table, tool_probe
+from reports.tables import CURVE_NAMES, MEASURE_NAMES
+from study.results.folder import Results
+
+Floats = NDArray[np.float64]
+
+KILO = 1e-3
+MILLI = 1e3
+MOST_SETS = 12
+SHADES = 33
+DASHES = {"fem": "solid", "basafa": "longdash", "reading": "dot"}
+OTHER_DASHES = ("solid", "dashdot", "dash", "longdashdot")
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An array: its shape, the kind of its numbers as a dtype, and their bytes in base64."""
+
+    shape: tuple[int, ...]
+    kind: str
+    base64: str
+
+
+@dataclass(frozen=True)
+class Line:
+    """A model's motion at a control point: rows time [s], displacement [mm], velocity [mm/s].
+
+    `lower` and `upper`: the same of the runs at both ends of a stiffness interval, if any.
+    """
+
+    model: str
+    motion: Packed
+    lower: Packed | None
+    upper: Packed | None
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A control point and the motion of every model there."""
+
+    name: str
+    lines: tuple[Line, ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """How a model is shown: its label, colour and line."""
+
+    name: str
+    label: str
+    colour: str
+    dash: str
+    status: str
+
+
+@dataclass(frozen=True)
+class Organ:
+    """Surface at rest [mm], triangles, and displacement [mm] (2, s, 3) by model.
+
+    The two frames are those of results: at the peak of the load and at the end, of a model that
+    diverged in between the first alone. `push`: direction of the tool; `probes` [mm]; `factor`: by
+    which displacements are exaggerated at first. `reference`: of the differences, if there is one.
+    """
+
+    points: Packed
+    triangles: Packed
+    tool: tuple[float, ...]
+    push: tuple[float, ...]
+    probes: Packed
+    fields: dict[str, Packed]
+    frames: tuple[str, str]
+    factor: float
+    reference: str | None
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A score and the block interval of it, if it is known."""
+
+    score: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Scores against a reference at a control point: a row per model, a column per measure."""
+
+    reference: str
+    probe: str
+    models: tuple[str, ...]
+    cells: tuple[tuple[Cell | None, ...], ...]
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Sets of a variable over kPa, membership (sets, samples) with the ends of the footprint."""
+
+    name: str
+    is_output: bool
+    sets: tuple[str, ...]
+    x: Packed
+    lower: Packed
+    principal: Packed
+    upper: Packed
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Estimate [kPa] of a system over a grid of two readings, and how far between its lines.
+
+    `error` [kPa]: see `interpolation_error`.
+    """
+
+    system: str
+    name: str
+    colour: str
+    estimate: float | None
+    values: Packed
+    error: float
+
+
+@dataclass(frozen=True)
+class Fuzzy:
+    """Sets, and surfaces over the readings `inputs`, grid lines `x` and `y` [kPa].
+
+    `start`: the readings [kPa] of the scene where the sliders stand at first.
+    """
+
+    sets: tuple[Sets, ...]
+    surfaces: tuple[Surface, ...]
+    inputs: tuple[str, str]
+    x: Packed
+    y: Packed
+    start: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A point of the trade-off: name, wall per simulated second, error and its bar [%]."""
+
+    name: str
+    wall: float
+    error: float | None
+    bar: float
+    on_front: bool
+    any_load: bool
+    stated: str
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """Configurations measured before on the built-in liver, and where."""
+
+    configurations: tuple[Configuration, ...]
+    conditions: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """All that the page draws; `nearest`: the model shown first; `scale`: colours of a number."""
+
+    models: tuple[Model, ...]
+    probes: tuple[Probe, ...]
+    tool_probe: str
+    nearest: str | None
+    scale: tuple[str, ...]
+    organ: Organ | None
+    measures: tuple[str, ...]
+    matrices: tuple[Matrix, ...]
+    fuzzy: Fuzzy | None
+    tradeoff: Tradeoff
+
+
+def page(results: Results) -> Page:
+    """What the page of a run draws."""
+    found = nearest(results)
+    return Page(
+        models=tuple(_models(results)),
+        probes=tuple(_probe(results, name) for name in results.record.probes),
+        tool_probe=tool_probe(results),
+        nearest=None if found is None else found.model.name,
+        scale=_scale(),
+        organ=_organ(results),
+        measures=tuple(_measure(curve, measure) for curve, measure in columns(results)),
+        matrices=tuple(_matrices(results)),
+        fuzzy=_fuzzy(results),
+        tradeoff=_tradeoff(),
+    )
+
+
+def packed(array: NDArray[np.generic]) -> Packed:
+    """An array as 32-bit numbers, the least significant byte first on every machine."""
+    kind = "<i4" if array.dtype.kind in "iu" else "<f4"
+    data = np.ascontiguousarray(array, dtype=kind).tobytes()
+    return Packed(tuple(array.shape), kind, base64.b64encode(data).decode("ascii"))
+
+
+def _models(results: Results) -> Iterator[Model]:
+    for i, (name, look) in enumerate(looks(results).items()):
+        dash = DASHES.get(name, OTHER_DASHES[i % len(OTHER_DASHES)])
+        status = results.model(name).status
+        yield Model(name, words(look.label), look.colour, dash, status)
+
+
+def _scale() -> tuple[str, ...]:
+    """Colours that are in the same order to every eye and in grey, dark to light."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return tuple(to_hex(colormaps["cividis"](x)) for x in np.linspace(0.0, 1.0, SHADES))
+
+
+# --- motion --------------------------------------------------------------------------------------
+
+
+def _probe(results: Results, name: str) -> Probe:
+    named = {model.label: model.name for model in results.record.models}
+    found = tuple(_line(named[one.look.label], one) for one in motions(results, name))
+    return Probe(name, found)
+
+
+def _line(model: str, one: ProbeMotion) -> Line:
+    lower, upper = one.bounds or (None, None)
+    return Line(
+        model,
+        packed(one.motion),
+        None if lower is None else packed(lower),
+        None if upper is None else packed(upper),
+    )
+
+
+# --- organ ---------------------------------------------------------------------------------------
+
+
+def _organ(results: Results) -> Organ | None:
+    names, fields = drawable(results), results.fields
+    if not names:
+        return None
+    place, push = fields["tool"]
+    return Organ(
+        points=packed(MILLI * fields["points"]),
+        triangles=packed(fields["triangles"]),
+        tool=tuple(round(MILLI * float(x), 4) for x in place),
+        push=tuple(round(float(x), 6) for x in push),
+        probes=packed(MILLI * fields["probes"]),
+        fields={name: packed(MILLI * _finite(fields[name])) for name in names},
+        frames=("peak of the load", "end"),
+        factor=_factor(fields["points"], [fields[name][0] for name in names]),
+        reference=next((name for name in results.record.references if name in names), None),
+    )
+
+
+def _finite(frames: Floats) -> Floats:
+    """The frames before the first that a model did not reach."""
+    lost = np.flatnonzero(~np.isfinite(frames).all(axis=(1, 2)))
+    return frames[: int(lost[0])] if lost.size else frames
+
+
+def _factor(points: Floats, peaks: list[Floats]) -> float:
+    """Exaggeration as in the pictures of report.pdf."""
+    return exaggeration(points, [np.linalg.norm(u, axis=-1) for u in peaks])
+
+
+# --- similarity ----------------------------------------------------------------------------------
+
+
+def _measure(curve: str, measure: str) -> str:
+    return f"{CURVE_NAMES.get(curve, curve)}: {MEASURE_NAMES.get(measure, measure)}"
+
+
+def _matrices(results: Results) -> Iterator[Matrix]:
+    heads, named = columns(results), labels(results)
+    intervals = {row[:5]: (row.low, row.high) for row in results.score_errors}
+    for reference in references(results):
+        for probe in results.record.probes:
+            scores = score_table(results, reference, probe)
+            rows = tuple(
+                tuple(
+                    _cell(row.get(head), intervals.get((model, reference, probe, *head)))
+                    for head in heads
+                )
+                for model, row in scores.items()
+            )
+            if rows:
+                of = reference_name(results, reference)
+                yield Matrix(of, probe, tuple(named[name] for name in scores), rows)
+
+
+def _cell(score: float | None, interval: tuple[float, float] | None) -> Cell | None:
+    if score is None:
+        return None
+    low, high = interval or (None, None)
+    return Cell(*(None if x is None else float(f"{x:.6g}") for x in (score, low, high)))  # type: ignore[arg-type]
+
+
+# --- fuzzy systems -------------------------------------------------------------------------------
+
+
+def _fuzzy(results: Results) -> Fuzzy | None:
+    arrays = results.fuzzy
+    systems = fuzzy_figures.systems(arrays)
+    if not systems:
+        return None
+    inputs = results.scene.fuzzy.surface
+    x, y = (KILO * arrays[f"surface.{axis}"] for axis in "xy")
+    return Fuzzy(
+        sets=tuple(_sets(results, name) for name in fuzzy_figures.variables(arrays)),
+        surfaces=tuple(_surface(results, system) for system in systems),
+        inputs=inputs,
+        x=packed(x),
+        y=packed(y),
+        start=(_start(results, inputs[0], x), _start(results, inputs[1], y)),
+    )
+
+
+def _start(results: Results, name: str, lines: Floats) -> float:
+    """The scene's reading [kPa], or the lowest line where it has none."""
+    reading = getattr(results.scene.patient, name, None)
+    kilo = float(lines[0]) if reading is None else KILO * float(reading)
+    return float(np.clip(kilo, lines[0], lines[-1]))
+
+
+def _sets(results: Results, name: str) -> Sets:
+    """Sets of a variable; of very many, as many as can be told apart, equally spread."""
+    arrays = results.fuzzy
+    names = [str(one) for one in arrays[f"{name}.sets"]]
+    kept = np.unique(np.linspace(0, len(names) - 1, min(len(names), MOST_SETS)).astype(int))
+    return Sets(
+        name=name,
+        is_output=name == fuzzy_figures.OUTPUT,
+        sets=tuple(short(names[i]) for i in kept),
+        x=packed(KILO * arrays[f"{name}.x"]),
+        lower=packed(arrays[f"{name}.lower"][kept]),
+        principal=packed(arrays[f"{name}.principal"][kept]),
+        upper=packed(arrays[f"{name}.upper"][kept]),
+    )
+
+
+def _surface(results: Results, system: str) -> Surface:
+    values = KILO * np.asarray(results.fuzzy[f"surface.{system}"], dtype=np.float64)
+    found = results.record.fuzzy.systems.get(system)
+    return Surface(
+        system=system,
+        name=system_name(system),
+        colour=system_colour(system),
+        estimate=None if found is None else KILO * found.estimate_pa,
+        values=packed(values),
+        error=interpolation_error(values),
+    )
+
+
+def interpolation_error(values: Floats) -> float:
+    """What bilinear interpolation between the lines of a grid may miss, in the unit of the values.
+
+    Of each direction the largest difference of a node from the mean of its two neighbours, which is
+    what leaving out every second line would miss: four times that of all lines of a smooth surface,
+    and twice that at a crease.
+    """
+    rows = 0.5 * (values[:-2] + values[2:]) - values[1:-1]
+    lines = 0.5 * (values[:, :-2] + values[:, 2:]) - values[:, 1:-1]
+    return sum(float(np.abs(part).max(initial=0.0)) for part in (rows, lines))
+
+
+# --- trade-off -----------------------------------------------------------------------------------
+
+
+def _tradeoff() -> Tradeoff:
+    found = tradeoff.timed(tradeoff.configurations())
+    made = tradeoff.conditions()
+    where = "" if made is None or made.processor is None else f" on {made.processor}"
+    points = tuple(
+        Configuration(
+            name=one.name,
+            wall=one.timing.quartiles[1],
+            error=None if one.error is None else 100.0 * one.error,
+            bar=100.0 * one.bar,
+            on_front=one.on_front,
+            any_load=one.any_load,
+            stated=one.stated_error,
+        )
+        for one in found
+    )
+    return Tradeoff(points, f"Not of this run: measured before on the built-in liver{where}.")

@@ -1,0 +1,203 @@
+"""The lattices of a scene as arrays, with the curves of their runs to compare with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msm.assembly import arrays
+from msm.integrators import INTEGRATORS
+from msm.laws import LAWS, Law, force_law_of, initial_stiffness
+from msm.network import Network
+from study.models.lattice import PreparedLattice
+from study.problem.problem import Problem
+from study.progress import Progress
+from study.results import Results
+from study.results.arrays import Arrays
+from study.run.ready import ReadyPoint, ready
+from study.scene import Scene
+
+Floats = NDArray[np.float64]
+
+STEPPED = "symplectic-euler"
+LAWS_STEPPED = ("hooke", "basafa")
+DIGITS = 1e-9
+"""By how much of its largest value a curve of this run may differ from the stored one."""
+# As msm.lattice has them: x is the highest bit, z the lowest.
+CORNERS = np.array([[(c >> 2) & 1, (c >> 1) & 1, c & 1] for c in range(8)])
+
+
+@dataclass(frozen=True)
+class LawConstants:
+    """Name of a spring law and its constants [N/m] or dimensionless."""
+
+    name: str
+    constants: dict[str, float]
+
+
+@dataclass(frozen=True)
+class ExportedModel:
+    """A lattice model: its own arrays, law, Young's modulus [Pa] at small strain, stiffness there.
+
+    `initial_stiffness` [N/m] of a spring of relative stiffness 1.
+    """
+
+    name: str
+    label: str
+    law: LawConstants
+    modulus: float
+    initial_stiffness: float
+    arrays: Arrays
+
+
+@dataclass(frozen=True)
+class ExportedLattices:
+    """The lattice that the models of a scene share, in arrays, and the models."""
+
+    title: str
+    problem: Problem
+    shared: Arrays
+    models: tuple[ExportedModel, ...]
+
+
+def lattices(scene: Scene, progress: Progress) -> ExportedLattices:
+    """Arrays of all lattices of a scene, each run once more.
+
+    ValueError naming the key of what the exported stepper cannot follow, or for a scene without a
+    lattice.
+    """
+    _refuse(scene)
+    found = ready(scene, progress)
+    if isinstance(found, ReadyPoint):
+        raise ValueError(  # noqa: TRY004 - a scene's choice, reported as such
+            "organ.shape: a point has no lattice; use liver, block or a mesh"
+        )
+    prepared = {name: one for name, one in found.models.items() if isinstance(one, PreparedLattice)}
+    if not prepared:
+        raise ValueError("models: none of them is a lattice; add msm, basafa or reading")
+    first = next(iter(prepared.values()))
+    return ExportedLattices(
+        scene.title,
+        found.problem,
+        _shared(first),
+        tuple(_model(one, progress) for one in prepared.values()),
+    )
+
+
+def _refuse(scene: Scene) -> None:
+    """What the stepper of the export does not follow, by the key that would have to change."""
+    lattice = scene.lattice
+    for is_asked, message in (
+        (bool(scene.features), f"it has {', '.join(scene.features)}; leave these out"),
+        (lattice.integrator != STEPPED, f'set lattice.integrator to "{STEPPED}"'),
+        (lattice.geometry == "linear", 'set lattice.geometry to "nonlinear"'),
+        (lattice.precision == "single", 'set lattice.precision to "double"'),
+        (
+            scene.damping.kind == "rayleigh" and scene.damping.stiffness > 0.0,
+            "set damping.stiffness to 0",
+        ),
+    ):
+        if is_asked:
+            raise ValueError(
+                f"--to lattice: the exported stepper does not follow this scene: {message}"
+            )
+
+
+def _network(one: PreparedLattice) -> Network:
+    return arrays(one.assembly, one.springs.material, linear=one.linear)
+
+
+def _shared(one: PreparedLattice) -> Arrays:
+    problem, net, lattice = one.problem, _network(one), one.assembly.lattice
+    weights, _ = lattice.interpolation(problem.observation.probes)
+    rows = np.repeat(np.arange(len(net.mass)), np.diff(net.row).astype(np.int64))
+    return {
+        "nodes": lattice.nodes,
+        "mass": net.mass,
+        "ends": net.ends.astype(np.int64),
+        "rest": net.rest,
+        "scale": net.scale,
+        "foundation": net.value,
+        "foundation_row": rows,
+        "foundation_column": net.column.astype(np.int64),
+        "load": net.load,
+        "probes": weights.toarray(),
+        "push": np.asarray(problem.tool.direction),
+        "times": problem.observation.times,
+    }
+
+
+def _model(one: PreparedLattice, progress: Progress) -> ExportedModel:
+    law, material = one.springs.material.law, one.springs.material
+    name = next(key for key, kind in LAWS.items() if kind is force_law_of(law))
+    if name not in LAWS_STEPPED:
+        raise ValueError(
+            f"--to lattice: {one.model.name} has springs of law {name}, which the exported stepper "
+            f"does not know; set lattice.law to one of {', '.join(LAWS_STEPPED)}"
+        )
+    net = _network(one)
+    with progress.stage(one.model.name):
+        found = one.moved()
+    if found.trajectory.status != "finished":
+        raise ValueError(
+            f"--to lattice: {one.model.name} diverges; leave it out of models, or choose a smaller "
+            "lattice.step_fraction"
+        )
+    return ExportedModel(
+        name=one.model.name,
+        label=one.model.label,
+        law=LawConstants(name, _constants(law)),
+        modulus=one.springs.modulus,
+        initial_stiffness=initial_stiffness(law),
+        arrays={
+            "gamma_0": np.array(material.damping.gamma_0),
+            "gamma_1": np.array(material.damping.gamma_1),
+            "cells": net.cells.astype(np.int64),
+            "bulk": net.bulk,
+            "slopes": (2.0 * CORNERS - 1.0) / (4.0 * net.spacing),
+            "substeps": found.substeps,
+            "factors": _factors(one.problem, found.substeps),
+            "curve": found.trajectory.displacement @ one.problem.tool.direction,
+        },
+    )
+
+
+def _constants(law: Law) -> dict[str, float]:
+    """Constants of a law by the names that its named tuple has."""
+    return {key: float(x) for key, x in zip(type(law).__annotations__, law, strict=True)}
+
+
+def _factors(problem: Problem, substeps: NDArray[np.int64]) -> Floats:
+    """Share of the load at every step of a run, where its integrator takes it."""
+    (at,) = INTEGRATORS[STEPPED].at
+    times = problem.observation.times
+    interval = float(times[1] - times[0])
+    starts = [
+        start + interval / count * np.arange(count)
+        for start, count in zip(times[:-1], substeps, strict=True)
+    ]
+    return np.concatenate(
+        [
+            problem.factor(found + at * interval / count)
+            for found, count in zip(starts, substeps, strict=True)
+        ]
+    )
+
+
+def check_curves(found: ExportedLattices, results: Results) -> None:
+    """ValueError unless each model moves as its results say, up to their printed digits."""
+    for model in found.models:
+        stored = np.stack(
+            [results.curve(model.name, probe).displacement for probe in found.problem.probes], 1
+        )
+        curve = model.arrays["curve"]
+        if (
+            stored.shape != curve.shape
+            or np.abs(stored - curve).max() > DIGITS * np.abs(curve).max()
+        ):
+            raise ValueError(
+                f"--to lattice: {model.name} moves otherwise than its results say, which another "
+                "version or machine made; run the scene again"
+            )
