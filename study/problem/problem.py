@@ -16,6 +16,7 @@ from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
+from study.problem.varied import notes_of
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +54,11 @@ class Problem:
         """How its motion is looked at."""
         times, volumes = self.observation.times, self.volume_rule.weights
         return Response(times, self.probes, self.tool.direction, volumes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found or assumed of the organ, and how much of it is of other tissue."""
+        return (*self.geometry.notes, *notes_of(self.geometry.mesh, self.tissue))
 
     @property
     def tool_probe(self) -> int:

@@ -49,7 +49,7 @@ def error(name: ElementName, nu: float, contrast: float, cells: int = CELLS) -> 
     centred = TetrahedralMesh(mesh.points - HALF, mesh.tetrahedra)
     body = solid(straight(centred), name, ball.tissue)
     exact = ball.displacement(body.points)
-    outer = (np.abs(body.points) > HALF - 1e-9).any(axis=1)
+    outer = np.asarray((np.abs(body.points) > HALF - 1e-9).any(axis=1))
     prescribed = np.where(outer[:, None], exact, np.nan)
     u = at_rest(body.stiffness, np.zeros(exact.size), prescribed).reshape(-1, 3)
     return ball.off(u, body.points)
