@@ -146,6 +146,7 @@ def _image(path: Path) -> tuple[Floats, Floats]:
     """Voxels (i, j, k), and the affine (4, 4) that takes their numbers to millimetres in RAS."""
     try:
         import nibabel
+        from nibabel.filebasedimages import ImageFileError
     except ImportError:
         raise ValueError(
             "tissue.stiffness_map: needs nibabel, which is not installed; install "
@@ -156,7 +157,7 @@ def _image(path: Path) -> tuple[Floats, Floats]:
         voxels = np.asarray(image.get_fdata(dtype=np.float64))
     except FileNotFoundError:
         raise ValueError(f"tissue.stiffness_map.file: {path}: no such file") from None
-    except (OSError, ValueError, EOFError, nibabel.filebasedimages.ImageFileError) as error:
+    except (OSError, ValueError, EOFError, ImageFileError) as error:
         raise ValueError(
             f"tissue.stiffness_map.file: {path} is no NIfTI image ({error}); name a .nii or "
             ".nii.gz file"
