@@ -101,7 +101,7 @@ def estimate_notes(results: Results) -> list[str]:
 
 def scene_groups(results: Results) -> list[Group]:
     """Tables of the resolved scene: name, and rows of key and value."""
-    scene = resolved_scene(results.scene)
+    scene = dict(_numbered(resolved_scene(results.scene)))
     whole = {key: v for key, v in scene.items() if not isinstance(v, dict) and key not in LEFT_OUT}
     tables = {"scene": whole} | {key: v for key, v in scene.items() if isinstance(v, dict) and v}
     return [
@@ -111,6 +111,15 @@ def scene_groups(results: Results) -> list[Group]:
         }
         for name, table in tables.items()
     ]
+
+
+def _numbered(table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    """Each of several tables on its own, with its number behind the name."""
+    for key, value in table.items():
+        if isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+            yield from ((f"{key} {number}", one) for number, one in enumerate(value, 1))
+        else:
+            yield key, value
 
 
 def balanced(groups: list[Group], count: int) -> list[list[Group]]:
@@ -141,7 +150,7 @@ def _height(group: Group) -> int:
 
 
 def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in table.items():
+    for key, value in _numbered(table):
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")
         else:

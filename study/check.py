@@ -36,7 +36,7 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
         return [*lines, f"one control mass point of {given.problem.mass:.4g} kg"]
     from study.run.dimensionless import dimensionless
 
-    lines += [f"note: {note}" for note in (*scene.remarks, *given.problem.geometry.notes)]
+    lines += [f"note: {note}" for note in (*scene.remarks, *given.problem.notes)]
     numbers = asdict(dimensionless(scene, given.problem))
     lines += [f"{key} = {value:.4g}" for key, value in numbers.items()]
     described = (line for model in given.models.values() for line in model.describe())

@@ -346,7 +346,7 @@ and then has the same tetrahedra again, also where a mesher that is not reproduc
 
 def _noted(scene: Scene, problem: Problem) -> str:
     """What was found, repaired or chosen of the organ, each once."""
-    notes = dict.fromkeys((*scene.remarks, *problem.geometry.notes))
+    notes = dict.fromkeys((*scene.remarks, *problem.notes))
     return "".join(["\nNotes on the organ:\n", *(f"- {note}\n" for note in notes)]) if notes else ""
 
 

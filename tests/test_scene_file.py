@@ -315,7 +315,7 @@ def test_what_an_override_gives_is_on_no_line(tmp_path):
         ("tissue.youngs_modulus=9 kpa", "did you mean 'kPa'"),
         ("support.stiffness=20 mpa/m", "did you mean 'MPa/m'"),
         ("tool.radius=1,5 mm", "the decimal sign is a point"),
-        ("radius=12 mm", "did you mean 'tool.radius'"),
+        ("radius=12 mm", "did you mean 'support.radius' or 'tool.radius'"),
         ("tool.force=nan", "must be finite"),
         ("tool.force=-inf", "must be finite"),
         ("models=3", "should be a list"),

@@ -10,16 +10,19 @@ Micromechanics of Defects in Solids, section 11.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.problem.tissue import Tissue
+from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
 IDENTITY = np.eye(3)
+STRAIN = np.array([[0.01, 0.004, 0.0], [0.004, -0.006, 0.002], [0.0, 0.002, 0.003]])
+"""A strain far away that has all parts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,40 @@ class BallInclusion:
     inside: Tissue
     around: Tissue
     strain: Floats
+
+    @classmethod
+    def stiffer(cls, radius: float, times: float, around: Tissue, strain: Floats) -> BallInclusion:
+        """A ball of so many times the modulus of the tissue around, of its Poisson ratio."""
+        inside = replace(around, youngs_modulus=times * around.youngs_modulus)
+        return cls(radius, inside, around, strain)
+
+    @property
+    def tissue(self) -> VariedTissue:
+        """The body with the ball in it."""
+        distance = Ellipsoid(np.zeros(3), np.full(3, self.radius))
+        ball = Region(
+            name="ball",
+            distance=distance,
+            youngs_modulus=self.inside.youngs_modulus,
+            poisson_ratio=self.inside.poisson_ratio,
+        )
+        around = self.around
+        return VariedTissue(
+            youngs_modulus=around.youngs_modulus,
+            poisson_ratio=around.poisson_ratio,
+            density=around.density,
+            regions=(ball,),
+        )
+
+    def off(self, found: Floats, points: Floats) -> float:
+        """Error of a displacement [m] (n, 3) at points, over what the ball adds there.
+
+        Over the whole displacement if the ball adds nothing.
+        """
+        exact = self.displacement(points)
+        added = exact - points @ self.strain
+        whole = exact if self.inside == self.around else added
+        return float(np.linalg.norm(found - exact) / np.linalg.norm(whole))
 
     @property
     def inner_strain(self) -> Floats:

@@ -46,6 +46,7 @@ PROBLEMS = (
     _problem("damped motion, steps", "Clough and Penzien 1993", "damped_motion:stepped"),
     _problem("damped motion, subspaces", "Clough and Penzien 1993", "damped_motion:superposed"),
     _problem("standing wave", "waves in a box", "standing_wave:findings", quick=False),
+    _problem("ball in a body", "Eshelby 1957", "ball_inclusion:findings", quick=False),
     _problem("iterative solvers", "factors of the same matrix", "iterations:findings"),
 )
 """Problems with exact solutions that `verify` solves by the finite-element reference."""

@@ -16,6 +16,7 @@ from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
+from study.problem.varied import notes_of
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +62,11 @@ class Problem:
             return self.factor
         histories = (self.factor, *(load.factor for load in self.loads))
         return lambda times: np.column_stack([one(times) for one in histories])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found or assumed of the organ, and how much of it is of other tissue."""
+        return (*self.geometry.notes, *notes_of(self.geometry.mesh, self.tissue))
 
     @property
     def tool_probe(self) -> int:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import TetrahedralMesh
+from study.mesh.tetrahedra import volumes
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -26,10 +27,10 @@ Booleans = NDArray[np.bool_]
 Points = Callable[[slice], Floats]
 """Points [m] (c, k, 3), equally many in each of a range of cells, that share the cell equally."""
 
-CHUNK = 4096
-"""Cells that are sampled at once: 216 points of each take 20 MB."""
-SAMPLES = 128
-"""Points in a tetrahedron: a cut through one is told to 2 % of its volume in the mean."""
+CHUNK = 2048
+"""Cells that are sampled at once: 512 points of each take 25 MB."""
+SAMPLES = 512
+"""Points in a tetrahedron: a cut through one is told to 1 % of its volume in the mean."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,6 +160,27 @@ def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition |
     """What each tetrahedron is made of; None for tissue that is the same everywhere."""
     corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
+
+
+def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
+    """How much of the organ is of other tissue than around."""
+    made = of_tetrahedra(mesh, tissue)
+    if made is None or not isinstance(tissue, VariedTissue):
+        return ()
+    size = volumes(mesh)
+    found = [
+        f"{region.name}: {1e6 * float(size @ share):.3g} ml of "
+        f"{region.youngs_modulus / 1e3:.3g} kPa"
+        for region, share in zip(tissue.regions, made.share.T, strict=True)
+    ]
+    if tissue.mapped is not None:
+        part = float(size @ made.mapped_share)
+        modulus = part / max(float(size @ made.mapped), 1e-300)
+        found.append(
+            f"tissue.stiffness_map: {100 * part / size.sum():.0f} % of the organ, Young's modulus "
+            f"{modulus / 1e3:.3g} kPa in the mean (harmonic); the rest is as around"
+        )
+    return tuple(found)
 
 
 @cache

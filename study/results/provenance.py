@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from study.results.records import Provenance
+from study.scene import Scene
 
 PACKAGES = (
     "liver-study",
@@ -43,6 +44,30 @@ def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Pr
 def mesh_sha256(mesh: str | None) -> str | None:
     """SHA-256 of a scene's mesh file, None without one. ValueError if it cannot be read."""
     return _sha256(mesh, "{}: no such file", "organ.mesh: {} cannot be read ({}); name a mesh file")
+
+
+def organ_sha256(scene: Scene) -> str | None:
+    """SHA-256 of all files that a scene's organ is made of: its mesh, inclusions and map.
+
+    That of the mesh alone where there is no other; None without any. ValueError if one cannot be
+    read.
+    """
+    named = {
+        f"tissue.inclusion.{number}.mesh": one.mesh
+        for number, one in enumerate(scene.tissue.inclusion, 1)
+        if one.mesh is not None
+    }
+    if scene.tissue.stiffness_map is not None:
+        named["tissue.stiffness_map.file"] = scene.tissue.stiffness_map.file
+    own = mesh_sha256(scene.organ.mesh)
+    if not named:
+        return own
+    refusal = "{key}: {{}} cannot be read ({{}}); name a file"
+    sums = [
+        _sha256(path, f"{key}: {{}}: no such file", refusal.format(key=key))
+        for key, path in named.items()
+    ]
+    return hashlib.sha256(" ".join(map(str, (own, *sums))).encode()).hexdigest()
 
 
 def rule_base_sha256(rule_base: str | None) -> str | None:

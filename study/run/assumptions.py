@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from study.models import table
+from study.problem.supports import CLAMPED, FOUNDATION
 from study.results.records import ControlPoint
-from study.scene import Scene
+from study.scene import Scene, Support
 
 
 def assumptions(scene: Scene, point: ControlPoint | None) -> tuple[str, ...]:
@@ -33,11 +34,57 @@ def _organ(scene: Scene) -> list[str]:
     return [
         "Organ, support, tool, load history and time span are scene parameters; the paper gives "
         "none.",
-        f"The organ rests on an elastic foundation of {scene.support.stiffness:.3g} Pa/m over its "
-        f"{scene.support.side} surface, the same field for every model and mesh, and so is the "
-        "tool's traction.",
+        *(_held(one) for one in scene.supports),
+        *_tissue(scene),
         "There is no gravity: the shape given is the shape at rest.",
     ]
+
+
+def _held(support: Support) -> str:
+    """On what holds the organ, and what each model makes of it."""
+    where = (
+        f"its {support.side} surface"
+        if support.place is None
+        else f"the surface within {1e3 * (support.radius or 0.0):.3g} mm of a place"
+    )
+    if support.kind == FOUNDATION:
+        return (
+            f"The organ rests on an elastic foundation of {support.stiffness:.3g} Pa/m over "
+            f"{where}, the same field for every model and mesh, and so is the tool's traction."
+        )
+    how = "is clamped" if support.kind == CLAMPED else f"slides across the line to {support.side}"
+    return (
+        f"The organ {how} over {where}: finite elements hold the nodes of the facets there, a "
+        "lattice the nodes nearest to it, which lie up to half a spacing off, so that a clamped "
+        "lattice is thinner or thicker by as much."
+    )
+
+
+def _tissue(scene: Scene) -> list[str]:
+    """On tissue that differs from place to place."""
+    if "inclusions" not in scene.features:
+        return []
+    found = [
+        "Inclusions and the map of stiffness have the modulus that they are given in every model, "
+        "an estimate or the benchmark's law that of the tissue around; all springs share one law "
+        "in proportion. An element or cell that an interface cuts has the mean compliance of its "
+        "parts by volume; results converge at first order in its size, and the elements' own "
+        "error bar is found by meshes that do not follow the interface.",
+    ]
+    if not scene.lattice.volume_term and any(
+        one.poisson_ratio is not None for one in scene.tissue.inclusion
+    ):
+        found.append(
+            "Springs without a volume term have a Poisson ratio of 1/4 in inclusions too, whatever "
+            "theirs."
+        )
+    given = scene.tissue.stiffness_map
+    if given is not None and given.quantity == "shear-modulus":
+        found.append(
+            "Young's modulus follows from the map's shear modulus with the tissue's Poisson ratio "
+            f"of {scene.tissue.poisson_ratio:g}."
+        )
+    return found
 
 
 def _similarity() -> list[str]:

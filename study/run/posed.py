@@ -71,7 +71,7 @@ class Posing:
             surface.triangles,
             np.stack([tool.centre, tool.direction]),
             problem.observation.probes,
-            problem.geometry.notes,
+            problem.notes,
             dimensionless(self.scene, problem),
             self.mesh,
         )

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from study.mesh.quadrature import over_volume
 from study.problem.problem import Problem
-from study.results.provenance import mesh_sha256
+from study.results.provenance import organ_sha256
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
@@ -27,8 +27,8 @@ class Stated:
 
 
 def arguments(scene: Scene) -> Plain:
-    """The scene as plain values, with the SHA-256 of its mesh file if it has one."""
-    return {"scene": resolved(scene), "mesh_sha256": mesh_sha256(scene.organ.mesh)}
+    """The scene as plain values, with the SHA-256 of its files of the organ if it has some."""
+    return {"scene": resolved(scene), "mesh_sha256": organ_sha256(scene)}
 
 
 def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
@@ -40,8 +40,9 @@ def stated(scene: Plain, mesh_sha256: str | None) -> Stated:
 @lru_cache(maxsize=2)
 def _stated(scene: str, mesh: str | None) -> Stated:
     found = validate(json.loads(scene), "scene")
-    if mesh_sha256(found.organ.mesh) != mesh:
-        raise ValueError(f"organ.mesh: {found.organ.mesh} has changed since the runs were planned")
+    if organ_sha256(found) != mesh:
+        named = found.organ.mesh or "a file of its tissue"
+        raise ValueError(f"organ.mesh: {named} has changed since the runs were planned")
     problem = problem_of(found)
     rule = over_volume(problem.geometry.mesh, 1)
     seen = replace(problem.observation, volume_points=rule.points)

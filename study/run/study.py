@@ -15,7 +15,7 @@ from study.problem.response import Response
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.results.folder import Arrays, Results
-from study.results.provenance import mesh_sha256, provenance
+from study.results.provenance import mesh_sha256, organ_sha256, provenance
 from study.results.records import (
     ControlPoint,
     Dimensionless,
@@ -140,7 +140,7 @@ def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -
 
     tuned = estimates(scene) if is_tuned(scene) else {}
     _start_fuzzy(scene, stages, made_by.rule_base_sha256)
-    moving = Moving(scene, tuned, made_by.mesh_sha256, stages, watch)
+    moving = Moving(scene, tuned, organ_sha256(scene), stages, watch)
     posed = moving.start()
     found = moving.motions(posed)
     return Compared(

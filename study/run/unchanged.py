@@ -13,7 +13,7 @@ from pathlib import Path
 
 from study.results import Results, manifest
 from study.results.folder import summary
-from study.results.provenance import mesh_sha256, rule_base_sha256
+from study.results.provenance import organ_sha256, rule_base_sha256
 from study.scene import Scene
 from study.scene.file import resolved
 from study.stages.fingerprint import machine
@@ -40,7 +40,7 @@ def run_key(scene: Scene, folder: Path, *, fields: bool) -> str:
 
     ValueError for a file of the scene that is missing.
     """
-    files = [mesh_sha256(scene.organ.mesh), rule_base_sha256(scene.fuzzy.rule_base)]
+    files = [organ_sha256(scene), rule_base_sha256(scene.fuzzy.rule_base)]
     given = [resolved(scene), str(folder.absolute()), files, fields]
     return digest(["run", *given, everything("reports"), machine()])
 

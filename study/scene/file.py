@@ -327,11 +327,9 @@ def _line(problem: ErrorDetails) -> str:
     location = [str(part) for part in problem["loc"] if not str(part).startswith("function-")]
     key = ".".join(location)
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
-        near = [
-            *difflib.get_close_matches(location[-1], _fields(location[:-1]), n=1),
-            *_elsewhere(location[-1]),
-        ]
-        return f"{key}: unknown key" + (f", did you mean {near[0]!r}?" if near else "; remove it")
+        near = difflib.get_close_matches(location[-1], _fields(location[:-1]), n=1)
+        meant = " or ".join(map(repr, near or _elsewhere(location[-1])))
+        return f"{key}: unknown key" + (f", did you mean {meant}?" if meant else "; remove it")
     message = problem["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
     message = message.replace("a valid tuple", "a list").replace("a valid dictionary", "a table")
     if problem["type"] == "dataclass_type":
@@ -366,7 +364,8 @@ def _held(hint: Any) -> Any:
 
 def _elsewhere(key: str) -> list[str]:
     """Full names of the keys of this name in the tables of a scene."""
-    tables = {f.name: _fields([f.name]) for f in dataclasses.fields(Scene)}
+    own = [f.name for f in dataclasses.fields(Scene) if f.name not in SEVERAL.values()]
+    tables = {name: _fields([name]) for name in own}
     return [f"{table}.{key}" for table, keys in tables.items() if key in keys]
 
 

@@ -52,27 +52,6 @@ def tissue_of(table: OrganTissue, mesh: TetrahedralMesh, surface: SurfaceMesh) -
     return found
 
 
-def notes_of(tissue: Tissue, mesh: TetrahedralMesh) -> tuple[str, ...]:
-    """How much of the organ is of other tissue than around."""
-    made = of_tetrahedra(mesh, tissue)
-    if made is None or not isinstance(tissue, VariedTissue):
-        return ()
-    size = volumes(mesh)
-    found = [
-        f"{region.name}: {1e6 * float(size @ share):.3g} ml of "
-        f"{region.youngs_modulus / 1e3:.3g} kPa"
-        for region, share in zip(tissue.regions, made.share.T, strict=True)
-    ]
-    if tissue.mapped is not None:
-        part = float(size @ made.mapped_share)
-        modulus = part / max(float(size @ made.mapped), 1e-300)
-        found.append(
-            f"tissue.stiffness_map: {100 * part / size.sum():.0f} % of the organ, Young's modulus "
-            f"{modulus / 1e3:.3g} kPa in the mean (harmonic); the rest is as around"
-        )
-    return tuple(found)
-
-
 def _region(one: Inclusion, name: str, surface: SurfaceMesh) -> Region:
     return Region(
         name=name,
@@ -166,7 +145,8 @@ class _Sampled:
 def _image(path: Path) -> tuple[Floats, Floats]:
     """Voxels (i, j, k), and the affine (4, 4) that takes their numbers to millimetres in RAS."""
     try:
-        import nibabel  # type: ignore[import-not-found,unused-ignore] # an extra
+        import nibabel
+        from nibabel.filebasedimages import ImageFileError
     except ImportError:
         raise ValueError(
             "tissue.stiffness_map: needs nibabel, which is not installed; install "
@@ -177,7 +157,7 @@ def _image(path: Path) -> tuple[Floats, Floats]:
         voxels = np.asarray(image.get_fdata(dtype=np.float64))
     except FileNotFoundError:
         raise ValueError(f"tissue.stiffness_map.file: {path}: no such file") from None
-    except (OSError, ValueError, EOFError, nibabel.filebasedimages.ImageFileError) as error:
+    except (OSError, ValueError, EOFError, ImageFileError) as error:
         raise ValueError(
             f"tissue.stiffness_map.file: {path} is no NIfTI image ({error}); name a .nii or "
             ".nii.gz file"

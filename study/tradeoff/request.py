@@ -120,7 +120,7 @@ def advise(
     found = recommend.recommend(
         sampled(given), wanted, store, request.how, progress, known_place=known_place
     )
-    noted = dict.fromkeys((*given.remarks, *problem.geometry.notes))
+    noted = dict.fromkeys((*given.remarks, *problem.notes))
     lines = [*(f"note: {note}" for note in noted), *recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]

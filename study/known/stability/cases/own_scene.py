@@ -25,7 +25,7 @@ from study.models.lattice import LatticeModel, PreparedLattice
 from study.models.model import Prepared
 from study.models.table import kind, model
 from study.problem.problem import Problem
-from study.results.provenance import mesh_sha256
+from study.results.provenance import organ_sha256
 from study.run.ready import set_up
 from study.scene import Scene
 from study.scene.file import resolved, validate
@@ -50,7 +50,7 @@ def cases(scene: Scene) -> Iterator[Case]:
     """Cases of a scene with a body. ValueError for a single control point, which has no lattice."""
     _refuse_point(scene)
     for name in tried(scene):
-        given = {"name": name, "scene": resolved(scene), "mesh": mesh_sha256(scene.organ.mesh)}
+        given = {"name": name, "scene": resolved(scene), "mesh": organ_sha256(scene)}
         if isinstance(model(scene, name), LatticeModel):
             if scene.lattice.integrator in EXPLICIT:
                 yield _case(f"{name}, critical step", "steps", given, MEASURED, quick=True)
@@ -171,7 +171,7 @@ def _prepared(
 ) -> tuple[Prepared, Problem]:
     """A model of a scene whose steps follow the limit, under so many times the load."""
     scene = validate(table, "scene")
-    if mesh_sha256(scene.organ.mesh) != mesh:
+    if organ_sha256(scene) != mesh:
         raise ValueError(f"organ.mesh: {scene.organ.mesh} has changed since the cases were listed")
     scene = replace(_free(scene), tool=replace(scene.tool, force=times * scene.tool.force))
     problem = problem_of(scene)

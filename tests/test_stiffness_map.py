@@ -1,0 +1,193 @@
+"""Maps of stiffness from images, and inclusions as a scene states them."""
+
+import numpy as np
+import pytest
+
+from fem_reference import model as fem
+from fem_reference.solvers import solve_static
+from study.check import describe_scene
+from study.problem.varied import VariedTissue, of_tetrahedra
+from study.results.provenance import organ_sha256
+from study.scene.file import read_scene, validate, write_scene
+from study.scene.problem import problem_of
+
+nibabel = pytest.importorskip("nibabel")
+
+BLOCK = (
+    'organ.size=["60 mm", "40 mm", "30 mm"]',
+    "tool.radius=15 mm",
+    "tool.force=0.05 N",
+    "reference.element_size=12 mm",
+    "time.samples=101",
+)
+STEP = 2.0
+"""Edge of a voxel [mm]."""
+
+
+def image(path, modulus, shape=(34, 24, 19), origin=(2.0, 2.0, -2.0), mirrored=False):
+    """An image of `modulus` at points [m] of the scene; x and y of RAS point the other way."""
+    affine = np.diag([-STEP, -STEP, STEP, 1.0])
+    affine[:3, 3] = origin
+    if mirrored:  # the same voxels stored from the other end of x
+        affine[0, 0], affine[0, 3] = STEP, origin[0] - STEP * (shape[0] - 1)
+    index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
+    in_ras = index @ affine[:3, :3].T + affine[:3, 3]
+    points = 1e-3 * in_ras * [-1.0, -1.0, 1.0]
+    nibabel.save(nibabel.Nifti1Image(modulus(points), affine), path)
+    return path
+
+
+def scene_of(path, *overrides, unit="kPa", quantity="youngs-modulus"):
+    table = f'{{file="{path}", quantity="{quantity}", unit="{unit}"}}'
+    return read_scene("block", (*BLOCK, f"tissue.stiffness_map={table}", *overrides))
+
+
+def halves(points):
+    """5 kPa where x is less than 30 mm, else 20."""
+    return np.where(points[..., 0] < 0.03, 5.0, 20.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_voxels_lie_where_their_affine_says(tmp_path, mirrored):
+    path = image(tmp_path / "map.nii.gz", halves, mirrored=mirrored)
+    problem = problem_of(scene_of(path))
+    assert isinstance(problem.tissue, VariedTissue)
+    at = np.array([[0.01, 0.02, 0.015], [0.05, 0.02, 0.015], [0.5, 0.0, 0.0]])
+    found = problem.tissue.mapped(at)
+    assert found[:2] == pytest.approx([5e3, 20e3])
+    assert np.isnan(found[2])
+
+
+def test_a_uniform_map_is_the_tissue_of_its_modulus(tmp_path):
+    path = image(tmp_path / "map.nii", lambda points: np.full(points.shape[:-1], 9.5))
+    mapped, plain = (problem_of(one) for one in (scene_of(path), read_scene("block", BLOCK)))
+    rest = [
+        solve_static(fem.build(one.geometry.mesh, one.tissue, one.foundation, one.tool))
+        for one in (mapped, plain)
+    ]
+    assert rest[0] == pytest.approx(rest[1], abs=1e-9 * np.abs(rest[1]).max())
+
+
+def test_a_shear_modulus_is_a_third_or_so_of_youngs(tmp_path):
+    path = image(tmp_path / "map.nii", lambda points: np.full(points.shape[:-1], 3.0))
+    problem = problem_of(scene_of(path, quantity="shear-modulus"))
+    nu = problem.tissue.poisson_ratio
+    found = problem.tissue.mapped(np.array([[0.03, 0.02, 0.01]]))
+    assert found == pytest.approx([2.0 * (1.0 + nu) * 3e3])
+
+
+def test_zeros_are_tissue_as_around_and_do_not_soften_what_is_beside_them(tmp_path):
+    path = image(tmp_path / "map.nii", lambda p: np.where(p[..., 0] < 0.03, 0.0, 20.0))
+    problem = problem_of(scene_of(path))
+    mesh = problem.geometry.mesh
+    made = of_tetrahedra(mesh, problem.tissue)
+    known = made.mapped_share > 0.0
+    assert (made.mapped_share[known] / made.mapped[known]) == pytest.approx(20e3)
+    assert 0.3 < made.around.mean() < 0.7
+    told = [line for line in problem.notes if "stiffness_map" in line]
+    assert len(told) == 1
+    assert "20 kPa" in told[0]
+    with pytest.raises(ValueError, match=r"has no value in it; set its elsewhere"):
+        problem_of(scene_of(path, "tissue.stiffness_map.elsewhere=refused"))
+
+
+@pytest.mark.parametrize(
+    ("make", "unit", "message"),
+    [
+        (lambda p: image(p / "m.nii", halves), "MPa", None),
+        (lambda p: image(p / "m.nii", lambda x: 1e6 * halves(x)), "MPa", "stiffness_map.unit"),
+        (lambda p: image(p / "m.nii", halves, origin=(900.0, 0.0, 0.0)), "kPa", "no voxel"),
+        (lambda p: p / "none.nii", "kPa", "no such file"),
+        (lambda p: p / "text.nii", "kPa", "is no NIfTI image"),
+        (lambda p: image(p / "m.nii", lambda x: np.stack([halves(x)] * 2, -1)), "kPa", "4 axes"),
+    ],
+)
+def test_an_image_of_no_use_is_refused(tmp_path, make, unit, message):
+    (tmp_path / "text.nii").write_text("not an image")
+    scene = scene_of(make(tmp_path), unit=unit)
+    if message is None:
+        assert problem_of(scene)
+        return
+    with pytest.raises(ValueError, match=message):
+        problem_of(scene)
+
+
+# Inclusions as a scene states them -------------------------------------------------------------
+
+
+def with_inclusions(*given):
+    from study.scene.file import resolved
+
+    table = resolved(read_scene("block", BLOCK))
+    table["tissue"]["inclusion"] = list(given)
+    return validate(table, "made")
+
+
+BALL = {
+    "place": {"fraction": [0.5, 0.5, 0.5]},
+    "radius": "10 mm",
+    "youngs_modulus": "40 kPa",
+}
+
+
+def test_inclusions_are_read_placed_described_and_written():
+    import tomllib
+
+    oval = {
+        "place": {"point": ["9 mm", "20 mm", "15 mm"]},
+        "semi_axes": ["10 mm", "6 mm", "6 mm"],
+        "youngs_modulus": "2 kPa",
+        "poisson_ratio": 0.3,
+    }
+    scene = with_inclusions(BALL, oval)
+    assert validate(tomllib.loads(write_scene(scene)), "again") == scene
+    first, second = problem_of(scene).tissue.regions
+    assert first.distance(np.array([0.03, 0.02, 0.015])) == pytest.approx(-0.01)
+    assert second.distance(np.array([0.019, 0.02, 0.015])) == pytest.approx(0.0, abs=1e-12)
+    notes = [line for line in problem_of(scene).notes if "tissue.inclusion" in line]
+    assert [note.split(":")[0] for note in notes] == ["tissue.inclusion.1", "tissue.inclusion.2"]
+    assert float(notes[0].split()[1]) == pytest.approx(4.19, rel=0.02)  # [ml]
+
+
+def test_a_closed_mesh_is_an_inclusion(tmp_path):
+    import meshio
+
+    from study.mesh.tetrahedra import boundary
+    from study.organ.block import block_mesh
+
+    shell = boundary(block_mesh((0.02, 0.02, 0.02), 0.01))
+    path = tmp_path / "cube.stl"
+    points = 1e3 * (shell.points + np.array([0.02, 0.01, 0.005]))
+    meshio.Mesh(points, [("triangle", shell.triangles)]).write(path)
+    cube = {"mesh": str(path), "unit": "mm", "youngs_modulus": "40 kPa"}
+    problem = problem_of(with_inclusions(cube))
+    (region,) = problem.tissue.regions
+    inside = np.array([[0.03, 0.02, 0.015], [0.03, 0.02, 0.026]])
+    assert (region.distance(inside) < 0.0).tolist() == [True, False]
+    before = organ_sha256(with_inclusions(cube))
+    path.write_bytes(path.read_bytes() + b" ")
+    assert organ_sha256(with_inclusions(cube)) != before
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"radius": None}, r"tissue\.inclusion\.1: give one of radius, semi_axes and mesh"),
+        ({"semi_axes": ["1 mm"] * 3}, r"not radius and semi_axes"),
+        ({"place": None}, r"tissue\.inclusion\.1\.place: give fraction or point"),
+        ({"place": {"side": "left", "at": [0.5, 0.5]}}, r"place: give fraction or point"),
+        ({"unit": "mm"}, r"tissue\.inclusion\.1\.unit: has no effect"),
+        ({"youngs_modulus": "0 Pa"}, r"tissue\.inclusion\.1\.youngs_modulus"),
+        ({"place": {"point": [1.0, 1.0, 1.0]}}, r"tissue\.inclusion\.1: nothing of it lies in"),
+    ],
+)
+def test_an_inclusion_that_is_none_is_refused(change, message):
+    given = {key: value for key, value in (BALL | change).items() if value is not None}
+    with pytest.raises(ValueError, match=message):
+        problem_of(with_inclusions(given))
+
+
+def test_check_tells_of_a_scene_with_inclusions(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(write_scene(with_inclusions(BALL)))
+    assert any("tissue.inclusion.1: 4." in line for line in describe_scene(str(path), ()))
