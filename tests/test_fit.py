@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study.models.table import models_of
 from study.run.ready import QUIET
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -48,7 +49,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(rng):
     assert one.value == pytest.approx(6e3, rel=1e-5)
 
 
-def test_an_interval_widens_where_the_model_does_not_follow(rng):
+def test_an_interval_widens_where_the_model_does_not_follow():
     off = compliant([6e3]) * (1.0 + 0.2 * np.sin(9.0 * TIMES))
     near, far = (
         solve(compliant, curve(values, 1e-5), [E]).fit for values in (compliant([6e3]), off)
@@ -76,14 +77,8 @@ def test_what_a_curve_does_not_determine_is_refused():
 def test_only_positive_quantities_of_the_scene_are_free():
     scene = read_scene("block")
     assert free_of(scene, "tissue.youngs_modulus") == E
-    for key in (
-        "tissue.colour",
-        "tissue",
-        "tool.place",
-        "models",
-        "lattice.springs",
-        "time.samples",
-    ):
+    none = ("tissue.colour", "tissue", "tool.place", "models", "lattice.springs", "time.samples")
+    for key in none:
         with pytest.raises(ValueError, match="no positive quantity"):
             free_of(scene, key)
 
@@ -131,11 +126,7 @@ def test_files_that_are_not_there_or_no_text_are_refused(tmp_path):
 def posed():
     """A small scene, its problem, and the motion that it says itself."""
     scene = read_scene("block", SCENE)
-    data = OwnData({}, None)
     problem = problem_of(scene)
-    del data
-    from study.models.table import models_of
-
     (model,) = models_of(scene, {})
     return scene, problem, model.prepare(problem).simulate().trajectory
 

@@ -75,9 +75,8 @@ def comparisons(
             others = coarser(model, problem)
         for name, curve in data.curves.items():
             read = partial(seen, problem, curve=curve, probe=at)
-            yield _of_curve(
-                name, curve, model.label, read(found), others.own_error(read(found), read)
-            )
+            own = others.own_error(read(found), read)
+            yield _of_curve(name, curve, model.label, read(found), own)
         if data.markers is not None:
             first, peak = len(problem.probes), problem.observation.frames[0]
 
@@ -131,7 +130,7 @@ def seen(problem: Problem, trajectory: Trajectory, curve: Curve, probe: int) -> 
 
 @dataclass(frozen=True)
 class Coarser:
-    """A model's motions on coarser meshes or lattices, coarse to fine, with their sizes over its."""
+    """A model's motions on coarser meshes or lattices, coarse to fine; their sizes over its."""
 
     motions: tuple[Trajectory, ...]
     sizes: tuple[float, ...]
