@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, csr_array, eye_array, kron
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
@@ -102,6 +102,27 @@ def move_driven(
             return DrivenLattice(tuple(rests), at.factor, failure)
         rests.append(lattice.told(at))
     return DrivenLattice(tuple(rests), at.factor, "")
+
+
+def lowest_frequency(
+    law: Law, net: Network, prescribed: Floats, displacement: Floats | None = None
+) -> float:
+    """Of undamped free motion of small amplitude [Hz] about a displacement [m] (n, 3), or none.
+
+    What is prescribed is held still. ValueError if nothing holds the lattice.
+    """
+    lattice = _Lattice(law, net, prescribed)
+    u = np.zeros_like(net.load) if displacement is None else displacement
+    at = lattice.linearised(u)
+    stiffness = lattice.matrix(at, net.bulk * at.swelling)[lattice.free][:, lattice.free]
+    factors = _factorised(stiffness)
+    if factors is None:
+        raise ValueError("the stiffness is singular: nothing holds the lattice")
+    mass = diags_array(np.repeat(net.mass, 3)[lattice.free]).tocsc()
+    inverse = LinearOperator(mass.shape, factors.solve, dtype=np.float64)
+    start = np.ones(mass.shape[0])
+    (found,) = eigsh(stiffness, 1, mass, 0.0, OPinv=inverse, return_eigenvectors=False, v0=start)
+    return float(np.sqrt(found) / (2.0 * np.pi))
 
 
 def _move_up(lattice: _Lattice, at: _Rest, target: float) -> tuple[_Rest, str]:

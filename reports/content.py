@@ -16,6 +16,7 @@ from reports.reference import is_built_in_liver, reference
 from reports.reference_spacing import reference_spacing
 from reports.robustness import robustness
 from reports.rule_view import view_names
+from reports.validation import validation
 from reports.verification import verification
 from study.results.folder import Results
 
@@ -71,6 +72,7 @@ def document(results: Results) -> dict[str, object]:
         "provenance": tables.provenance_rows(results),
         "benchmarks": benchmarks(results),
         "verification": verification(results),
+        "validation": validation(results),
         "robustness": robustness(results),
         "ranking_study": ranking_study() if is_ranked(results) else None,
         "organ_ranking": organ_ranking() if is_ranked(results) else None,

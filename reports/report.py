@@ -18,6 +18,7 @@ import numpy as np
 from reports.budget_figure import budget_figure
 from reports.content import document
 from reports.difference_figure import difference_figure
+from reports.differences import finite_elements
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
@@ -29,6 +30,7 @@ from reports.renders import Pictures, render_once
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
+from reports.validation_figure import validation_figure
 from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
@@ -150,6 +152,8 @@ def _plots(results: Results) -> Figures:
         "reference_spacing": reference_spacing_figure(results),
         **robustness_figures(results),
     }
+    if finite_elements(results) is not None:
+        single["validation"] = validation_figure()
     if is_ranked(results):
         single |= ranking_figures() | organ_figures()
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}

@@ -5,12 +5,13 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
+from fem_reference import small_motion
 from fem_reference.driven import Drive, solve_driven, solve_linear
 from fem_reference.grid import curved, straight
 from fem_reference.laws import NeoHookean
 from fem_reference.mixed_strain import mixed_solid
+from msm import driven, volume
 from msm import lattice as cells
-from msm import volume
 from msm.calibration import lame, reference_stiffness
 from msm.damping import UNDAMPED
 from msm.driven import move_driven
@@ -155,6 +156,33 @@ def test_a_slender_column_buckles_under_its_own_weight():
     # Two cells of the elements more in width would come nearer; bent, it is followed no further.
     assert 0.95 < path.reached < 1.15
     assert "gives way" in path.failure or "no balance" in path.failure
+
+
+def test_a_rod_between_walls_vibrates_at_its_closed_form():
+    """Sides that slide leave waves along, of speed sqrt((lambda + 2 mu) / rho)."""
+    nu, rho, length = 0.3, 1000.0, 0.04
+    first, mu = lame(E, nu)
+    exact = np.sqrt((first + 2.0 * mu) / rho) / (4.0 * length)
+    solid = body(nu, size=0.01)
+    prescribed = np.zeros_like(solid.points)
+    prescribed[solid.points[:, 2] > 1e-9, 2] = np.nan
+    drive = Drive(prescribed, np.zeros(solid.size))
+    assert small_motion.lowest_frequency(solid, drive, rho) == pytest.approx(exact, rel=1e-3)
+    # Stretched, it is stiffer or softer by the slope of its law there: lambda (1 - ln s) + mu
+    # (s^2 + 1) over s^2, with the mass of the unloaded body.
+    stretch = 1.2
+    pulled = prescribed.copy()
+    pulled[solid.points[:, 2] > length - 1e-9, 2] = (stretch - 1.0) * length
+    (state,) = solve_driven(solid, Drive(pulled, np.zeros(solid.size))).states
+    slope = (first * (1.0 - np.log(stretch)) + mu * (stretch**2 + 1.0)) / stretch**2
+    found = small_motion.lowest_frequency(solid, drive, rho, state)
+    assert found == pytest.approx(np.sqrt(slope / rho) / (4.0 * length), rel=1e-3)
+    nodes, law, net = lattice(nu, 0.005)
+    volumes = np.prod(np.where((nodes < 1e-9) | (nodes > EDGE - 1e-9), 0.5, 1.0) * 0.005, axis=1)
+    net = net._replace(mass=rho * volumes)
+    prescribed = np.zeros_like(nodes)
+    prescribed[nodes[:, 2] > 1e-9, 2] = np.nan
+    assert driven.lowest_frequency(law, net, prescribed) == pytest.approx(exact, rel=5e-3)
 
 
 def test_the_cylinder_has_its_volume_and_converges():

@@ -17,6 +17,7 @@ from study.commands.cohort import cohort
 from study.commands.compare import compare
 from study.commands.estimate import estimate
 from study.commands.export import export
+from study.commands.fit import fit
 from study.commands.flags import EXIT_BAD_INPUT, EXIT_MACHINE
 from study.commands.plan import plan
 from study.commands.recommend import recommend
@@ -123,7 +124,7 @@ def _say(message: str) -> None:
 
 
 for command in (
-    *(run, scenes, check, report, view, compare, export, verify, validate),
+    *(run, scenes, check, report, view, compare, export, verify, validate, fit),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from study.commands.flags import EXIT_FAILED_CHECK, AsJson, Switch
+from study.commands.flags import EXIT_FAILED_CHECK, AsJson, Overrides, Switch
 
 
 def validate(
     name: str | None = None,
     *,
     models: list[str] | None = None,
+    data: Path | None = None,
+    probe: str | None = None,
+    overrides: Overrides = None,
     quick: Switch = False,
     out: Path | None = None,
     as_json: AsJson = False,
@@ -23,10 +26,21 @@ def validate(
     Parameters
     ----------
     name
-        What was measured: cylinders, cantilever or cube. All by default.
+        What was measured: cylinders, cantilever or cube, all by default; with --data a scene, by
+        name or TOML file.
     models
         Kinds of models: linear and neo-hookean finite elements, springs, volume (springs with the
         volume term), basafa. All by default.
+    data
+        Folder with your own measurements of the scene (CSV): curves with the columns time_s and
+        displacement_m or force_N; markers.csv with x_m, y_m, z_m, ux_m, uy_m, uz_m; each with the
+        column uncertainty if it is known.
+    probe
+        With --data: control point that curves of displacement are of; by default the one nearest
+        to the tool.
+    overrides
+        With --data: override of the scene, for example tissue.youngs_modulus="4 kPa". May be
+        repeated.
     quick
         Two meshes or spacings of each model instead of three, a minute or two.
     out
@@ -38,13 +52,16 @@ def validate(
     from study.progress import on_stderr
     from study.validation import request, table
 
-    asked = request.ValidationRequest(
-        names=() if name is None else (name,), kinds=tuple(models or ()), quick=quick
-    )
     if out is not None:
         check_file(out)
     with on_stderr() as progress:
-        found = list(asked.comparisons(progress))
+        if data is not None:
+            own = request.own_comparisons(name, data, overrides or (), probe, progress)
+            found = list(own)
+        else:
+            names = () if name is None else (name,)
+            asked = request.ValidationRequest(names=names, kinds=tuple(models or ()), quick=quick)
+            found = list(asked.comparisons(progress))
     if out is not None:
         table.write(found, out)
     print(table.as_json(found) if as_json else "\n".join(table.lines(found)))

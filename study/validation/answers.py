@@ -10,23 +10,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
+from fem_reference import small_motion
 from fem_reference.driven import Drive, DrivenState, solve_driven, solve_linear
 from fem_reference.elasticity import Outline
 from fem_reference.grid import curved, straight
 from fem_reference.mixed_strain import MixedSolid, mixed_solid
 from fem_reference.observation import evaluation
+from msm import driven
 from msm import lattice as cells
 from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
 from msm.damping import UNDAMPED
-from msm.driven import move_driven
+from msm.lattice import CellLattice
 from msm.laws import Hooke, Law
 from msm.laws.basafa import in_proportion
-from msm.network import network
+from msm.network import Network, network
 from msm.springs import connect
 from msm.volume import none, volume_term
 from study.problem.tissue import Tissue
@@ -77,6 +81,21 @@ def linear(specimen: Specimen, level: int, modulus: float, factors: tuple[float,
     )
 
 
+def neo_hookean_frequency(specimen: Specimen, level: int, modulus: float) -> float:
+    """Of free motion of small amplitude about the loaded rest [Hz]; nan where there is none."""
+    solid, drive, _ = _elements(specimen, level, modulus)
+    path = solve_driven(solid, drive)
+    if not path.converged:
+        return float("nan")
+    return small_motion.lowest_frequency(solid, drive, specimen.density, path.states[-1])
+
+
+def linear_frequency(specimen: Specimen, level: int, modulus: float) -> float:
+    """The same of linear elasticity, whatever the rest."""
+    solid, drive, _ = _elements(specimen, level, modulus)
+    return small_motion.lowest_frequency(solid, drive, specimen.density)
+
+
 def _elements(
     specimen: Specimen, level: int, modulus: float
 ) -> tuple[MixedSolid, Drive, csr_array]:
@@ -115,51 +134,57 @@ def _told(
     )
 
 
-def springs(specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]) -> Answer:
-    """A lattice of linear springs alone, whose Poisson's ratio is 1/4."""
-    law = Hooke(reference_stiffness(modulus, specimen.spacings[level]))
-    return _lattice(specimen, level, law, None, factors)
+class _Springs(NamedTuple):
+    """Law of springs, and the modulus [Pa] that a volume term goes with; none without a term."""
+
+    law: Law
+    modulus: float | None
 
 
-def springs_and_volume(
-    specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
-) -> Answer:
+Make = Callable[[Specimen, int, float], _Springs]
+
+
+def springs(specimen: Specimen, level: int, modulus: float) -> _Springs:
+    """Linear springs alone, whose Poisson's ratio is 1/4."""
+    return _Springs(Hooke(reference_stiffness(modulus, specimen.spacings[level])), None)
+
+
+def springs_and_volume(specimen: Specimen, level: int, modulus: float) -> _Springs:
     """The same with the volume term that makes up for the material's Poisson's ratio."""
     k = reference_stiffness(modulus, specimen.spacings[level], specimen.poisson_ratio)
-    law = Hooke(k)
-    return _lattice(specimen, level, law, modulus, factors)
+    return _Springs(Hooke(k), modulus)
 
 
-def basafa(specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]) -> Answer:
+def basafa(specimen: Specimen, level: int, modulus: float) -> _Springs:
     """Springs of the benchmark's law with its own ratio of constants, at the modulus given."""
     table, k = BasafaConstants(), reference_stiffness(modulus, specimen.spacings[level])
-    law = in_proportion(k, table.k2 / table.k1, table.x_c)
-    return _lattice(specimen, level, law, None, factors)
+    return _Springs(in_proportion(k, table.k2 / table.k1, table.x_c), None)
 
 
-def _lattice(
-    specimen: Specimen,
-    level: int,
-    law: Law,
-    modulus: float | None,
-    factors: tuple[float, ...],
-) -> Answer:
-    """Rests of a lattice, with the volume term of a modulus [Pa] if there is one."""
-    spacing = specimen.spacings[level]
+def _network(specimen: Specimen, level: int, chosen: _Springs) -> tuple[CellLattice, Network]:
+    """The lattice of a spacing over a specimen, with its load."""
+    spacing, nu = specimen.spacings[level], specimen.poisson_ratio
     lattice = cells.build(specimen.body, specimen.lower, specimen.upper, spacing)
-    nodes, mass = lattice.nodes, specimen.density * cells.node_volumes(lattice)
+    mass = specimen.density * cells.node_volumes(lattice)
     load = mass[:, None] * specimen.acceleration
     if len(specimen.at):
         load += lattice.interpolation(specimen.at)[0].T @ specimen.forces
-    nu = specimen.poisson_ratio
-    with_term = modulus is not None and nu > SPRING_POISSON_RATIO
-    volume = volume_term(lattice, modulus, nu) if with_term and modulus else none(spacing)
-    # The scene's default layout of springs.
-    chosen = connect(lattice, Lattice().flexion)
-    unheld = csr_array((len(nodes), len(nodes)))
-    net = network(chosen, mass, unheld, load, volume, UNDAMPED)
-    found = move_driven(law, net, specimen.prescribed(nodes), factors)
-    face, axis = specimen.face(nodes), specimen.along[0]
+    volume = none(spacing)
+    if chosen.modulus is not None and nu > SPRING_POISSON_RATIO:
+        volume = volume_term(lattice, chosen.modulus, nu)
+    layout = connect(lattice, Lattice().flexion)  # as a scene has it by default
+    unheld = csr_array((len(mass), len(mass)))
+    return lattice, network(layout, mass, unheld, load, volume, UNDAMPED)
+
+
+def of_lattice(
+    make: Make, specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
+) -> Answer:
+    """Rests of a lattice."""
+    chosen = make(specimen, level, modulus)
+    lattice, net = _network(specimen, level, chosen)
+    found = driven.move_driven(chosen.law, net, specimen.prescribed(lattice.nodes), factors)
+    face, axis = specimen.face(lattice.nodes), specimen.along[0]
     watched, _ = lattice.interpolation(specimen.watched)
     moved = [watched @ rest.displacement for rest in found.rests]
     force = [specimen.parts * rest.reaction[face, axis].sum() for rest in found.rests]
@@ -167,25 +192,45 @@ def _lattice(
         np.array([rest.factor for rest in found.rests]),
         np.reshape(moved, (len(found.rests), len(specimen.watched), 3)),
         np.array(force),
-        3 * len(nodes),
+        3 * len(lattice.nodes),
         found.failure,
     )
 
 
+def lattice_frequency(make: Make, specimen: Specimen, level: int, modulus: float) -> float:
+    """Of free motion of small amplitude about the loaded rest [Hz]; nan where there is none."""
+    chosen = make(specimen, level, modulus)
+    lattice, net = _network(specimen, level, chosen)
+    prescribed = specimen.prescribed(lattice.nodes)
+    found = driven.move_driven(chosen.law, net, prescribed)
+    if found.failure:
+        return float("nan")
+    return driven.lowest_frequency(chosen.law, net, prescribed, found.rests[-1].displacement)
+
+
 @dataclass(frozen=True)
 class Kind:
-    """A kind of model: how it is called in tables, and its answer; `elements` or a lattice."""
+    """A kind of model: how it is called in tables, its answer, and how it vibrates.
+
+    `elements` or a lattice. `frequency` [Hz] is that of the slowest free motion about the loaded
+    rest, by specimen, number of the mesh or spacing, and Young's modulus [Pa].
+    """
 
     label: str
     solve: Solve
-    elements: bool
+    frequency: Callable[[Specimen, int, float], float]
+    elements: bool = False
+
+
+def _lattice(label: str, make: Make) -> Kind:
+    return Kind(label, partial(of_lattice, make), partial(lattice_frequency, make))
 
 
 KINDS: dict[str, Kind] = {
-    "linear": Kind("linear FE", linear, elements=True),
-    "neo-hookean": Kind("neo-Hookean FE", neo_hookean, elements=True),
-    "springs": Kind("springs alone", springs, elements=False),
-    "volume": Kind("springs and volume term", springs_and_volume, elements=False),
-    "basafa": Kind("Basafa's law, scaled", basafa, elements=False),
+    "linear": Kind("linear FE", linear, linear_frequency, elements=True),
+    "neo-hookean": Kind("neo-Hookean FE", neo_hookean, neo_hookean_frequency, elements=True),
+    "springs": _lattice("springs alone", springs),
+    "volume": _lattice("springs and volume term", springs_and_volume),
+    "basafa": _lattice("Basafa's law, scaled", basafa),
 }
 """Kinds of models by name, as the command and the tables have them."""

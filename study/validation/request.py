@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from study.progress import Progress
-from study.validation import cantilever, cube, cylinders
+from study.scene.file import read_scene
+from study.validation import cantilever, cube, cylinders, own_scene
 from study.validation.answers import KINDS
 from study.validation.rows import Comparison
 
@@ -35,6 +37,9 @@ class ValidationRequest:
 
     def __post_init__(self) -> None:
         """Refuse unknown names before anything is solved."""
+        for name in self.names:
+            if name.endswith(".toml"):
+                raise ValueError(f"{name}: give --data too, a folder with your measurements of it")
         _refuse_unknown(self.names, PROBLEMS, "problem")
         _refuse_unknown(self.kinds, KINDS, "--models")
 
@@ -43,6 +48,16 @@ class ValidationRequest:
         kinds = self.kinds or tuple(KINDS)
         for name in self.names or tuple(PROBLEMS):
             yield from PROBLEMS[name](kinds, QUICK if self.quick else ALL, progress)
+
+
+def own_comparisons(
+    scene: str | None, folder: Path, overrides: Sequence[str], probe: str | None, progress: Progress
+) -> Iterator[Comparison]:
+    """A scene by name or file beside the measurements in a folder. ValueError for unfit ones."""
+    if scene is None or scene in PROBLEMS:
+        raise ValueError("--data: give the scene that was measured too, a name or a TOML file")
+    data = own_scene.read_folder(folder)
+    return own_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
 
 
 def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> None:

@@ -45,6 +45,11 @@ class Comparison:
         return self.found - self.measured
 
     @property
+    def judged(self) -> bool:
+        """Whether there is a number, and an uncertainty to hold its difference to."""
+        return self.answered and math.isfinite(self.uncertainty)
+
+    @property
     def within(self) -> bool:
         """Whether the difference is explained by both uncertainties."""
         own = 0.0 if math.isnan(self.numerical) else self.numerical

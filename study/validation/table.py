@@ -57,11 +57,11 @@ def lines(found: Sequence[Comparison]) -> Iterator[str]:
         yield f"{problem}, {faces} (fitted: {_fitted(block)})"
         cases = {one.case for one in block}
         yield from _medians(block) if len(cases) >= MANY else map(_line, block)
-    answered = [one for one in found if one.answered]
-    within = sum(one.within for one in answered)
+    judged = [one for one in found if one.judged]
+    within, lacking = sum(one.within for one in judged), sum(not one.answered for one in found)
     yield (
-        f"{within} of {len(answered)} differences within twice the measurement's uncertainty and "
-        f"the model's own error; {len(found) - len(answered)} without an answer"
+        f"{within} of {len(judged)} differences within twice the measurement's uncertainty and "
+        f"the model's own error; {lacking} without an answer"
     )
 
 
@@ -74,8 +74,9 @@ def _line(one: Comparison) -> str:
     if not one.answered:
         return _aligned((f"  {one.model}", quantity, f"none: {one.note}", "", ""))
     beside = f"{one.difference:+.3g}" + (f" of {one.measured:.3g}" if one.measured else "")
-    cells = (f"  {one.model}", quantity, beside, f"{one.uncertainty:.2g}", _own(one.numerical))
-    return f"{_aligned(cells)}{'' if one.within else '  beyond'}".rstrip()
+    known = f"{one.uncertainty:.2g}" if one.judged else "not given"
+    cells = (f"  {one.model}", quantity, beside, known, _own(one.numerical))
+    return f"{_aligned(cells)}{'  beyond' if one.judged and not one.within else ''}".rstrip()
 
 
 def _medians(block: list[Comparison]) -> Iterator[str]:
@@ -105,7 +106,7 @@ def _own(error: float, unit: str = "") -> str:
 
 
 def _values(one: Comparison) -> tuple[str | float | bool, ...]:
-    within = one.within if one.answered else ""
+    within = one.within if one.judged else ""
     numbers = (one.measured, one.uncertainty, one.found, one.numerical, one.modulus)
     words = (one.problem, one.case, one.faces, one.model, one.quantity, one.unit)
     return (*words, *numbers, one.fitted, within, one.note)

@@ -1,0 +1,167 @@
+"""Models beside measurements, as the table that comes with the program has it.
+
+`liver-study validate --out` writes such a table; none of the figures is of the run reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.resources.abc import Traversable
+from statistics import median
+from typing import NamedTuple
+
+from reports.benchmarks import Line, read
+from reports.differences import finite_elements
+from reports.digits import DASH, Group, Table, percent, significant, words
+from study.results.folder import Results
+
+NAME = "validation"
+CYLINDERS, CANTILEVER, CUBE = "cylinders", "cantilever", "cube"
+WITHIN = {"True": "within", "False": "beyond", "": DASH}
+
+
+class Median(NamedTuple):
+    """Of many cases: median, least and largest relative difference, and how many lie within.
+
+    `uncertainty` and `own`: medians of the measurement's and of the model's own, relative; nothing
+    is said of cases without an answer, of `cases` in all.
+    """
+
+    difference: float
+    least: float
+    largest: float
+    uncertainty: float
+    own: float | None
+    within: int
+    answered: int
+    cases: int
+
+
+def validation(results: Results) -> dict[str, object] | None:
+    """Tables by name; None for a scene without finite elements, or where no table was delivered."""
+    lines = read(NAME) if finite_elements(results) is not None else []
+    if not lines:
+        return None
+    return {
+        "cylinders": cylinder_rows(lines),
+        "bodies": [
+            {"name": words(f"{problem}, {faces}"), "rows": rows}
+            for problem in (CANTILEVER, CUBE)
+            for faces, rows in _by_faces(lines, problem)
+        ],
+        "within": _within(lines),
+    }
+
+
+def cylinder_rows(lines: list[Line]) -> list[Group]:
+    """By what the plates do: model, quantity, median and range, uncertainty, own error, within."""
+    groups: list[Group] = []
+    for faces in _faces(lines, CYLINDERS):
+        rows: Table = []
+        for (model, quantity), own in of_cylinders(lines, faces).items():
+            found = summed(own)
+            cells = [model, quantity] if not rows or rows[-1][0] != model else ["", quantity]
+            rows.append([*cells, *_median_cells(found)] if found else [*cells, *_none(own)])
+        groups.append({"name": f"faces {faces}", "rows": rows})
+    return groups
+
+
+def of_cylinders(lines: list[Line], faces: str) -> dict[tuple[str, str], list[Line]]:
+    """Lines of all materials by model and quantity."""
+    found: dict[tuple[str, str], list[Line]] = {}
+    for line in lines:
+        if (line["problem"], line["faces"]) == (CYLINDERS, faces):
+            found.setdefault((line["model"], line["quantity"]), []).append(line)
+    return found
+
+
+def summed(lines: list[Line]) -> Median | None:
+    """Of lines of one quantity; None if none has an answer."""
+    answered = [line for line in lines if line["found"]]
+    if not answered:
+        return None
+    off = [_number(line, "found") / _number(line, "measured") - 1.0 for line in answered]
+    spread = [_number(line, "uncertainty") / _number(line, "measured") for line in answered]
+    own = [
+        _number(line, "numerical") / _number(line, "measured")
+        for line in answered
+        if line["numerical"]
+    ]
+    within = sum(line["within"] == "True" for line in answered)
+    return Median(
+        median(off),
+        min(off),
+        max(off),
+        median(spread),
+        median(own) if own else None,
+        within,
+        len(answered),
+        len(lines),
+    )
+
+
+def of_body(lines: list[Line], problem: str, quantity: str) -> list[Line]:
+    """Lines of a quantity of one body."""
+    return [line for line in lines if (line["problem"], line["quantity"]) == (problem, quantity)]
+
+
+def _median_cells(found: Median) -> list[str]:
+    answered = f"{found.within} of {found.answered}"
+    lacking = found.cases - found.answered
+    return [
+        _signed(found.difference),
+        f"{_signed(found.least)} to {_signed(found.largest)}",
+        percent(found.uncertainty),
+        DASH if found.own is None else percent(found.own),
+        answered + (f", {lacking} without an answer" if lacking else ""),
+    ]
+
+
+def _none(lines: list[Line]) -> list[str]:
+    return [words(lines[0]["note"]), DASH, DASH, DASH, "no answer"]
+
+
+def _by_faces(lines: list[Line], problem: str) -> Iterator[tuple[str, Table]]:
+    for faces in _faces(lines, problem):
+        own = [line for line in lines if (line["problem"], line["faces"]) == (problem, faces)]
+        yield faces, [_body_row(line) for line in own]
+
+
+def _body_row(line: Line) -> list[str]:
+    """Model, case, quantity, measured, model, difference, uncertainty, own error, verdict."""
+    found, measured = line["found"], _number(line, "measured")
+    off = f"{_number(line, 'found') - measured:+.2f}" if found else DASH
+    return [
+        line["model"],
+        line["case"],
+        words(f"{line['quantity']} [{line['unit']}]"),
+        significant(measured, 3) if measured else "0",
+        significant(float(found), 3) if found else DASH,
+        off,
+        significant(_number(line, "uncertainty"), 2),
+        significant(float(line["numerical"]), 2) if line["numerical"] else DASH,
+        WITHIN[line["within"]] if found else words(line["note"]),
+    ]
+
+
+def _faces(lines: list[Line], problem: str) -> list[str]:
+    return list(dict.fromkeys(line["faces"] for line in lines if line["problem"] == problem))
+
+
+def _within(lines: list[Line]) -> str:
+    answered = [line for line in lines if line["found"]]
+    within = sum(line["within"] == "True" for line in answered)
+    return f"{within} of {len(answered)}"
+
+
+def _signed(share: float) -> str:
+    return f"{100.0 * share:+.1f} %"
+
+
+def _number(line: Line, column: str) -> float:
+    return float(line[column])
+
+
+def table(folder: Traversable | None = None) -> list[Line]:
+    """The table that comes with the program, or that of a folder."""
+    return read(NAME, folder)

@@ -1,0 +1,265 @@
+"""Quantities of a scene fitted to a measured curve, with what the curve leaves open of them.
+
+Least squares in the logarithms of the quantities, by the model's motion at each; the interval is
+that of the linearised problem, with Student's t. A quantity that the curve does not determine is
+refused: one whose interval is wider than its allowed range, that ends at a limit of it, or that
+another can take the place of.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from study.annotation.quantity import Quantity
+from study.models.estimates import estimates
+from study.models.model import Model
+from study.models.table import is_tuned, models_of
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Progress
+from study.scene import Scene
+from study.scene.problem import problem_of
+from study.validation.own_data import Curve
+from study.validation.own_scene import coarser, probe_number, refuse_unanswered, seen
+
+Floats = NDArray[np.float64]
+Predict = Callable[[Floats], Floats]
+"""From values of the free quantities to the curve (k,)."""
+
+CONFIDENCE = 0.95
+STEP = 0.02
+"""Of the logarithm, for derivatives: models round to far less."""
+AT_LIMIT = 1e-3
+"""How near a logarithm lies to a limit that it is at."""
+LARGEST_CONDITION = 1e6
+MOST_RUNS = 60
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A quantity [SI] of a scene: its best value and 95 % interval.
+
+    `numerical`: by how much the model's own error may shift it, nan if that is not known.
+    """
+
+    key: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    numerical: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Quantities fitted to a curve, and the curve with them (k,).
+
+    `rms` of what is left, in the unit of the curve; `scatter_known`: whether the interval is by the
+    measurement's stated uncertainties, or by what is left; `chi`: what is left over the stated
+    uncertainties, above 1 where the model does not follow the curve.
+    """
+
+    quantities: tuple[Fitted, ...]
+    curve: Curve
+    found: Floats
+    rms: float
+    scatter_known: bool
+    chi: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class Free:
+    """A key of a scene that is free, between limits [SI], from a value."""
+
+    key: str
+    unit: str
+    low: float
+    high: float
+    start: float
+
+
+def free_of(scene: Scene, key: str) -> Free:
+    """What may be fitted: table.key of one positive quantity. ValueError for anything else."""
+    table, _, name = key.partition(".")
+    part = getattr(scene, table, None)
+    value = getattr(part, name, None) if dataclasses.is_dataclass(part) else None
+    quantity = _quantity(part, name) if value is not None else None
+    if quantity is None or not isinstance(value, float) or not value > 0.0:
+        raise ValueError(
+            f"--free {key}: is no positive quantity of the scene; give for example "
+            "tissue.youngs_modulus"
+        )
+    low = max(quantity.low, 1e-6 * value, 1e-12)
+    return Free(key, quantity.unit, low, quantity.high, value)
+
+
+def _quantity(part: Any, name: str) -> Quantity | None:
+    """The annotation of a field."""
+    hints = typing.get_type_hints(type(part), include_extras=True)
+    found = typing.get_args(hints.get(name))
+    return next((one for one in found if isinstance(one, Quantity)), None)
+
+
+def changed(scene: Scene, values: dict[str, float]) -> Scene:
+    """The scene with other values of keys table.key."""
+    for key, value in values.items():
+        table, _, name = key.partition(".")
+        part = dataclasses.replace(getattr(scene, table), **{name: float(value)})
+        scene = dataclasses.replace(scene, **{table: part})
+    return scene
+
+
+def fit(
+    scene: Scene,
+    curve: Curve,
+    keys: Sequence[str],
+    model: str,
+    progress: Progress,
+    probe: str | None = None,
+) -> Fit:
+    """Fit quantities of a scene by one of its models.
+
+    ValueError for keys, a model or a probe that there are not, and for a curve that does not
+    determine the quantities.
+    """
+    free = [free_of(scene, key) for key in keys]
+    if len({one.key for one in free}) < len(free) or not free:
+        raise ValueError("--free: give each quantity once, one at least")
+    refuse_unanswered(problem_of(scene), curve)
+    own = _Runs(scene, curve, keys, model, probe)
+    with progress.stage(f"fit by {model}"):
+        found = solve(own.predict, curve, free)
+    with progress.stage(f"own error of {model}"):
+        return dataclasses.replace(
+            found.fit, quantities=_shifted(found, own.own_error(found.values), free)
+        )
+
+
+class _Runs:
+    """A model of a scene at values of its free quantities."""
+
+    def __init__(
+        self, scene: Scene, curve: Curve, keys: Sequence[str], model: str, probe: str | None
+    ) -> None:
+        self.scene, self.curve, self.keys = scene, curve, tuple(keys)
+        self.model, self.probe = model, probe
+        self._at(np.array([getattr(getattr(scene, t), n) for t, n in self._split()]))
+
+    def _split(self) -> list[tuple[str, str]]:
+        return [(key.partition(".")[0], key.partition(".")[2]) for key in self.keys]
+
+    def _at(self, values: Floats) -> tuple[Model, Problem]:
+        """The model and the problem. ValueError if the scene has no such model."""
+        scene = changed(self.scene, dict(zip(self.keys, values, strict=True)))
+        scene = dataclasses.replace(scene, models=(self.model,))
+        found = list(models_of(scene, estimates(scene) if is_tuned(scene) else {}))
+        return found[0], problem_of(scene)
+
+    def predict(self, values: Floats) -> Floats:
+        """The curve; nan after the motion diverged."""
+        model, problem = self._at(values)
+        found = model.prepare(problem).simulate().trajectory
+        return seen(problem, found, self.curve, probe_number(problem, self.probe))
+
+    def own_error(self, values: Floats) -> Floats | None:
+        """What a coarser mesh or lattice changes of the curve (k,), as an error; None if none."""
+        model, problem = self._at(values)
+        at = probe_number(problem, self.probe)
+
+        def read(motion: Trajectory) -> Floats:
+            return seen(problem, motion, self.curve, at)
+
+        return coarser(model, problem).own_error(self.predict(values), read)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A fit with its derivative by the logarithms (k, quantities), over the scatter."""
+
+    fit: Fit
+    values: Floats
+    slope: Floats
+    scatter: Floats
+
+
+def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
+    """Least squares of a prediction. ValueError if the curve does not determine the quantities."""
+    scatter = np.ones_like(curve.values) if curve.uncertainty is None else curve.uncertainty
+    scatter = scatter * (float(np.abs(curve.values).max()) if curve.uncertainty is None else 1.0)
+    if len(curve.values) <= len(free):
+        raise ValueError(f"--curve: {len(curve.values)} values cannot determine {len(free)}")
+
+    def left(logs: Floats) -> Floats:
+        found = (predict(np.exp(logs)) - curve.values) / scatter
+        return np.where(np.isfinite(found), found, 1e6)
+
+    limits = np.log([[one.low for one in free], [one.high for one in free]])
+    start = np.clip(np.log([one.start for one in free]), limits[0] + STEP, limits[1] - STEP)
+    best = least_squares(
+        left, start, bounds=limits, diff_step=STEP, x_scale=1.0, xtol=1e-6, max_nfev=MOST_RUNS
+    )
+    freedom = len(curve.values) - len(free)
+    variance = float((best.fun**2).sum()) / freedom
+    known = curve.uncertainty is not None
+    _refuse_undetermined(best.jac, free)
+    spread = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
+    # A model that does not follow the curve makes the interval wider, never narrower.
+    spread *= np.sqrt(max(1.0, variance) if known else variance)
+    half = float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * spread
+    _refuse_open(best.x, half, limits, free)
+    quantities = tuple(
+        Fitted(
+            one.key, one.unit, float(np.exp(x)), float(np.exp(x - h)), float(np.exp(x + h)), np.nan
+        )
+        for one, x, h in zip(free, best.x, half, strict=True)
+    )
+    found = best.fun * scatter + curve.values
+    rms = float(np.sqrt(((found - curve.values) ** 2).mean()))
+    whole = Fit(quantities, curve, found, rms, known, np.sqrt(variance), int(best.nfev))
+    return Solved(whole, np.exp(best.x), best.jac, scatter)
+
+
+def _refuse_undetermined(slope: Floats, free: Sequence[Free]) -> None:
+    names = ", ".join(one.key for one in free)
+    sizes = np.linalg.svd(slope, compute_uv=False)
+    if not sizes[0] > 0.0:
+        raise ValueError(f"--free {names}: the curve does not change with it; fit another quantity")
+    if sizes[-1] * LARGEST_CONDITION < sizes[0] or len(sizes) < len(free):
+        raise ValueError(
+            f"--free {names}: the curve does not tell them apart; fit fewer, or measure elsewhere"
+        )
+
+
+def _refuse_open(logs: Floats, half: Floats, limits: Floats, free: Sequence[Free]) -> None:
+    for x, h, low, high, one in zip(logs, half, *limits, free, strict=True):
+        if not 2.0 * h < high - low:
+            raise ValueError(
+                f"--free {one.key}: the curve does not determine it: its 95 % interval is wider "
+                f"than {one.low:g} to {one.high:g} {one.unit}; measure more, or fit fewer"
+            )
+        if min(x - low, high - x) < AT_LIMIT:
+            raise ValueError(
+                f"--free {one.key}: no value between {one.low:g} and {one.high:g} {one.unit} fits "
+                "best; check the units of the curve and the scene's load"
+            )
+
+
+def _shifted(found: Solved, error: Floats | None, free: Sequence[Free]) -> tuple[Fitted, ...]:
+    """With the shift that the model's own error of the curve makes."""
+    if error is None or not np.isfinite(error).all():
+        return found.fit.quantities
+    logs = np.linalg.lstsq(found.slope, error / found.scatter, rcond=None)[0]
+    return tuple(
+        dataclasses.replace(one, numerical=float(one.value * abs(x)))
+        for one, x in zip(found.fit.quantities, logs[: len(free)], strict=True)
+    )

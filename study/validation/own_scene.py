@@ -1,0 +1,226 @@
+"""A user's own scene beside a user's own measurements: every model of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.error_estimate import discretisation_error
+from study.models.estimates import estimates
+from study.models.model import Model, Simulation
+from study.models.table import is_tuned, models_of
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.progress import Progress
+from study.scene import Scene
+from study.scene.problem import problem_of
+from study.validation.own_data import Curve, OwnMarkers, read_curve, read_markers
+from study.validation.rows import ORDER, Comparison
+
+Floats = NDArray[np.float64]
+
+NAME = "own scene"
+MARKERS = "markers.csv"
+COARSER_SPACING = 4.0 / 3.0
+"""Of a lattice over the next finer one, that its own error is seen by."""
+
+
+@dataclass(frozen=True)
+class OwnData:
+    """What a folder holds: curves by the name of their file, markers."""
+
+    curves: dict[str, Curve]
+    markers: OwnMarkers | None
+
+
+def read_folder(folder: Path) -> OwnData:
+    """All CSV files of a folder. ValueError for a folder without, or a file that is no such."""
+    if not folder.is_dir():
+        raise ValueError(f"--data {folder}: there is no such folder; give one with CSV files")
+    files = sorted(folder.glob("*.csv"))
+    if not files:
+        raise ValueError(
+            f"--data {folder}: holds no CSV file; put a curve in it (time_s, displacement_m or "
+            f"force_N), or {MARKERS}"
+        )
+    curves = {file.stem: read_curve(file) for file in files if file.name != MARKERS}
+    markers = folder / MARKERS
+    return OwnData(curves, read_markers(markers) if markers in files else None)
+
+
+def comparisons(
+    scene: Scene, data: OwnData, progress: Progress, probe: str | None = None
+) -> Iterator[Comparison]:
+    """Each model of the scene beside what was measured: curves by their rms, markers likewise.
+
+    `probe`: the control point that curves of displacement are of, by default the one nearest to
+    the tool. ValueError for what the scene cannot answer.
+    """
+    if scene.is_point:
+        raise ValueError("organ.shape: a single point has no body to be measured; give an organ")
+    with progress.stage("organ"):
+        posed = problem_of(scene)
+    problem = posed if data.markers is None else _marked(posed, data.markers)
+    for curve in data.curves.values():
+        refuse_unanswered(problem, curve)
+    at = probe_number(problem, probe)
+    for model in models_of(scene, estimates(scene) if is_tuned(scene) else {}):
+        with progress.stage(model.name):
+            found = model.prepare(problem).simulate().trajectory
+            others = coarser(model, problem)
+        for name, curve in data.curves.items():
+            read = partial(seen, problem, curve=curve, probe=at)
+            own = others.own_error(read(found), read)
+            yield _of_curve(name, curve, model.label, read(found), own)
+        if data.markers is not None:
+            first, peak = len(problem.probes), problem.observation.frames[0]
+
+            def moved(motion: Trajectory, first: int = first, peak: int = peak) -> Floats:
+                return motion.displacement[peak, first:]
+
+            own = others.own_error(moved(found), moved)
+            yield _of_markers(data.markers, model.label, moved(found), own)
+
+
+def _marked(problem: Problem, markers: OwnMarkers) -> Problem:
+    """The problem seen at the markers too, after its control points."""
+    probes = np.concatenate([problem.observation.probes, markers.places])
+    return replace(problem, observation=replace(problem.observation, probes=probes))
+
+
+def probe_number(problem: Problem, name: str | None) -> int:
+    """Number of a control point, by default the one nearest to the tool; ValueError for none."""
+    if name is None:
+        known = problem.observation.probes[: len(problem.probes)]
+        return int(np.linalg.norm(known - problem.tool.centre, axis=1).argmin())
+    if name not in problem.probes:
+        raise ValueError(f"--probe {name}: is not one of {', '.join(problem.probes)}")
+    return problem.probes.index(name)
+
+
+def refuse_unanswered(problem: Problem, curve: Curve) -> None:
+    """ValueError for a force without a tool that is moved, or times that are not simulated."""
+    if curve.column == "force_N" and not problem.rigid_tools:
+        raise ValueError(
+            "force_N: the scene's tool is driven by force; give a curve of displacement_m, or "
+            "move the tool: tool.shape and tool.displacement"
+        )
+    last = float(problem.observation.times[-1])
+    if curve.times[0] < 0.0 or curve.times[-1] > last * (1.0 + 1e-9):
+        raise ValueError(
+            f"time_s: {curve.times[0]:g} to {curve.times[-1]:g} s is not within the {last:g} s "
+            "simulated; enlarge time.duration or shorten the curve"
+        )
+
+
+def seen(problem: Problem, trajectory: Trajectory, curve: Curve, probe: int) -> Floats:
+    """What a motion says at the times of a curve (k,); nan after it diverged."""
+    if curve.column == "force_N":
+        tool = problem.rigid_tools[0]
+        values = -(trajectory.tool_force[:, 0] @ tool.axis)
+    else:
+        values = trajectory.displacement[:, probe] @ problem.tool.direction
+    return np.interp(curve.times, problem.observation.times, values)
+
+
+@dataclass(frozen=True)
+class Coarser:
+    """A model's motions on coarser meshes or lattices, coarse to fine; their sizes over its."""
+
+    motions: tuple[Trajectory, ...]
+    sizes: tuple[float, ...]
+
+    def own_error(self, found: Floats, read: Callable[[Trajectory], Floats]) -> Floats | None:
+        """Error of values (k, ...) that are read of a motion, by those of the coarser ones.
+
+        As large as estimated in the root mean square, and of the shape of the last change. None
+        without a coarser one, or where one diverged.
+        """
+        if not self.motions:
+            return None
+        values = [np.reshape(one, (len(one), -1)) for one in (*map(read, self.motions), found)]
+        if not all(np.isfinite(one).all() for one in values):
+            return None
+        change = values[-1] - values[-2]
+        size = float(np.linalg.norm(change))
+        if size == 0.0:
+            return np.zeros_like(found)
+        error = discretisation_error(values, (*self.sizes, 1.0), ORDER).error
+        share = error * float(np.linalg.norm(values[-1])) / size
+        return np.asarray(share * change).reshape(found.shape)
+
+
+def coarser(model: Model, problem: Problem) -> Coarser:
+    """The motions of a model on two coarser meshes or lattices, or as many as there are."""
+    found = [
+        (one.trajectory, size)
+        for settings, size in _coarser_settings(model, problem)
+        if (one := _simulated(model, problem, settings)) is not None
+    ]
+    motions, sizes = zip(*found, strict=True) if found else ((), ())
+    return Coarser(tuple(motions), tuple(sizes))
+
+
+def _coarser_settings(model: Model, problem: Problem) -> Iterator[tuple[dict[str, float], float]]:
+    """What to vary, and the size of elements or cells over the model's own, coarse to fine."""
+    lattice, levels = getattr(model, "lattice", None), problem.geometry.level
+    base = levels(0)
+    for step in (2, 1):
+        if lattice is not None:
+            ratio = COARSER_SPACING**step
+            yield {"spacing": ratio * lattice.spacing}, ratio
+        elif base is not None and (level := levels(-step)) is not None:
+            yield {"level": -step}, level.size / base.size
+
+
+def _simulated(model: Model, problem: Problem, settings: dict[str, float]) -> Simulation | None:
+    try:
+        return model.varied(**settings).prepare(problem).simulate()
+    except (TypeError, ValueError):  # it has no such setting, or none that fits
+        return None
+
+
+def _of_curve(name: str, curve: Curve, label: str, found: Floats, own: Floats | None) -> Comparison:
+    """Root mean squares of the measured curve and of what the model is off."""
+    spread = curve.uncertainty
+    return Comparison(
+        problem=NAME,
+        case=name,
+        faces="as in the scene",
+        model=label,
+        quantity=f"{curve.column.partition('_')[0]}, rms of the difference",
+        unit=curve.unit,
+        measured=0.0,
+        uncertainty=np.nan if spread is None else _rms(spread),
+        found=_rms(found - curve.values),
+        numerical=np.nan if own is None else _rms(own),
+        note=f"rms of the curve {_rms(curve.values):.4g} {curve.unit}",
+    )
+
+
+def _of_markers(markers: OwnMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
+    """The same of the markers when the load is largest."""
+    spread = markers.uncertainty
+    return Comparison(
+        problem=NAME,
+        case="markers",
+        faces="as in the scene",
+        model=label,
+        quantity="markers, rms of the difference",
+        unit="m",
+        measured=0.0,
+        uncertainty=np.nan if spread is None else float(np.sqrt(3.0)) * _rms(spread),
+        found=_rms(moved - markers.moved),
+        numerical=np.nan if own is None else _rms(own),
+        note=f"rms of the markers {_rms(markers.moved):.4g} m",
+    )
+
+
+def _rms(values: Floats) -> float:
+    """Of numbers (k,), or of the lengths of vectors (k, 3)."""
+    return float(np.sqrt((values**2).sum() / len(values)))

@@ -1,0 +1,183 @@
+"""Own measurements: files refused by line, a scene beside them, quantities fitted or refused."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.models.table import models_of
+from study.run.ready import QUIET
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
+from study.validation import fit_table, own_scene, table
+from study.validation.fitting import Free, fit, free_of, solve
+from study.validation.own_data import Curve, read_curve, read_markers
+from study.validation.own_scene import OwnData
+
+SCENE = [
+    'organ.size=["60 mm", "60 mm", "40 mm"]',
+    "reference.element_size=20 mm",
+    "lattice.spacing=10 mm",
+    "time.samples=17",
+    'models=["fem"]',
+]
+E = Free("tissue.youngs_modulus", "Pa", 100.0, 1e6, 9.5e3)
+TIMES = np.linspace(0.1, 1.0, 12)
+
+
+def curve(values, uncertainty=None, column="displacement_m"):
+    spread = None if uncertainty is None else np.full(len(values), uncertainty)
+    return Curve(column, TIMES, np.asarray(values), spread)
+
+
+def compliant(values):
+    """Displacement of a spring whose stiffness is in proportion to the modulus."""
+    return 5.0 * TIMES / values[0]
+
+
+def test_the_interval_holds_the_truth_as_often_as_it_says(rng):
+    held, sigma = 0, 2e-5
+    for _ in range(100):
+        data = curve(compliant([6e3]) + rng.normal(0.0, sigma, len(TIMES)), sigma)
+        (one,) = solve(compliant, data, [E]).fit.quantities
+        held += one.low < 6e3 < one.high
+    assert 88 <= held <= 100
+    (one,) = solve(compliant, curve(compliant([6e3])), [E]).fit.quantities
+    assert one.value == pytest.approx(6e3, rel=1e-5)
+
+
+def test_an_interval_widens_where_the_model_does_not_follow():
+    off = compliant([6e3]) * (1.0 + 0.2 * np.sin(9.0 * TIMES))
+    near, far = (
+        solve(compliant, curve(values, 1e-5), [E]).fit for values in (compliant([6e3]), off)
+    )
+    assert near.chi < 0.01
+    assert far.chi > 3.0
+    wide = [one.quantities[0].high - one.quantities[0].low for one in (near, far)]
+    assert wide[1] > 3.0 * wide[0]
+
+
+def test_what_a_curve_does_not_determine_is_refused():
+    other = Free("support.stiffness", "Pa/m", 1.0, 1e12, 1e6)
+    with pytest.raises(ValueError, match="does not change with it"):
+        solve(lambda _: TIMES, curve(TIMES), [E])
+    with pytest.raises(ValueError, match="does not tell them apart"):
+        solve(lambda v: 5.0 * TIMES / (v[0] * v[1]) * 1e6, curve(TIMES * 1e-3), [E, other])
+    with pytest.raises(ValueError, match="wider than"):
+        solve(compliant, curve(compliant([6e3]), 1.0), [E])
+    with pytest.raises(ValueError, match="no value between"):
+        solve(compliant, curve(compliant([1e8]), 1e-9), [E])
+    with pytest.raises(ValueError, match="cannot determine"):
+        solve(compliant, replace(curve([1.0]), times=TIMES[:1]), [E])
+
+
+def test_only_positive_quantities_of_the_scene_are_free():
+    scene = read_scene("block")
+    assert free_of(scene, "tissue.youngs_modulus") == E
+    none = ("tissue.colour", "tissue", "tool.place", "models", "lattice.springs", "time.samples")
+    for key in none:
+        with pytest.raises(ValueError, match="no positive quantity"):
+            free_of(scene, key)
+
+
+def write(path, header, rows):
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "message"),
+    [
+        ("time_s,displacement_m", ["0,0", "1,x", "2,1"], r"line 3: displacement_m: 'x'"),
+        ("time_s,displacement_m", ["0,0", "1,nan", "2,1"], r"line 3: displacement_m"),
+        ("time_s,displacement_m", ["0,0", "1", "2,1"], r"line 3: 1 cells"),
+        ("time_s,displacement_m", ["0,0", "1,1", "1,2"], r"line 4: time_s does not grow"),
+        ("time_s,displacement_m", ["0,0"], r"give 3 or more"),
+        ("time_s,displacement_m,force_N", ["0,0,0"], r"give one of the columns"),
+        ("displacement_m", ["0", "1", "2"], r"time_s is missing"),
+        ("time_s,depth", ["0,0"], r"give one of the columns"),
+        ("time_s,displacement_m,uncertainty", ["0,0,1", "1,1,0", "2,2,1"], r"line 3: uncertainty"),
+    ],
+)
+def test_a_curve_that_is_none_is_refused_by_line(tmp_path, header, rows, message):
+    with pytest.raises(ValueError, match=message):
+        read_curve(write(tmp_path / "c.csv", header, rows))
+
+
+def test_files_that_are_not_there_or_no_text_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="no such file"):
+        read_curve(tmp_path / "none.csv")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match="UTF-8"):
+        read_curve(tmp_path / "b.csv")
+    with pytest.raises(ValueError, match="no such folder"):
+        own_scene.read_folder(tmp_path / "none")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match="holds no CSV"):
+        own_scene.read_folder(tmp_path / "empty")
+    with pytest.raises(ValueError, match="x_m is missing"):
+        read_markers(write(tmp_path / "m.csv", "a,b", ["1,2"]))
+
+
+@pytest.fixture(scope="module")
+def posed():
+    """A small scene, its problem, and the motion that it says itself."""
+    scene = read_scene("block", SCENE)
+    problem = problem_of(scene)
+    (model,) = models_of(scene, {})
+    return scene, problem, model.prepare(problem).simulate().trajectory
+
+
+def own_curve(posed, uncertainty=1e-6):
+    _, problem, motion = posed
+    values = motion.displacement[:, 0] @ problem.tool.direction
+    return Curve("displacement_m", problem.observation.times, values, np.full(17, uncertainty))
+
+
+def test_a_scene_beside_its_own_motion_differs_by_nothing(posed):
+    scene, problem, _ = posed
+    found = own_scene.comparisons(scene, OwnData({"tool": own_curve(posed)}, None), QUIET)
+    (one,) = found
+    assert one.found < 1e-12
+    assert one.within
+    assert one.numerical > 0.0  # its own error is not nothing for that
+    assert "own scene" in "\n".join(table.lines([one]))
+    with pytest.raises(ValueError, match="is not one of tool, corner"):
+        own_scene.probe_number(problem, "rim")
+    force = replace(own_curve(posed), column="force_N")
+    with pytest.raises(ValueError, match="driven by force"):
+        own_scene.refuse_unanswered(problem, force)
+    late = replace(own_curve(posed), times=own_curve(posed).times + 1.0)
+    with pytest.raises(ValueError, match="is not within"):
+        own_scene.refuse_unanswered(problem, late)
+
+
+def test_a_modulus_is_found_again_and_its_error_told(posed):
+    scene, _, _ = posed
+    started = replace(scene, tissue=replace(scene.tissue, youngs_modulus=8e3))
+    found = fit(started, own_curve(posed, 1e-5), ["tissue.youngs_modulus"], "fem", QUIET)
+    (one,) = found.quantities
+    assert one.value == pytest.approx(9.5e3, rel=1e-3)
+    assert one.low < 9.5e3 < one.high
+    assert one.numerical > 0.0
+    assert found.chi < 0.1
+    text = "\n".join(fit_table.lines(found))
+    assert "tissue.youngs_modulus = 9500 Pa" in text
+    assert json.loads(fit_table.as_json(found))["quantities"][0]["key"] == "tissue.youngs_modulus"
+
+
+def test_the_commands_refuse_with_exit_code_2(tmp_path):
+    path = write(tmp_path / "c.csv", "time_s,displacement_m", ["0,0", "1,x", "2,1"])
+    for command in (
+        ["fit", "block", "--curve", str(path), "--free", "tissue.youngs_modulus"],
+        ["validate", "block", "--data", str(tmp_path)],
+        ["validate", "--data", str(tmp_path)],
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "study", *command], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr

@@ -1,0 +1,83 @@
+"""The appendix prints models beside measurements as the table has them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from reports import benchmarks
+from reports.validation import of_cylinders, summed, validation
+from reports.validation_figure import validation_figure
+from tests.report_samples import bare, printed, results_of
+
+HEAD = (
+    "problem,case,faces,model,quantity,unit,measured,uncertainty,found,numerical,modulus_pa,"
+    "fitted,within,note\n"
+)
+TABLE = HEAD + (
+    "cylinders,soft,bonded,linear FE,force at 10 %,N,10,0.5,9,0.01,6e3,modulus,True,\n"
+    "cylinders,hard,bonded,linear FE,force at 10 %,N,20,0.5,22,0.04,9e3,modulus,False,\n"
+    "cylinders,soft,bonded,springs alone,force at 10 %,N,10,0.5,,,,modulus,,gives way\n"
+    'cantilever,weight alone,clamped,linear FE,"tip down, mean of markers",mm,6.5,0.07,6.69,0.03,'
+    "2.6e5,nothing,False,\n"
+    'cube,5 %,bonded,linear FE,"residual of beads, rms",mm,0,0.65,0.46,0.01,,way,True,plate\n'
+    'cube,5 %,sliding,linear FE,"residual of beads, rms",mm,0,0.65,,,,way,,gives way\n'
+)
+
+
+@pytest.fixture(name="folder")
+def _folder(tmp_path, monkeypatch):
+    (tmp_path / "validation.csv").write_text(TABLE)
+    monkeypatch.setattr(benchmarks, "FOLDER", tmp_path)
+    return tmp_path
+
+
+@pytest.mark.usefixtures("folder")
+def test_medians_and_ranges_are_of_the_cases_with_an_answer():
+    lines = benchmarks.read("validation")
+    groups = of_cylinders(lines, "bonded")
+    found = summed(groups["linear FE", "force at 10 %"])
+    assert found.difference == pytest.approx(0.0)
+    assert (found.least, found.largest) == (pytest.approx(-0.1), pytest.approx(0.1))
+    assert found.uncertainty == pytest.approx(0.0375)
+    assert (found.within, found.answered, found.cases) == (1, 2, 2)
+    assert summed(groups["springs alone", "force at 10 %"]) is None
+    (group,) = validation(results_of())["cylinders"]
+    assert group["rows"][0][:4] == ["linear FE", "force at 10 %", "+0.0 %", "-10.0 % to +10.0 %"]
+    assert group["rows"][1][2] == "gives way"
+
+
+@pytest.mark.usefixtures("folder")
+def test_bodies_stand_with_difference_uncertainty_and_verdict():
+    found = validation(results_of())
+    names = [group["name"] for group in found["bodies"]]
+    assert names == ["cantilever, clamped", "cube, bonded", "cube, sliding"]
+    row = found["bodies"][0]["rows"][0]
+    assert row[3:] == ["6.50", "6.69", "+0.19", "0.070", "0.030", "beyond"]
+    assert found["bodies"][1]["rows"][0][-1] == "within"
+    assert found["bodies"][2]["rows"][0][-1] == "gives way"
+    assert found["within"] == "2 of 4"
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_figure_is_drawn_of_what_there_is():
+    svg = validation_figure()
+    assert svg is not None
+    assert b"model - measured" in svg or b"<svg" in svg
+
+
+def test_without_a_table_or_finite_elements_there_is_nothing(tmp_path, monkeypatch):
+    assert validation(results_of(["basafa"])) is None
+    monkeypatch.setattr(benchmarks, "FOLDER", tmp_path)
+    assert validation(results_of()) is None
+    assert validation_figure() is None
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_appendix_is_printed():
+    text = printed(bare(results_of()))
+    assert "gives way" in text
+    assert "beyond" in text
+    assert "faces bonded" in text
+    assert json.dumps(validation(results_of()))
