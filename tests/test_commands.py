@@ -18,6 +18,7 @@ from study import progress, signals
 from study.__main__ import main
 from study.commands import EXIT_MACHINE
 from study.results import tables
+from study.scene.file import read_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLES = {
@@ -351,3 +352,16 @@ def test_an_exit_that_was_swallowed_is_made_up_for_at_the_next_stage(monkeypatch
         signals.ask_to_stop(15)
     with pytest.raises(signals.Stopped, match="SIGTERM"), progress.Lines().stage("two"):
         pass
+
+
+def test_a_scene_is_shown_as_a_file_that_can_be_run(typed, tmp_path):
+    done = typed("scenes", "--show", "block")
+    assert done.returncode == 0
+    (tmp_path / "mine.toml").write_text(done.stdout)
+    assert read_scene(str(tmp_path / "mine.toml")) == read_scene("block")
+
+
+def test_a_page_is_not_opened_that_is_not_made(typed):
+    done = typed("run", "paper", "--open", "--no-html")
+    assert done.returncode == 2
+    assert "--open: opens report.html" in done.stderr

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reports import several
 from study.commands.compare import compare as command
 from study.compare import differences, other_words
 from study.results.folder import write
@@ -131,3 +132,60 @@ def test_a_folder_that_is_not_whole_is_not_compared(folders):
     (folders[1] / "curves.csv").write_text("")
     with pytest.raises(ValueError, match=r"curves\.csv, line 1"):
         command(*folders)
+
+
+# --- several runs, by their errors ---------------------------------------------------------------
+
+
+def rows_of(*runs):
+    return {(row.quantity, row.model): row for row in several.compared(runs)}
+
+
+def at_tool(model):
+    return "largest displacement at tool", model
+
+
+def test_a_number_that_moves_by_less_than_both_errors_does_not_differ():
+    found = rows_of(results_of(), scaled(results_of(), 1.001), results_of())
+    row = found[at_tool("Basafa benchmark")]
+    # By time steps 0.001 of 2 mm each way.
+    assert row.values[0].error == pytest.approx(2e-3, rel=0.01)
+    assert row.differs is False
+
+
+def test_a_number_that_moves_by_more_than_both_errors_differs():
+    """Negative control of the test above."""
+    found = rows_of(results_of(), results_of(), scaled(results_of(), 1.003))
+    assert found[at_tool("Basafa benchmark")].differs is True
+    assert found[at_tool("MSM Sugeno")].differs is False
+
+
+def test_a_number_without_an_error_is_not_judged():
+    unknown = with_model(scaled(results_of(), 1.5), "basafa", time_step_errors={})
+    assert rows_of(results_of(), unknown)[at_tool("Basafa benchmark")].differs is None
+
+
+def test_a_run_without_a_model_leaves_a_gap_and_one_that_no_other_has_is_left_out():
+    found = rows_of(results_of(), results_of(), results_of(["fem", "basafa"]))
+    assert found[at_tool("MSM Sugeno")].values[2] is None
+    assert at_tool("MSM Sugeno") not in rows_of(results_of(), results_of(["fem", "basafa"]))
+
+
+def test_three_folders_make_one_table_with_those_that_differ_first(tmp_path, capsys):
+    runs = {"a": whole(), "b": scaled(whole(), 1.2), "c": whole()}
+    for name, run in runs.items():
+        (tmp_path / name).mkdir()
+        write(run, tmp_path / name)
+    command(*(tmp_path / name for name in runs), out=tmp_path / "table.csv")
+    head, first, *_ = capsys.readouterr().out.splitlines()
+    assert head.split()[-4:] == ["a", "b", "c", "verdict"]
+    assert first.startswith("largest displacement at tool")
+    assert first.endswith("differs")
+    table = (tmp_path / "table.csv").read_text().splitlines()
+    assert table[0] == "quantity,model,unit,a,a ±,b,b ±,c,c ±,verdict"
+    assert any(line.endswith("within errors") for line in table)
+
+
+def test_out_is_for_the_table_alone(tmp_path):
+    with pytest.raises(ValueError, match="--out"):
+        command(tmp_path, tmp_path, out=tmp_path / "table.csv")

@@ -334,3 +334,39 @@ def test_space_round_a_quantity_is_no_mistake():
 def test_a_name_that_no_file_can_have_is_refused():
     with pytest.raises(SceneError, match="neither a file nor a built-in scene"):
         read_scene("n" * 5000)
+
+
+# --- a reader's own terms ------------------------------------------------------------------------
+
+
+def test_keys_are_matched_whatever_their_case_but_names_of_control_points_are_kept(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        '[Organ]\nSHAPE = "block"\n[Tool]\nForce = "2 N"\n[control_points]\n'
+        'Apex = { Side = "anterior", at = [0.5, 0.5] }\n'
+    )
+    found = read_scene(str(path), ["Patient.HCV=9.5 kPa"])
+    assert (found.organ.shape, found.tool.force, found.patient.hcv) == ("block", 2.0, 9500.0)
+    assert list(found.control_points) == ["Apex"]
+
+
+def test_a_key_given_in_two_cases_is_refused(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text('[tool]\nforce = "1 N"\nForce = "2 N"\n')
+    with pytest.raises(SceneError, match="Force: unknown key, did you mean 'force'"):
+        read_scene(str(path))
+
+
+def test_a_bare_reading_is_answered_with_its_usual_unit():
+    with pytest.raises(SceneError, match=r'did you mean "9\.5 kPa"'):
+        read_scene("block", ["patient.hcv=9.5"])
+
+
+def test_frames_per_second_are_a_rate():
+    assert read_scene("block", ["require.rate=60 fps"]).require.rate == 60.0
+
+
+@pytest.mark.parametrize("name", ["my liver.stl", "liver.MSH", "a.vtu"])
+def test_a_mesh_given_as_a_scene_is_answered_with_how_to_give_it(name):
+    with pytest.raises(SceneError, match=r"--set organ\.mesh="):
+        read_scene(name)

@@ -24,7 +24,7 @@ from study.sweep.task import Task
 from study.tradeoff import recommend as advice
 from study.tradeoff import study as study_module
 from study.tradeoff import table
-from study.tradeoff.demand import Demand, demand
+from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
 from study.tradeoff.observation import Observed
@@ -502,6 +502,7 @@ def test_a_recommended_corrected_lattice_has_its_spacing_in_the_scene():
         (("recommend", "block", "--rate", "60 kg"), "--rate 60 kg"),
         (("recommend", "block", "--error", "many %"), "--error many %"),
         (("recommend", "block", "--error", "0 %"), "--error 0 %"),
+        (("recommend", "block", "--error", "500 mm"), "the organ moves by"),
         (("recommend", "block", "--error", "5 %", "--out", "no/where.toml"), "there is no folder"),
     ],
 )
@@ -522,3 +523,16 @@ def test_a_dry_run_says_what_would_be_run_and_writes_nothing(command, tmp_path):
 def test_demands_are_read_with_their_units():
     assert demand("1 kHz", "5%") == Demand(1000.0, 0.05)
     assert demand(None, "0.05") == Demand(None, 0.05)
+
+
+@pytest.mark.parametrize("rate", ["60", "60 fps", "60 Hz", "0.06 kHz"])
+def test_frames_per_second_and_a_bare_number_are_a_rate(rate):
+    assert demand(rate, None) == Demand(60.0, None)
+
+
+def test_a_length_is_an_error_and_a_share_of_what_the_organ_moves_by():
+    assert length("0.5 mm") == pytest.approx(5e-4)
+    assert [length(one) for one in ("5 %", "0.05", None)] == [None] * 3
+    assert as_share(5e-4, 2e-3) == "25 %"
+    with pytest.raises(ValueError, match=r"--error 3 mm: the organ moves by 2 mm at most"):
+        as_share(3e-3, 2e-3)

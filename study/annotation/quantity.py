@@ -33,6 +33,8 @@ USUAL = {
     "byte": ("MB", "GB", "byte"),
 }
 """Units that are suggested, by the SI unit."""
+FRAMES = {"Hz": ("fps", "FPS")}
+"""Frames per second, which pint takes for feet."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,17 @@ class Quantity:
         if not math.isfinite(number):
             raise ValueError("must be finite")
         if not self.low <= number <= self.high:
-            hint = _hint(value, self.unit) if isinstance(value, str) else ""
+            hint = _hint(value, self.unit) if isinstance(value, str) else self._meant(number)
             limits = f"must lie between {self.low:g} and {self.high:g} {self.unit}".strip()
             raise ValueError(limits + hint)
         return number
+
+    def _meant(self, number: float) -> str:
+        """For a bare number out of range: the first usual unit in which it would be in it."""
+        for unit in USUAL.get(self.unit, ()):
+            if unit != self.unit and self.low <= number * _factor(unit, self.unit, "") <= self.high:
+                return f', did you mean "{number:g} {unit}"?'
+        return ""
 
     def text(self, value: float) -> str:
         """The value as text that `read` takes back unchanged."""
@@ -96,6 +105,8 @@ def _parsed(text: str, unit: str) -> float:
     if not match["unit"]:
         if unit:
             raise ValueError(f"the unit is missing; {example}")
+        return float(match["number"])
+    if match["unit"] in FRAMES.get(unit, ()):
         return float(match["number"])
     converted = float(match["number"]) * _factor(match["unit"], unit, example)
     return float(f"{converted:.15g}")  # 1.5 l is 0.0015 m^3, without the rounding of the factor

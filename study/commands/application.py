@@ -12,6 +12,7 @@ from pathlib import Path
 from cyclopts import App, CycloptsError, Parameter
 
 from study import signals
+from study.commands.bundle import bundle
 from study.commands.check import check
 from study.commands.cohort import cohort
 from study.commands.compare import compare
@@ -124,7 +125,7 @@ def _say(message: str) -> None:
 
 
 for command in (
-    *(run, scenes, check, report, view, compare, export, verify, validate, fit),
+    *(run, scenes, check, report, view, compare, bundle, export, verify, validate, fit),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
     app.command(command)

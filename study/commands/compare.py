@@ -1,4 +1,4 @@
-"""`compare`: what differs between two results folders."""
+"""`compare`: what differs between results folders."""
 
 from __future__ import annotations
 
@@ -7,17 +7,26 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.flags import EXIT_FAILED_CHECK
+from study.commands.flags import EXIT_FAILED_CHECK, Switch
 
 if TYPE_CHECKING:
     from study.compare import Difference
 
 
-def compare(first: Path, second: Path, *, tolerance: float = 0.0) -> None:
+def compare(
+    first: Path,
+    second: Path,
+    *others: Path,
+    tolerance: float = 0.0,
+    errors: Switch = False,
+    out: Path | None = None,
+) -> None:
     """Say which numbers differ between two results folders, and what made them otherwise.
 
     Exit code 1 if any number differs by more than the tolerance. Wall times are left out; what
-    differs in scene, versions or platform is told and does not count.
+    differs in scene, versions or platform is told and does not count. Of more than two folders, or
+    with --errors, one table says which displacements, differences and estimates are apart by more
+    than their numerical errors; exit code 0.
 
     Parameters
     ----------
@@ -25,10 +34,40 @@ def compare(first: Path, second: Path, *, tolerance: float = 0.0) -> None:
         Results folder of a run.
     second
         Results folder of another run.
+    others
+        Results folders of further runs.
     tolerance
         Relative difference that counts as none, of the largest value of a curve or array, or of a
         single number. 0 by default: all numbers are the same.
+    errors
+        Compare by the errors of the numbers, and not by a tolerance.
+    out
+        CSV file to write the table to as well.
     """
+    if others or errors:
+        _by_errors([first, second, *others], out)
+        return
+    if out is not None:
+        raise ValueError("--out: is for the table of --errors; give both")
+    _two(first, second, tolerance)
+
+
+def _by_errors(folders: list[Path], out: Path | None) -> None:
+    from reports import several
+    from study.folders import check_file, write_text
+    from study.results.folder import read
+
+    if out is not None:
+        check_file(out)
+    names = several.short_names([str(folder) for folder in folders])
+    rows = several.compared([read(folder) for folder in folders])
+    print("\n".join(several.lines(names, rows)))
+    if out is not None:
+        write_text(out, several.text(names, rows))
+        print(f"table in {out}")
+
+
+def _two(first: Path, second: Path, tolerance: float) -> None:
     from study.compare import differences, other_words
     from study.results.folder import read
 

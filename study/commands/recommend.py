@@ -25,9 +25,10 @@ def recommend(
     scene
         A built-in scene or a TOML file.
     rate
-        States per second that must be ready in real time, for example "60 Hz".
+        States per second that must be ready in real time, for example "60 Hz", "60 fps" or 60.
     error
-        Error of the displacement over the organ to stay below, for example "5 %".
+        Error of the displacement over the organ to stay below, for example "5 %"; a length such as
+        "0.5 mm" is taken as a share of the largest displacement at rest.
     known_place
         The load stays where the scene has it: corrected lattices, which follow it only there, are
         chosen from too.

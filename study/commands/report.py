@@ -1,29 +1,66 @@
-"""`report`: the PDF and the page of a results folder, made again."""
+"""`report`: the PDF and the page of a results folder or a bundle, made again."""
 
 from __future__ import annotations
 
 import os
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 
+from study.commands.flags import EXIT_FAILED_CHECK
 
-def report(folder: Path, *, html: bool = True) -> None:
-    """Make report.pdf and report.html of a results folder again, without simulating.
+
+def report(target: Path, *, html: bool = True, out: Path | None = None) -> None:
+    """Make report.pdf and report.html of a results folder or a bundle again, without simulating.
+
+    Of a bundle, exit code 1 if they have other bytes than those in it.
 
     Parameters
     ----------
-    folder
-        Results folder of an earlier run.
+    target
+        Results folder of an earlier run, or an archive of liver-study bundle.
     html
         Whether to make report.html.
+    out
+        Folder to unpack a bundle into; its name without the ending, here, by default.
     """
+    from study.bundle import is_archive
+
+    if is_archive(target):
+        _of_bundle(target, out or Path(target.stem), html=html)
+        return
+    if out is not None:
+        raise ValueError("--out: is for a bundle; the reports of a folder are made in it")
+    print("\n".join(str(path) for path in _of_folder(target, html=html)))
+
+
+def _of_folder(folder: Path, *, html: bool) -> list[Path]:
     from study.folders import claimed
 
     # Where its parent may not be written the folder cannot be replaced meanwhile, nor locked.
     free = os.access(folder.absolute().parent, os.W_OK)
     with claimed(folder) if free else nullcontext():
-        made = make(folder, report=True, page=html)
-    print("\n".join(str(path) for path in made))
+        return make(folder, report=True, page=html)
+
+
+def _of_bundle(archive: Path, folder: Path, *, html: bool) -> None:
+    """Unpack, make, and say whether the bytes are those of the archive."""
+    from study.bundle import changed, unpack
+
+    unpacked = unpack(archive, folder)
+    made = _of_folder(folder, html=html)
+    other = changed(unpacked, made)
+    for path in made:
+        known = path.name in unpacked.reports
+        told = "other bytes than" if path.name in other else "the same bytes as"
+        print(f"{path}: {told} in {archive}" if known else f"{path}: not in {archive}")
+    if other:
+        print(
+            "liver-study: other versions or another renderer made them; compare "
+            "environment/installed.txt of the archive",
+            file=sys.stderr,
+        )
+        sys.exit(EXIT_FAILED_CHECK)
 
 
 def make(folder: Path, *, report: bool, page: bool) -> list[Path]:

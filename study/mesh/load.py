@@ -58,6 +58,8 @@ _READERS: dict[str, Callable[[bytes], RawMesh]] = {
 _READERS |= dict.fromkeys(
     [".vtm", ".pvtu", ".pvtp", ".pvd", ".vtmb", ".vti", ".vtr", ".vts"], read_vtk_xml
 )
+ENDINGS = frozenset(_READERS)
+"""Endings of files that are read as meshes, or refused with a reason."""
 FORMATS = (
     ".vtu, .vtp, .vtk (legacy), .msh (Gmsh), .inp (Abaqus), .mesh, .meshb (MEDIT), .stl, .obj, "
     ".ply, .off"

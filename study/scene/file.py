@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
@@ -40,6 +41,7 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
 
     Raises SceneError naming file, key, value and remedy.
     """
+    _refuse_mesh(name)
     text, base = _load(name)
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_files(table, base)
@@ -89,6 +91,7 @@ def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) 
     from pydantic import TypeAdapter, ValidationError
 
     _split_lists(table)
+    _match_case(table, ())
     try:
         scene = TypeAdapter(Scene).validate_python(table)
     except ValidationError as error:
@@ -99,6 +102,17 @@ def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) 
     if problems:
         raise SceneError(_summary(source, [_placed(one, lines or {}) for one in problems]))
     return scene
+
+
+def _match_case(table: Table, location: Sequence[str]) -> None:
+    """Name the keys of a table as its fields are named, where they differ by case alone."""
+    fields = set(_fields(location))
+    for key in [key for key in table if key not in fields and key.lower() in fields]:
+        if key.lower() not in table:
+            table[key.lower()] = table.pop(key)
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _match_case(value, (*location, key))
 
 
 def _as_written(problem: str) -> str:
@@ -242,6 +256,20 @@ def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
             yield "organ", key
 
 
+def _refuse_mesh(name: str) -> None:
+    """A mesh is no scene, but may be the organ of one."""
+    ending = Path(name).suffix.lower()
+    if not ending or ending == ".toml":
+        return
+    from study.mesh.load import ENDINGS
+
+    if ending in ENDINGS:
+        raise SceneError(
+            f"{name}: is a mesh by its ending, and no scene; give it as the organ of one, for "
+            f"example liver --set organ.mesh={shlex.quote(name)}"
+        )
+
+
 def _load(name: str) -> tuple[str, Path]:
     """Text of a scene, and the folder that a mesh is looked for in."""
     if name in BUILT_IN:
@@ -284,7 +312,7 @@ def _resolve(table: Any, key: str, base: Path) -> None:
 def _apply(table: Table, override: str) -> str:
     """Set what an override sets; its key."""
     path, separator, text = override.partition("=")
-    keys = [key.strip() for key in path.split(".")]
+    keys = _matched([key.strip() for key in path.split(".")])
     if not separator or not all(keys):
         raise SceneError(f"--set {override}: write table.key=value, for example tool.force=1 N")
     for depth, name in enumerate(keys[1:-1], 1):
@@ -313,6 +341,15 @@ def _apply_to_one(table: Table, keys: Sequence[str], number: int, override: str)
             f"--set {name}.{number}: there is no such {keys[-1]}; the scene has {len(listed)}"
         )
     return f"{name}.{number}.{_apply(listed[number - 1], override)}"
+
+
+def _matched(keys: Sequence[str]) -> list[str]:
+    """Keys of a path as the fields are named from which they differ by case alone."""
+    found: list[str] = []
+    for key in keys:
+        fields = _fields(found)
+        found.append(key.lower() if key not in fields and key.lower() in fields else key)
+    return found
 
 
 def _value(text: str) -> object:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from study.folders import check_file, write_text
 from study.models.table import model
 from study.problem.problem import Problem
@@ -19,7 +21,7 @@ from study.sweep.plan import plan
 from study.sweep.runner import How
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
-from study.tradeoff.demand import Demand, demand
+from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.lineup import configurations
 from study.tradeoff.problem import sampled
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
@@ -108,12 +110,24 @@ def advise(
     *,
     known_place: bool = False,
 ) -> tuple[bool, list[str]]:
-    """Whether the demand can be met, and lines; writes the scene if it can."""
-    wanted, given = demand(rate, error), request.read()
-    path = request.out or Path(f"{request.name}-{_suffix(wanted)}.toml")
+    """Whether the demand can be met, and lines; writes the scene if it can.
+
+    An `error` that is a length is taken as a share of the largest displacement at rest.
+    """
+    absolute, told = length(error), list[str]()
+    wanted, given = demand(rate, "1" if absolute else error), request.read()
+    path = request.out or Path(f"{request.name}-{_suffix(wanted, absolute)}.toml")
     check_file(path)
     problem = _set_up(recommend.judged_by(sampled(given)))
-    model(given, "tissue").varied().prepare(problem)  # a lattice of its spacing
+    lattice = model(given, "tissue").varied().prepare(problem)  # one of its spacing
+    if absolute is not None:
+        reach = float(np.linalg.norm(lattice.rest(), axis=1).max())
+        share = as_share(absolute, reach)
+        wanted = demand(rate, share)
+        told = [
+            f"an error of {1e3 * absolute:.3g} mm is taken as {share} of the {1e3 * reach:.3g} mm "
+            "by which the tissue's lattice yields at most at rest; errors are of the whole field"
+        ]
     store = _store(Path("results") / f"{request.name}-tradeoff")
     if known_place:
         model(given, "corrected").prepare(problem)
@@ -121,7 +135,8 @@ def advise(
         sampled(given), wanted, store, request.how, progress, known_place=known_place
     )
     noted = dict.fromkeys((*given.remarks, *problem.notes))
-    lines = [*(f"note: {note}" for note in noted), *recommend.lines(found), *_busy()]
+    notes = (f"note: {note}" for note in noted)
+    lines = [*told, *notes, *recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
     write_text(path, recommend.recommended_scene(given, found))
@@ -139,9 +154,11 @@ def _busy() -> list[str]:
     ]
 
 
-def _suffix(wanted: Demand) -> str:
-    """Of a file name."""
+def _suffix(wanted: Demand, absolute: float | None = None) -> str:
+    """Of a file name, with an error [m] as it was given."""
     rate = [] if wanted.rate is None else [f"{wanted.rate:g}Hz"]
+    if absolute is not None:
+        return "-".join([*rate, f"{1e3 * absolute:g}mm"])
     return "-".join(rate + ([] if wanted.error is None else [f"{100 * wanted.error:g}percent"]))
 
 
