@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,13 @@ from msm.damping import UNDAMPED, NodalDamping
 from msm.lattice import LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
+from msm.outer import Burden
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import SolidShape
-from study.problem.contact import Foundation, ToolPatch
+from study.problem.contact import Foundation, Load, ToolPatch, Weight
+from study.problem.rigid import RigidTool
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +31,8 @@ Floats = NDArray[np.float64]
 class Assembly:
     """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
-    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
+    `mass` [kg] (n,), of weights too; `foundation` [N/m] (n, n), acting alike along each axis;
+    `load` [N] (n, 3); `burden`: what acts beside it.
     """
 
     lattice: LatticeMesh
@@ -36,6 +40,7 @@ class Assembly:
     mass: Floats
     foundation: csr_array
     load: Floats
+    burden: Burden | None = None
 
 
 @dataclass(frozen=True)
@@ -86,11 +91,55 @@ def contact(
     pushed = tool.profile(surface.points, surface.normals) * surface.weights
     if not held.any():
         raise ValueError("the support holds no surface; enlarge support.depth")
+    if tool.force == 0.0:  # moved, and not a load
+        return csr_array(weights.T @ diags_array(held) @ weights), np.zeros((weights.shape[1], 3))
     if not pushed.any():
         raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
     support = csr_array(weights.T @ diags_array(held) @ weights)
     nodal = weights.T @ (pushed * tool.force / pushed.sum())
     return support, np.outer(nodal, tool.direction)
+
+
+def burdened(
+    assembly: Assembly,
+    surface: SurfaceRule,
+    gravity: Floats,
+    loads: Sequence[Load] = (),
+    weights: Sequence[Weight] = (),
+    tools: Sequence[RigidTool] = (),
+    *,
+    touched: SurfaceRule | None = None,
+    given_loaded: bool = False,
+) -> Assembly:
+    """The assembly with what acts on it beside its first load, gravity [m/s^2] (3,) among it.
+
+    Loads and weights act by the rule `surface`, tools meet the points of `touched`, or its own.
+    ValueError if a load or weight touches no surface.
+    """
+    at_points, _ = assembly.lattice.interpolation(surface.points)
+
+    def nodal(patch: ToolPatch, what: str) -> Floats:
+        """The patch's force, shared out among the nodes (n,)."""
+        pushed = patch.profile(surface.points, surface.normals) * surface.weights
+        if not pushed.any():
+            raise ValueError(f"{what} touches no surface that faces it; move or enlarge it")
+        return np.asarray(at_points.T @ (pushed * patch.force / pushed.sum()))
+
+    attached = np.zeros_like(assembly.mass)
+    for number, one in enumerate(weights, 1):
+        attached += one.mass * nodal(one.patch, f"weight.{number}")
+    mass = assembly.mass + attached
+    pushes = [np.outer(nodal(one.tool, "tool: a further one"), one.tool.direction) for one in loads]
+    burden = Burden(
+        np.outer(mass, gravity),
+        attached,
+        np.array(pushes).reshape(-1, len(mass), 3),
+        tuple(one.factor for one in loads),
+        tuple(tools),
+        touched or surface,
+        given_loaded,
+    )
+    return replace(assembly, mass=mass, burden=burden)
 
 
 def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> Network:
@@ -104,4 +153,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         volume,
         material.damping,
         linear=linear,
+        undamped=None if assembly.burden is None else assembly.burden.attached,
     )

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 
 if TYPE_CHECKING:
     from msm.damping import NodalDamping
+    from msm.outer import Outer
     from msm.springs import Springs
     from msm.volume import VolumeTerm
 
@@ -23,7 +24,8 @@ class Network(NamedTuple):
     times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] (c,), `spacing` [m]. Nodes: `mass`
     [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
     springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
-    `load` [N] (n, 3). `linear`: forces of small displacements.
+    `load` [N] (n, 3). `linear`: forces of small displacements. `swollen` (c,): J - 1 at which a
+    cell is unstressed. `outer`: what acts beside the load, None for nothing.
     """
 
     ends: NDArray[np.uint32]
@@ -42,6 +44,13 @@ class Network(NamedTuple):
     value: Floats
     load: Floats
     linear: bool
+    swollen: Floats
+    outer: Outer | None
+
+    @property
+    def is_strained(self) -> bool:
+        """Whether the given shape is not the unstressed one."""
+        return bool(self.swollen.any() or (np.linalg.norm(self.rest, axis=1) != self.length).any())
 
 
 def network(
@@ -53,8 +62,13 @@ def network(
     damping: NodalDamping,
     *,
     linear: bool = False,
+    undamped: Floats | None = None,
 ) -> Network:
-    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3)."""
+    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
+
+    `undamped` [kg] (n,): of the mass, what nodal damping does not act on.
+    """
+    damped = mass if undamped is None else mass - undamped
     length = springs.rest_length
     return Network(
         ends=np.ascontiguousarray(springs.ends, dtype=np.uint32),
@@ -65,12 +79,14 @@ def network(
         bulk=np.ascontiguousarray(volume.bulk),
         spacing=float(volume.spacing),
         mass=np.ascontiguousarray(mass),
-        gamma_0=damping.gamma_0 * mass,
-        gamma_1=damping.gamma_1 * mass,
+        gamma_0=damping.gamma_0 * damped,
+        gamma_1=damping.gamma_1 * damped,
         beta=float(damping.beta),
         row=foundation.indptr.astype(np.uint32),
         column=foundation.indices.astype(np.uint32),
         value=foundation.data.astype(np.float64),
         load=np.ascontiguousarray(load),
         linear=linear,
+        swollen=np.zeros(len(volume.bulk)),
+        outer=None,
     )

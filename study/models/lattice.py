@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from msm import model as msm
 from msm import tetrahedra
+from msm.assembly import burdened
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import LAWS, force_law_of
@@ -27,6 +28,7 @@ from study.models.errors import (
 )
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
+from study.models.touching import touchable
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Advance
@@ -37,6 +39,8 @@ from study.scene import Lattice, Scene
 Floats = NDArray[np.float64]
 
 MASS_LIMIT = 0.05
+FOLLOWED = frozenset({"moved-tools", "several-loads", "gravity", "weights"})
+"""Names of `study.problem.features.FEATURES` that every lattice follows."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +92,29 @@ class LatticeModel:
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
     """The lattice that all models of a scene share."""
-    if lattice.springs == "tetrahedra":
-        return _on_mesh(problem)
-    return _cubic(problem, lattice.spacing, lattice.flexion, lattice.body_diagonals)
+    on_mesh = lattice.springs == "tetrahedra"
+    mix = () if on_mesh else (lattice.spacing, lattice.flexion, lattice.body_diagonals)
+    if problem.is_burdened:
+        return _burdened(problem, *mix)
+    return _cubic(problem, *mix) if mix else _on_mesh(problem)
+
+
+@lru_cache(maxsize=1)
+def _burdened(problem: Problem, *mix: float) -> Assembly:
+    """The lattice with what acts on it beside its first load, on the mesh without a mix."""
+    bare = _cubic(problem, *mix) if mix else _on_mesh(problem)
+    surface, times = problem.geometry.surface, problem.observation.times
+    points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
+    return burdened(
+        bare,
+        problem.surface_rule,
+        problem.gravity,
+        problem.loads,
+        problem.weights,
+        problem.rigid_tools,
+        touched=points,
+        given_loaded=problem.given_loaded,
+    )
 
 
 @lru_cache(maxsize=1)
@@ -305,6 +329,7 @@ class PreparedLattice:
 
     def _mass(self) -> Check:
         expected = self.problem.geometry.volume * self.problem.tissue.density
+        expected += sum(weight.mass for weight in self.problem.weights)
         return Check(
             name="lattice: mass",
             value=abs(float(self.assembly.mass.sum()) / expected - 1.0),

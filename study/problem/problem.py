@@ -47,6 +47,11 @@ class Problem:
     given_loaded: bool = False
 
     @property
+    def is_burdened(self) -> bool:
+        """Whether more acts on the organ than its first tool as a load."""
+        return bool(self.rigid_tools or self.loads or self.weights or self.gravity.any())
+
+    @property
     def response(self) -> Response:
         """How its motion is looked at."""
         times, volumes = self.observation.times, self.volume_rule.weights
