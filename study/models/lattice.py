@@ -25,6 +25,7 @@ from study.models.errors import (
     rounding_errors,
     step_checks,
     time_step_errors,
+    tool_force_errors,
 )
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
@@ -223,6 +224,11 @@ class PreparedLattice:
             rounding = self._rounding(found, watch)
         sound = half if half is not None and half.status == "finished" else None
         record = replace(self.record(found, rounding), time_step_errors=errors)
+        if sound is not None:
+            order = INTEGRATORS[self.model.lattice.integrator].order
+            names = tuple(tool.name for tool in self.problem.rigid_tools)
+            forces = tool_force_errors(order, names, found.trajectory, sound)
+            record = replace(record, tool_force_errors=forces)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
         if finished and self.single:
             checks += tuple(rounding_checks(self.model.name, rounding))
@@ -230,7 +236,12 @@ class PreparedLattice:
         return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
 
     def rest(self) -> Floats:
-        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised."""
+        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
+
+        ValueError where more than one load acts, of which there is no linearised rest to tell.
+        """
+        if self.problem.is_burdened:
+            raise ValueError("the lattice at rest is told under one load on a weightless body only")
         nodal = msm.static_displacement(self.assembly, self.springs.material)
         points = self.problem.observation.volume_points
         return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
@@ -358,6 +369,7 @@ class PreparedLattice:
             stiffness_damping_s=damping.beta,
             largest_strain=found.largest_strain,
             time_step_errors={},
+            tool_overlap_m=found.overlap if self.problem.rigid_tools else None,
             lattice=LatticeRecord(
                 springs=len(self.assembly.springs.weight),
                 integrator=model.lattice.integrator,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
 from study.problem.contact import Foundation, Load, ToolPatch, Weight
-from study.problem.response import Response
+from study.problem.response import Response, ToolPath
 from study.problem.rigid import RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
@@ -55,7 +55,8 @@ class Problem:
     def response(self) -> Response:
         """How its motion is looked at."""
         times, volumes = self.observation.times, self.volume_rule.weights
-        return Response(times, self.probes, self.tool.direction, volumes)
+        tools = tuple(ToolPath(one.name, one.axis, one.travel(times)) for one in self.rigid_tools)
+        return Response(times, self.probes, self.tool.direction, volumes, tools)
 
     @property
     def tool_probe(self) -> int:
