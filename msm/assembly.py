@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,11 +19,13 @@ from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
 from msm.octree import Grading
+from msm.outer import Burden
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import SolidShape
-from study.problem.contact import ToolPatch
+from study.problem.contact import Load, ToolPatch, Weight
+from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.varied import Composition
@@ -36,11 +38,12 @@ Booleans = NDArray[np.bool_]
 class Assembly:
     """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
 
-    `mass` [kg] (n,); `foundation` [N/m] (n, n), acting alike along each axis; `load` [N] (n, 3).
-    `composition`: what each cell is made of, None where all are of one tissue; `connect`: the
-    springs for a stiffness (c,) of each cell relative to that of the law; `fixed` (n, 3): which
-    components of nodes do not move, None where all may. They are without load.
+    `mass` [kg] (n,), of weights too; `foundation` [N/m] (n, n), acting alike along each axis;
+    `load` [N] (n, 3). `composition`: what each cell is made of, None where all are of one tissue;
+    `connect`: the springs for a stiffness (c,) of each cell relative to that of the law; `fixed`
+    (n, 3): which components of nodes do not move, None where all may. They are without load.
     `masters` (n, n): how hanging nodes, which have none of these, move with the others, if any.
+    `burden`: what acts beside the load.
     """
 
     lattice: LatticeMesh
@@ -52,6 +55,7 @@ class Assembly:
     connect: Callable[[Floats], Springs] | None = None
     fixed: Booleans | None = None
     masters: csr_array | None = None
+    burden: Burden | None = None
 
 
 @dataclass(frozen=True)
@@ -177,11 +181,58 @@ def contact(
     pushed = tool.profile(surface.points, surface.normals) * surface.weights
     if not (resting.any() or foundation.fixed(surface.points, surface.normals).any()):
         raise ValueError("the support holds no surface; enlarge support.depth")
+    if tool.force == 0.0:  # moved, and not a load
+        return csr_array(weights.T @ diags_array(resting) @ weights), np.zeros(
+            (weights.shape[1], 3)
+        )
     if not pushed.any():
         raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
     support = csr_array(weights.T @ diags_array(resting) @ weights)
     nodal = weights.T @ (pushed * tool.force / pushed.sum())
     return support, np.outer(nodal, tool.direction)
+
+
+def burdened(
+    assembly: Assembly,
+    surface: SurfaceRule,
+    gravity: Floats,
+    loads: Sequence[Load] = (),
+    weights: Sequence[Weight] = (),
+    tools: Sequence[RigidTool] = (),
+    *,
+    touched: SurfaceRule | None = None,
+    given_loaded: bool = False,
+) -> Assembly:
+    """The assembly with what acts on it beside its first load, gravity [m/s^2] (3,) among it.
+
+    Loads and weights act by the rule `surface`, tools meet the points of `touched`, or its own.
+    ValueError if a load or weight touches no surface.
+    """
+    at_points, _ = assembly.lattice.interpolation(surface.points)
+
+    def nodal(patch: ToolPatch, what: str) -> Floats:
+        """The patch's force, shared out among the nodes (n,)."""
+        pushed = patch.profile(surface.points, surface.normals) * surface.weights
+        if not pushed.any():
+            raise ValueError(f"{what} touches no surface that faces it; move or enlarge it")
+        return np.asarray(at_points.T @ (pushed * patch.force / pushed.sum()))
+
+    attached = np.zeros_like(assembly.mass)
+    for number, one in enumerate(weights, 1):
+        attached += one.mass * nodal(one.patch, f"weight.{number}")
+    mass = assembly.mass + attached
+    pushes = [np.outer(nodal(one.tool, "tool: a further one"), one.tool.direction) for one in loads]
+    moves = 1.0 if assembly.fixed is None else ~assembly.fixed
+    burden = Burden(
+        np.outer(mass, gravity) * moves,
+        attached,
+        np.array(pushes).reshape(-1, len(mass), 3) * moves,
+        tuple(one.factor for one in loads),
+        tuple(tools),
+        touched or surface,
+        given_loaded,
+    )
+    return replace(assembly, mass=mass, burden=burden)
 
 
 def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> Network:
@@ -197,4 +248,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         linear=linear,
         fixed=assembly.fixed,
         masters=assembly.masters,
+        undamped=None if assembly.burden is None else assembly.burden.attached,
     )

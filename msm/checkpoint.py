@@ -38,9 +38,10 @@ CHANGING = {
     "motion": ("sample", "repeated", "wall"),
     "stepper": ("u", "v", "t", "unseen"),
     "pace": ("fraction", "substeps", "now", "at_rest", "margin", "halvings"),
+    "standing": ("push", "before", "due", "sums", "force"),
     "follower": ("found", "omega", "mode", "bound", "bound_then", "then"),
-    "recorder": ("strain", "inverted"),
-    "trajectory": ("displacement", "velocity", "volume_field", "surface_field"),
+    "recorder": ("strain", "inverted", "overlap"),
+    "trajectory": ("displacement", "velocity", "volume_field", "surface_field", "tool_force"),
 }
 """Attributes of the parts of a run that change as it goes."""
 
@@ -131,7 +132,7 @@ def _pieces(thing: object) -> Iterable[bytes]:
     elif isinstance(thing, np.ndarray | np.generic):
         yield f"{thing.dtype.str} {thing.shape} ".encode()
         yield np.ascontiguousarray(thing).tobytes()
-    elif isinstance(thing, str | int | float):
+    elif isinstance(thing, str | int | float | None):
         yield f"{thing!r} ".encode()
     else:
         raise TypeError(f"cannot identify a run by a {type(thing).__name__}")

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.forces import damping, internal_forces
+from msm.forces import damping, hold, internal_forces
 from msm.hanging import interpolate, interpolate_both
 from msm.kernel import kernel
 from msm.network import Network
+from msm.outer import add_outer_forces, stop_at_tools
 from msm.rayleigh import add_stiffness_damping
 
 Floats = NDArray[np.float64]
@@ -31,6 +32,7 @@ def symplectic_euler(
     force = np.empty_like(u)
     for n in range(factors.shape[0]):
         internal_forces(law, net, u, force)
+        add_outer_forces(net.outer, factors[n], 0, force.T)
         if net.beta > 0.0:
             add_stiffness_damping(law, net, u, net.beta * v, force)
         for i in range(u.shape[0]):
@@ -41,6 +43,9 @@ def symplectic_euler(
                 v[i, d] = kept * v[i, d] + share * pushed
                 u[i, d] += dt * v[i, d]
         interpolate_both(net, u, v)
+        stop_at_tools(net.outer, factors[n], dt, u.T, v.T)
+        hold(net.fixed, u)
+        hold(net.fixed, v)
 
 
 @kernel(nogil=True)
@@ -51,6 +56,8 @@ def velocity_verlet(
     force = np.empty_like(u)
     internal_forces(law, net, u, force)
     for n in range(factors.shape[0]):
+        if n == 0:
+            add_outer_forces(net.outer, factors[n], 0, force.T)
         for i in range(u.shape[0]):
             inertia = net.mass[i] + 0.5 * dt * damping(net, u, i)
             kept, share = net.mass[i] / inertia, 0.5 * dt / inertia
@@ -60,6 +67,7 @@ def velocity_verlet(
                 u[i, d] += dt * v[i, d]
         interpolate_both(net, u, v)
         internal_forces(law, net, u, force)
+        add_outer_forces(net.outer, factors[n], 1, force.T)
         for i in range(u.shape[0]):
             share = 0.5 * dt / net.mass[i]
             c = damping(net, u, i)
@@ -83,6 +91,7 @@ def runge_kutta_4(law: Any, net: Network, factors: Floats, dt: float, u: Floats,
             ahead = 0.5 * dt if stage < 2 else dt
             factor = factors[n, (stage + 1) // 2]
             internal_forces(law, net, at, force)
+            add_outer_forces(net.outer, factors[n], (stage + 1) // 2, force.T)
             for i in range(u.shape[0]):
                 c = damping(net, at, i)
                 for d in range(3):

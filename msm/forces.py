@@ -135,6 +135,7 @@ def add_volume_forces(net: Network, u: Floats, force: Floats) -> None:
     for c in range(net.cells.shape[0]):
         to_gradient = 0.25 / net.edges[c]
         swelling, x, y, z = volume_change(net.cells[c], u, to_gradient)
+        swelling -= net.swollen[c]
         scatter_pressure(net.cells[c], force, net.bulk[c] * swelling * to_gradient, x, y, z)
 
 

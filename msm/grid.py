@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from msm.lattice import CORNERS, CellLattice, LatticeMesh
 from msm.network import Network
+from msm.outer import Outer, placed
 from msm.simd import Lanes, lanes_of, widest
 
 Floats = NDArray[np.float64]
@@ -39,8 +40,8 @@ class Grid(NamedTuple):
     `spacing` [m]. Foundation: `held_start`, `held_offset`, `held` [N/m]. Nodes, each (b, l):
     `mass`, `gamma_0`, `gamma_1` as in `Network`, `kept` and `share`, which integrators fill;
     `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement. `beta`
-    [s] and `linear` as in `Network`, but None for no: kernels are compiled without what is not
-    wanted. `fixed` (f, 2): component and place of what does not move.
+    [s], `linear` and `outer` as in `Network`, but None for no: kernels are compiled without what is
+    not wanted. `fixed` (f, 2): component and place of what does not move.
     """
 
     lanes: Lanes
@@ -71,6 +72,7 @@ class Grid(NamedTuple):
     beta: float | None
     linear: Literal[True] | None
     fixed: Ints
+    outer: Outer | None
 
 
 def grid_of(
@@ -78,10 +80,11 @@ def grid_of(
 ) -> Grid | None:
     """The grid of a network on a lattice, with lanes as the processor has; None if it is no grid.
 
-    That is one on tetrahedra, or with a foundation that couples nodes far apart. `single`: in
-    single precision, of which the processor takes twice as many at once.
+    That is one on tetrahedra, with springs or cells of their own rest, or with a foundation that
+    couples nodes far apart. `single`: in single precision, of which the processor takes twice as
+    many at once.
     """
-    if not isinstance(lattice, CellLattice):
+    if not isinstance(lattice, CellLattice) or net.is_strained:
         return None
     index, strides, count = _numbering(lattice)
     held = _couplings(net, index @ strides)
@@ -126,6 +129,7 @@ def grid_of(
         beta=net.beta or None,
         linear=True if net.linear else None,
         fixed=np.stack([net.fixed[:, 1], place[net.fixed[:, 0]]], axis=1).astype(np.int64),
+        outer=None if net.outer is None else placed(net.outer, place),
     )
     return _rounded(grid) if single else grid
 

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.forces import hold
 from msm.grid import Grid
 from msm.grid_forces import add_internal_forces, add_stiffness_damping, damping
 from msm.kernel import inner_kernel, kernel
+from msm.outer import add_outer_forces, stop_at_tools
 from msm.simd import every, load, store
 
 Floats = NDArray[np.float64]
@@ -27,10 +29,14 @@ def symplectic_euler(
     set_shares(grid, dt)
     for n in range(factors.shape[0]):
         add_internal_forces(law, grid, grid.u, grid.force)
+        add_outer_forces(grid.outer, factors[n], 0, grid.force)
         add_stiffness_damping(law, grid, grid.beta, grid.u, grid.v, grid.force)
         if grid.uneven:
             set_shares(grid, dt)
         kick_and_drift(grid, factors[n, 0], dt)
+        stop_at_tools(grid.outer, factors[n], dt, grid.u, grid.v)
+        hold(grid.fixed, grid.u)
+        hold(grid.fixed, grid.v)
     give_back(grid, u, v)
 
 
@@ -41,10 +47,13 @@ def velocity_verlet(law: Any, grid: Grid, factors: Floats, dt: float, u: Floats,
     set_shares(grid, 0.5 * dt)
     add_internal_forces(law, grid, grid.u, grid.force)
     for n in range(factors.shape[0]):
+        if n == 0:
+            add_outer_forces(grid.outer, factors[n], 0, grid.force)
         if grid.uneven:
             set_shares(grid, 0.5 * dt)
         kick_and_drift(grid, factors[n, 0], dt)
         add_internal_forces(law, grid, grid.u, grid.force)
+        add_outer_forces(grid.outer, factors[n], 1, grid.force)
         kick_again(grid, factors[n, 1], 0.5 * dt)
     give_back(grid, u, v)
 
@@ -60,6 +69,7 @@ def runge_kutta_4(law: Any, grid: Grid, factors: Floats, dt: float, u: Floats, v
             weight = dt / 6.0 if stage in (0, 3) else dt / 3.0
             ahead = 0.5 * dt if stage < 2 else dt
             add_internal_forces(law, grid, at, grid.force)
+            add_outer_forces(grid.outer, factors[n], (stage + 1) // 2, grid.force)
             for b in range(grid.start.shape[0]):
                 c, i = damping(grid, at, b), grid.start[b]
                 for d in range(3):

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from msm.forces import damping, internal_forces
 from msm.kernel import kernel
 from msm.network import Network
+from msm.outer import add_outer_forces
 from msm.tangent import (
     Tangent,
     add_diagonal,
@@ -61,7 +62,7 @@ def implicit_euler(
     """Forces and load at the end of the step."""
     work, tangent = empty_workspace(u), empty_tangent(net)
     for n in range(factors.shape[0]):
-        if not solve_step(law, net, dt, factors[n, 0], u, v, work, tangent):
+        if not solve_step(law, net, dt, factors[n], u, v, work, tangent):
             work.w[:] = np.nan
         v[:] = work.w
         set_sum(u, dt, v, u)
@@ -74,7 +75,7 @@ def implicit_midpoint(
     """Forces and load at the middle of the step."""
     work, tangent = empty_workspace(u), empty_tangent(net)
     for n in range(factors.shape[0]):
-        if not solve_step(law, net, 0.5 * dt, factors[n, 0], u, v, work, tangent):
+        if not solve_step(law, net, 0.5 * dt, factors[n], u, v, work, tangent):
             work.w[:] = np.nan
         set_sum(u, dt, work.w, u)
         v[:] = 2.0 * work.w - v
@@ -92,7 +93,7 @@ def solve_step(
     law: Any,
     net: Network,
     h: float,
-    factor: float,
+    row: Floats,
     u: Floats,
     v: Floats,
     work: Workspace,
@@ -103,7 +104,7 @@ def solve_step(
     set_sum(u, h, v, work.at)
     for i in range(u.shape[0]):
         work.inertia[i] = net.mass[i] + h * damping(net, work.at, i)
-    size, scale = set_residual(law, net, h, factor, u, v, work)
+    size, scale = set_residual(law, net, h, row, u, v, work)
     for _ in range(NEWTON_STEPS):
         if size <= TOLERANCE * scale or not np.isfinite(size):
             break
@@ -112,23 +113,24 @@ def solve_step(
         if not correct(net, h, work, tangent, enough):
             make_definite(tangent)
             correct(net, h, work, tangent, enough)
-        size, scale = search(law, net, h, factor, u, v, work)
+        size, scale = search(law, net, h, row, u, v, work)
     return bool(size <= TOLERANCE * scale)
 
 
 @kernel()
 def set_residual(
-    law: Any, net: Network, h: float, factor: float, u: Floats, v: Floats, work: Workspace
+    law: Any, net: Network, h: float, row: Floats, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
     """Momentum [N s] that w leaves unexplained; its size and that of all the terms in it."""
     residual = work.residual
     set_sum(u, h, work.w, work.at)
     internal_forces(law, net, work.at, residual)
+    add_outer_forces(net.outer, row, 0, residual.T)
     size, scale = 0.0, 0.0
     for i in range(u.shape[0]):
         for d in range(3):
             after, before = work.inertia[i] * work.w[i, d], net.mass[i] * v[i, d]
-            inner, outer = h * residual[i, d], h * factor * net.load[i, d]
+            inner, outer = h * residual[i, d], h * row[0] * net.load[i, d]
             residual[i, d] = after - before - inner - outer
             size += residual[i, d] ** 2
             scale += after**2 + before**2 + inner**2 + outer**2
@@ -137,7 +139,7 @@ def set_residual(
 
 @kernel()
 def search(
-    law: Any, net: Network, h: float, factor: float, u: Floats, v: Floats, work: Workspace
+    law: Any, net: Network, h: float, row: Floats, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
     """Go along the correction, halved while it overshoots; size and scale of the residual there.
 
@@ -147,13 +149,13 @@ def search(
     limit = -0.5 * dot(work.residual, work.correction)
     share = 1.0
     set_sum(work.w, 1.0, work.correction, work.w)
-    size, scale = set_residual(law, net, h, factor, u, v, work)
+    size, scale = set_residual(law, net, h, row, u, v, work)
     for _ in range(HALVINGS):
         if dot(work.residual, work.correction) <= limit:  # false for NaN
             break
         share *= 0.5
         set_sum(work.w, -share, work.correction, work.w)
-        size, scale = set_residual(law, net, h, factor, u, v, work)
+        size, scale = set_residual(law, net, h, row, u, v, work)
     return size, scale
 
 

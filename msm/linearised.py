@@ -76,7 +76,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     gh, hf, fg = cross(g, h), cross(h, f), cross(f, g)
     cofactor = dot(gh, gh) + dot(hf, hf) + dot(fg, fg)
     size = np.sqrt(dot(f, f) + dot(g, g) + dot(h, h))
-    return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0) * size
+    return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0 - net.swollen[c]) * size
 
 
 @kernel()

@@ -63,7 +63,8 @@ class Run:
     smallest ratio of the critical step to the step taken, wherever it was looked at;
     `repeated_steps`: steps undone because the limit had fallen below them; `wall` [s]: steps and
     following of the limit, without compilation. `largest_strain`: largest absolute strain of a
-    spring, `inverted_cells`: largest number of cells turned inside out, both over the samples.
+    spring, `inverted_cells`: largest number of cells turned inside out, both over the samples;
+    `overlap` [m]: deepest one of body and rigid tools.
     """
 
     trajectory: Trajectory
@@ -76,6 +77,7 @@ class Run:
     wall: float
     largest_strain: float
     inverted_cells: int
+    overlap: float = 0.0
 
     @property
     def steps(self) -> int:
@@ -109,8 +111,9 @@ def run(
     """
     stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear, single=single)
     pace = _pace(step, observation, stepper.limit_at_rest)
-    recorder, motion = _Recorder(assembly.lattice, stepper.net, observation), _Motion()
-    recorder.record(0, stepper.u, stepper.v)
+    recorded = (assembly.lattice, stepper.net, observation, len(stepper.tool_force))
+    recorder, motion = _Recorder(*recorded), _Motion()
+    recorder.record(0, stepper)
     keeper = None
     if checkpoint is not None:
         found = _identity(assembly, stepper, integrator, step, observation)
@@ -131,11 +134,18 @@ def _identity(
     times = observation.times
     history = stepper.factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
     seen = tuple(getattr(observation, field.name) for field in fields(observation))
-    body = assembly.lattice.nodes, stepper.law, stepper.net
+    body = assembly.lattice.nodes, stepper.law, stepper.net, stepper.start, _driven(stepper, times)
     runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
     # Which round differently.
     lanes = () if stepper.grid is None else (stepper.grid.u.dtype.name, len(stepper.grid.lanes))
     return identity(runs, lanes, body, integrator, step, seen, history)
+
+
+def _driven(stepper: LatticeStepper, times: Floats) -> Floats:
+    """What drives further loads and tools at the samples, and between them."""
+    if stepper.burden is None:
+        return np.zeros(0)
+    return stepper.burden.drive(times, float(times[1] - times[0]), (0.5, 1.0))
 
 
 def _parts(
@@ -145,6 +155,7 @@ def _parts(
     return {
         "motion": motion,
         "stepper": stepper,
+        "standing": stepper.standing,
         "pace": pace,
         "follower": stepper.follower,
         "recorder": recorder,
@@ -163,7 +174,7 @@ def refuse(
     single: bool = False,
 ) -> None:
     """ValueError for all that `run` refuses but checkpoints, without a step taken."""
-    refuse_unfit(integrator, material)
+    refuse_unfit(integrator, material, assembly.burden)
     net = arrays(assembly, material, linear=linear)
     if single:  # else there is nothing to refuse, and a grid takes a while
         grid_for(assembly.lattice, net, integrator, single=True)
@@ -227,7 +238,7 @@ def _march(
 ) -> _Lost | None:
     """Go from sample to sample, and back to the last one kept where the steps were too long."""
     u, v, intervals = stepper.u, stepper.v, len(pace.substeps)
-    kept = (motion.sample, u.copy(), v.copy())
+    kept = (motion.sample, stepper.state())
     on_sample(motion.sample, u, v)
     while motion.sample < intervals:
         started = time.perf_counter()
@@ -235,18 +246,19 @@ def _march(
         motion.wall += time.perf_counter() - started
         if failed is None:
             motion.sample += 1
-            recorder.record(motion.sample, u, v)
+            recorder.record(motion.sample, stepper)
             on_progress(motion.sample / intervals)
             on_sample(motion.sample, u, v)
             if stepper.unseen == 0:
-                kept = (motion.sample, u.copy(), v.copy())
+                kept = (motion.sample, stepper.state())
                 if keeper is not None:
                     keeper.keep(last=motion.sample == intervals)
         elif pace.gives_up():
             return _lost(pace, recorder, motion.sample, taken, failed)
         else:
             motion.repeated += taken + int(pace.substeps[kept[0] : motion.sample].sum())
-            motion.sample, u[:], v[:] = kept
+            motion.sample = kept[0]
+            stepper.put_back(kept[1])
             stepper.unseen = 0
             on_sample(motion.sample, u, v)
     return None
@@ -298,25 +310,32 @@ def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder
         motion.wall,
         float(recorder.strain.max()),
         int(recorder.inverted.max()),
+        float(recorder.overlap.max()),
     )
 
 
 class _Recorder:
     """Writes what is observed into arrays, over what was written there before."""
 
-    def __init__(self, lattice: LatticeMesh, net: Network, observation: Observation) -> None:
+    def __init__(
+        self, lattice: LatticeMesh, net: Network, observation: Observation, tools: int
+    ) -> None:
         self.net, self.lattice = net, lattice
         self.far = FAR * float(np.ptp(lattice.nodes, axis=0).max())
         self.times, self.frames = observation.times, observation.frames
-        self.trajectory = empty_trajectory(observation)
+        self.trajectory = empty_trajectory(observation, tools)
+        self.overlap = np.zeros(len(observation.times))
         self.strain = np.zeros(len(observation.times))
         self.inverted = np.zeros(len(observation.times), dtype=np.int64)
         self.at_probes, _ = lattice.interpolation(observation.probes)
         self.in_volume, _ = lattice.interpolation(observation.volume_points)
         self.on_surface, _ = lattice.interpolation(observation.surface_points)
 
-    def record(self, sample: int, u: Floats, v: Floats) -> None:
+    def record(self, sample: int, stepper: LatticeStepper) -> None:
         """Keep the motion at one sample."""
+        u, v = stepper.u, stepper.v
+        self.trajectory.tool_force[sample] = stepper.tool_force
+        self.overlap[sample] = stepper.overlap
         self.strain[sample] = largest_strain(self.net, u)
         self.inverted[sample] = self.lattice.inverted_cells(u)
         self.trajectory.displacement[sample] = self.at_probes @ u
@@ -331,6 +350,8 @@ class _Recorder:
         after = np.arange(len(self.times)) > lost.sample
         late = after[np.asarray(self.frames, dtype=int)]
         self.strain[after], self.inverted[after] = 0.0, 0
+        self.overlap[after] = 0.0
+        self.trajectory.tool_force[after] = np.nan
         self.trajectory.displacement[after] = np.nan
         self.trajectory.velocity[after] = np.nan
         self.trajectory.volume_field[late] = np.nan

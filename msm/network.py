@@ -12,6 +12,7 @@ from msm.hanging import tied
 
 if TYPE_CHECKING:
     from msm.damping import NodalDamping
+    from msm.outer import Outer
     from msm.springs import Springs
     from msm.volume import VolumeTerm
 
@@ -28,8 +29,10 @@ class Network(NamedTuple):
     springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
     `load` [N] (n, 3). `linear`: forces of small displacements. Hanging nodes, see `msm.hanging`:
     the node `hanging[k]` moves as its masters `master[p]` by the shares `part[p]`, p from
-    `first_master[k]` to `first_master[k + 1]`; its mass is theirs, and a scale only. `fixed` (f, 2)
-    uint32: node and component of each displacement that does not change, on which no force acts.
+    `first_master[k]` to `first_master[k + 1]`; its mass is theirs, and a scale only. `swollen`
+    (c,): J - 1 at which a cell is unstressed. `outer`: what acts beside the load, None for nothing.
+    `fixed` (f, 2) uint32: node and component of each displacement that does not change, on which no
+    force acts.
     """
 
     ends: NDArray[np.uint32]
@@ -53,7 +56,14 @@ class Network(NamedTuple):
     first_master: NDArray[np.uint32]
     master: NDArray[np.uint32]
     part: Floats
+    swollen: Floats
+    outer: Outer | None
     fixed: NDArray[np.uint32] = np.zeros((0, 2), dtype=np.uint32)
+
+    @property
+    def is_strained(self) -> bool:
+        """Whether the given shape is not the unstressed one."""
+        return bool(self.swollen.any() or (np.linalg.norm(self.rest, axis=1) != self.length).any())
 
 
 def network(
@@ -67,14 +77,17 @@ def network(
     linear: bool = False,
     masters: csr_array | None = None,
     fixed: NDArray[np.bool_] | None = None,
+    undamped: Floats | None = None,
 ) -> Network:
     """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
 
     `masters` (n, n): how all nodes move with those that are free, None if all are; `fixed` (n, 3):
-    components of the nodes that do not move.
+    components of the nodes that do not move; `undamped` [kg] (n,): of the mass, what nodal damping
+    does not act on.
     """
     ties = tied(masters)
     mass = mass if masters is None else mass + (mass == 0.0) * (masters @ mass)
+    damped = mass if undamped is None else mass - undamped
     length = springs.rest_length
     held = np.zeros_like(load, dtype=np.bool_) if fixed is None else fixed
     return Network(
@@ -86,8 +99,8 @@ def network(
         bulk=np.ascontiguousarray(volume.bulk),
         spacing=float(volume.spacing),
         mass=np.ascontiguousarray(mass),
-        gamma_0=damping.gamma_0 * mass,
-        gamma_1=damping.gamma_1 * mass,
+        gamma_0=damping.gamma_0 * damped,
+        gamma_1=damping.gamma_1 * damped,
         beta=float(damping.beta),
         row=foundation.indptr.astype(np.uint32),
         column=foundation.indices.astype(np.uint32),
@@ -100,4 +113,6 @@ def network(
         first_master=ties.first,
         master=ties.master,
         part=ties.part,
+        swollen=np.zeros(len(volume.bulk)),
+        outer=None,
     )

@@ -28,6 +28,7 @@ from msm.forces import (
 from msm.kernel import kernel
 from msm.kinematics import gradient_of
 from msm.network import Network
+from msm.outer import add_outer_forces, stop_at_tools
 from msm.tangent import Tangent, corner_slope, empty_tangent, linearise_cells
 
 Floats = NDArray[np.float64]
@@ -45,6 +46,7 @@ def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, 
     at, pressure = empty_tangent(net), np.empty((6, net.cells.shape[0]))
     for n in range(factors.shape[0]):
         other_forces(law, net, u, force)
+        add_outer_forces(net.outer, factors[n], 0, force.T)
         for i in range(u.shape[0]):
             inertia[i] = net.mass[i] + dt * damping(net, u, i)
             for d in range(3):
@@ -56,6 +58,7 @@ def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, 
         spread_pressure(net, at, pressure[0], inertia, -dt, force)
         v += force
         u += dt * v
+        stop_at_tools(net.outer, factors[n], dt, u.T, v.T)
 
 
 @kernel()

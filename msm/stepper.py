@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from msm import outer as outers
 from msm.assembly import Assembly, Material, arrays
 from msm.grid import Grid, grid_of
 from msm.integrators import INTEGRATORS
@@ -14,10 +17,25 @@ from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
 from msm.linearised import farthest
 from msm.network import Network
+from msm.outer import Burden
+from msm.settled import sagged, unloaded
 from msm.stability import DEFAULT, Follower
 from msm.timestep import LOOK
+from msm.tools import DEEPEST, Standing, standing
 
 Floats = NDArray[np.float64]
+
+
+STOPPED = ("symplectic-euler", "split-volume")
+"""Integrators at the end of whose steps rigid tools stop what entered them."""
+
+
+class State(NamedTuple):
+    """Displacement [m] and velocity [m/s] (n, 3), and how the body stands to tools."""
+
+    u: Floats
+    v: Floats
+    standing: Standing
 
 
 class LatticeStepper:
@@ -39,14 +57,17 @@ class LatticeStepper:
         linear: bool = False,
         single: bool = False,
     ) -> None:
-        refuse_unfit(integrator, material)
+        refuse_unfit(integrator, material, assembly.burden)
         self.method = INTEGRATORS[integrator]
         self.law, self.factor = material.law, factor
-        self.net = arrays(assembly, material, linear=linear)
+        self.burden = assembly.burden
+        self.net, self.start = _at_start(assembly, material, integrator, linear=linear)
         self.grid = grid_for(assembly.lattice, self.net, integrator, single=single)
         self.follower = Follower(self.law, self.net, self.method)
-        self.u, self.v = np.zeros_like(self.net.load), np.zeros_like(self.net.load)
-        self.t, self.unseen = 0.0, 0
+        self.u, self.v = self.start.copy(), np.zeros_like(self.start)
+        self.contact = None if self.net.outer is None else self.net.outer.contact
+        self.standing = standing(self.contact)
+        self.restart()
         self.limit_at_rest = self.follower.limit(self.u)
         self.advance(0, 1.0)
 
@@ -54,6 +75,8 @@ class LatticeStepper:
         """Take so many steps of dt [s] and nothing else."""
         starts = np.asarray(self.t + dt * np.arange(count), dtype=np.float64)
         factors = np.stack([self.factor(starts + at * dt) for at in self.method.at], axis=1)
+        if self.burden is not None:
+            factors = np.hstack([factors, self.burden.drive(starts, dt, self.method.at)])
         if self.method.on_grid is not None and self.grid is not None:
             self.method.on_grid(self.law, self.grid, factors, dt, self.u, self.v)
         else:
@@ -77,10 +100,31 @@ class LatticeStepper:
         self.unseen = 0
         return self.follower.limit(self.u)
 
+    def state(self) -> State:
+        """A copy of where it is."""
+        return State(self.u.copy(), self.v.copy(), self.standing.kept())
+
+    def put_back(self, state: State) -> None:
+        """Set where it is to a copy."""
+        self.u[:], self.v[:] = state.u, state.v
+        self.standing.put_back(state.standing)
+
+    @property
+    def tool_force(self) -> Floats:
+        """What the body did to each rigid tool in the last step [N] (tools, 3)."""
+        return self.standing.force
+
+    @property
+    def overlap(self) -> float:
+        """Deepest overlap [m] of body and tools so far."""
+        return float(self.standing.sums[DEEPEST])
+
     def restart(self) -> None:
         """Put the lattice at rest again, at the time zero."""
-        self.u[:], self.v[:] = 0.0, 0.0
+        self.u[:], self.v[:] = self.start, 0.0
         self.t, self.unseen = 0.0, 0
+        if self.contact is not None and self.burden is not None:
+            outers.start(self.contact, self.burden.tools, self.u)
 
 
 def grid_for(lattice: LatticeMesh, net: Network, integrator: str, *, single: bool) -> Grid | None:
@@ -98,8 +142,29 @@ def grid_for(lattice: LatticeMesh, net: Network, integrator: str, *, single: boo
     return grid
 
 
-def refuse_unfit(integrator: str, material: Material) -> None:
-    """ValueError if an integrator does not suit the springs or their damping."""
+def _at_start(
+    assembly: Assembly, material: Material, integrator: str, *, linear: bool
+) -> tuple[Network, Floats]:
+    """What the kernels read, and the displacement [m] (n, 3) at rest under the dead load."""
+    net, burden = arrays(assembly, material, linear=linear), assembly.burden
+    if burden is None:
+        return net, np.zeros_like(net.load)
+    if burden.given_loaded:
+        (net, dead), start = unloaded(material.law, net, burden.dead), np.zeros_like(net.load)
+        burden = replace(burden, dead=dead)
+    else:
+        start = sagged(material.law, net, burden.dead)
+    nodes, stages = (net.mass, net.gamma_0, net.gamma_1), len(INTEGRATORS[integrator].at)
+    return net._replace(outer=outers.outer_of(burden, assembly.lattice, *nodes, stages)), start
+
+
+def refuse_unfit(integrator: str, material: Material, burden: Burden | None = None) -> None:
+    """ValueError if an integrator does not suit the springs, their damping or rigid tools."""
+    if burden is not None and burden.tools and integrator not in STOPPED:
+        raise ValueError(
+            f"the integrator {integrator} does not follow rigid tools that are moved; set "
+            f"lattice.integrator to {' or '.join(STOPPED)}"
+        )
     method = INTEGRATORS[integrator]
     if method.linear_only and not force_law_of(material.law).linear:
         raise ValueError(f"the integrator {integrator} takes linear springs only; choose another")

@@ -28,7 +28,8 @@ class Tangent(NamedTuple):
     """Springs and cells at a state.
 
     Springs: `direction` (s, 3), stiffness `along` and `across` [N/m] (s,). Cells: `deformation` F
-    and its `cofactor` (c, 3, 3), `swelling` J - 1 and `pressure` kappa V (J - 1) [J] (c,).
+    and its `cofactor` (c, 3, 3), `swelling` J - 1, less that at which the
+    cell is unstressed, and `pressure` kappa V times it [J] (c,).
     """
 
     direction: Floats
@@ -66,7 +67,7 @@ def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
 
 @inner_kernel()
 def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
-    """Set F, its cofactors, J - 1 and the pressure of each cell."""
+    """Set F, its cofactors, J - 1 less its unstressed value, and the pressure of each cell."""
     for c in range(net.cells.shape[0]):
         at.swelling[c] = deform(net, c, u, at.deformation[c], at.cofactor[c])
         at.pressure[c] = 0.0 if net.linear else net.bulk[c] * at.swelling[c]
@@ -89,7 +90,7 @@ def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
         g[d, 0], g[d, 1], g[d, 2] = cross(f[(d + 1) % 3], f[(d + 2) % 3])
     if not net.linear:
         swelling += f[0, 1] * g[0, 1] + f[0, 2] * g[0, 2]
-    return swelling
+    return swelling - net.swollen[c]
 
 
 @kernel()

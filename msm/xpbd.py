@@ -23,6 +23,7 @@ from msm.forces import damping
 from msm.kernel import kernel
 from msm.laws import stiffness
 from msm.network import Network
+from msm.outer import add_outer_forces
 from msm.tangent import corner_slope, deform
 
 Floats = NDArray[np.float64]
@@ -32,13 +33,15 @@ Floats = NDArray[np.float64]
 def xpbd(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Springs, cells and foundation in their order, once per step. Load at the end of the step."""
     inertia, before = np.empty(u.shape[0]), np.empty_like(u)
-    work = np.empty((3, 8, 3))
+    work, outer = np.empty((3, 8, 3)), np.empty_like(u)
     for n in range(factors.shape[0]):
-        before[:] = u
+        before[:], outer[:] = u, 0.0
+        add_outer_forces(net.outer, factors[n], 0, outer.T)
         for i in range(u.shape[0]):
             inertia[i] = net.mass[i] + dt * damping(net, u, i)
             for d in range(3):
                 momentum = net.mass[i] * v[i, d] + dt * factors[n, 0] * net.load[i, d]
+                momentum += dt * outer[i, d]
                 u[i, d] += dt * momentum / inertia[i]
         project_springs(law, net, inertia, dt, u)
         project_cells(net, inertia, dt, u, work)

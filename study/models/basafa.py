@@ -10,7 +10,7 @@ from msm.laws import Basafa
 from msm.model import Material
 from study.models.control_point import PointSpring, SpringDashpot
 from study.models.damping import reference_mass
-from study.models.lattice import LatticeModel, SpringMaterial
+from study.models.lattice import FOLLOWED, LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout
 from study.models.model import Estimates, ModelKind
 from study.problem.problem import PointProblem
@@ -76,5 +76,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     is_reference=True,
     blind_to=("reference", "superposition"),
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    able=FOLLOWED,
 )

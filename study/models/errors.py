@@ -37,6 +37,19 @@ def time_step_errors(
     }
 
 
+def tool_force_errors(
+    order: int, tools: tuple[str, ...], whole: Trajectory, half: Trajectory
+) -> dict[str, float]:
+    """Relative L2 error of each rigid tool's force by whole steps, as in `time_step_errors`."""
+    if half.status != "finished":
+        return {}
+    share = 1.0 / (1.0 - 0.5**order)
+    return {
+        name: share * _difference(whole.tool_force[:, i], half.tool_force[:, i])
+        for i, name in enumerate(tools)
+    }
+
+
 def rounding_errors(
     probes: tuple[str, ...], single: Trajectory, double: Trajectory
 ) -> dict[str, CurveErrors]:

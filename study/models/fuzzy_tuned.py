@@ -10,7 +10,7 @@ from fuzzy.liver.stiffness import StiffnessEstimate
 from study.models import own_rules
 from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import settings
-from study.models.lattice import LatticeModel
+from study.models.lattice import FOLLOWED, LatticeModel
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
@@ -68,5 +68,5 @@ KIND = ModelKind(
     of_patient=True,
     follows_law=True,
     blind_to=("patient", "fuzzy", "reference", "superposition", "basafa"),
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    able=FOLLOWED,
 )

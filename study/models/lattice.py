@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from msm import model as msm
 from msm import tetrahedra
+from msm.assembly import burdened
 from msm.graded import GradedLattice
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
@@ -26,10 +27,12 @@ from study.models.errors import (
     rounding_errors,
     step_checks,
     time_step_errors,
+    tool_force_errors,
 )
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.models.region_size import Sized, Wanted, sized
+from study.models.touching import touchable
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.problem.varied import of_tetrahedra
@@ -42,6 +45,10 @@ Floats = NDArray[np.float64]
 
 MASS_LIMIT = 0.05
 REGION_KEYS = ("spacing", "levels", "radius", "tolerance")
+FOLLOWED = frozenset(
+    {"moved-tools", "several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"}
+)
+"""Names of `study.problem.features.FEATURES` that every uniform lattice follows."""
 
 
 @dataclass(frozen=True)
@@ -121,9 +128,29 @@ class LatticeModel:
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
     """The lattice that all models of a scene share."""
-    if lattice.springs == "tetrahedra":
-        return _on_mesh(problem)
-    return _cubic(problem, lattice.spacing, lattice.flexion, lattice.body_diagonals)
+    on_mesh = lattice.springs == "tetrahedra"
+    mix = () if on_mesh else (lattice.spacing, lattice.flexion, lattice.body_diagonals)
+    if problem.is_burdened:
+        return _burdened(problem, *mix)
+    return _cubic(problem, *mix) if mix else _on_mesh(problem)
+
+
+@lru_cache(maxsize=1)
+def _burdened(problem: Problem, *mix: float) -> Assembly:
+    """The lattice with what acts on it beside its first load, on the mesh without a mix."""
+    bare = _cubic(problem, *mix) if mix else _on_mesh(problem)
+    surface, times = problem.geometry.surface, problem.observation.times
+    points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
+    return burdened(
+        bare,
+        problem.surface_rule,
+        problem.gravity,
+        problem.loads,
+        problem.weights,
+        problem.rigid_tools,
+        touched=points,
+        given_loaded=problem.given_loaded,
+    )
 
 
 @lru_cache(maxsize=1)
@@ -278,6 +305,11 @@ class PreparedLattice:
             rounding = self._rounding(found, watch)
         sound = half if half is not None and half.status == "finished" else None
         record = replace(self.record(found, rounding), time_step_errors=errors)
+        if sound is not None:
+            order = INTEGRATORS[self.model.lattice.integrator].order
+            names = tuple(tool.name for tool in self.problem.rigid_tools)
+            forces = tool_force_errors(order, names, found.trajectory, sound)
+            record = replace(record, tool_force_errors=forces)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
         if finished and self.single:
             checks += tuple(rounding_checks(self.model.name, rounding))
@@ -285,7 +317,12 @@ class PreparedLattice:
         return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
 
     def rest(self) -> Floats:
-        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised."""
+        """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
+
+        ValueError where more than one load acts, of which there is no linearised rest to tell.
+        """
+        if self.problem.is_burdened:
+            raise ValueError("the lattice at rest is told under one load on a weightless body only")
         nodal = msm.static_displacement(self.assembly, self.springs.material)
         points = self.problem.observation.volume_points
         return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
@@ -384,6 +421,7 @@ class PreparedLattice:
 
     def _mass(self) -> Check:
         expected = _mass_of(self.problem)
+        expected += sum(weight.mass for weight in self.problem.weights)
         return Check(
             name="lattice: mass",
             value=abs(float(self.assembly.mass.sum()) / expected - 1.0),
@@ -412,6 +450,7 @@ class PreparedLattice:
             stiffness_damping_s=damping.beta,
             largest_strain=found.largest_strain,
             time_step_errors={},
+            tool_overlap_m=found.overlap if self.problem.rigid_tools else None,
             lattice=LatticeRecord(
                 springs=len(self.assembly.springs.weight),
                 integrator=model.lattice.integrator,

@@ -9,7 +9,7 @@ import numpy as np
 
 from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import readings
-from study.models.lattice import LatticeModel
+from study.models.lattice import FOLLOWED, LatticeModel
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
@@ -56,5 +56,5 @@ KIND = ModelKind(
     of_patient=True,
     follows_law=True,
     blind_to=("fuzzy", "reference", "superposition", "basafa"),
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    able=FOLLOWED,
 )

@@ -12,7 +12,7 @@ from msm.laws import Hooke, Law, initial_stiffness
 from msm.model import Material
 from msm.volume import volume_term
 from study.models.damping import lattice_poisson_ratio, nodal_damping
-from study.models.lattice import LatticeModel, SpringMaterial
+from study.models.lattice import FOLLOWED, LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.scene import Scene
@@ -63,5 +63,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     blind_to=("reference", "superposition", "basafa"),
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    able=FOLLOWED,
 )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
 from study.problem.contact import Load, ToolPatch, Weight
-from study.problem.response import Response
+from study.problem.response import Response, ToolPath
 from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
@@ -50,10 +50,16 @@ class Problem:
     given_loaded: bool = False
 
     @property
+    def is_burdened(self) -> bool:
+        """Whether more acts on the organ than its first tool as a load."""
+        return bool(self.rigid_tools or self.loads or self.weights or self.gravity.any())
+
+    @property
     def response(self) -> Response:
         """How its motion is looked at."""
         times, volumes = self.observation.times, self.volume_rule.weights
-        return Response(times, self.probes, self.tool.direction, volumes)
+        tools = tuple(ToolPath(one.name, one.axis, one.travel(times)) for one in self.rigid_tools)
+        return Response(times, self.probes, self.tool.direction, volumes, tools)
 
     @property
     def factors(self) -> Callable[[Floats], Floats]:

@@ -22,16 +22,44 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class ToolPath:
+    """A rigid tool by name: its unit axis (3,), and how far [m] (samples, 3) its tip is moved."""
+
+    name: str
+    axis: Floats
+    travel: Floats
+
+
+@dataclass(frozen=True)
+class ToolCurve:
+    """Travel [m] along a tool's axis, force [N] on the body along it and across, (samples,)."""
+
+    time: Floats
+    travel: Floats
+    force: Floats
+    tangential: Floats
+
+
+@dataclass(frozen=True)
 class Response:
     """The response quantities: times [s], names of the probes, unit vector of the tool's push.
 
-    `volumes` [m^3] (q,) weigh the points of the volume field.
+    `volumes` [m^3] (q,) weigh the points of the volume field. `tools`: rigid tools, whose force is
+    one of the quantities.
     """
 
     times: Floats
     probes: tuple[str, ...]
     direction: Floats
     volumes: Floats
+    tools: tuple[ToolPath, ...] = ()
+
+    def tool_curve(self, trajectory: Trajectory, tool: int) -> ToolCurve:
+        """Force of a tool on the body over time."""
+        path, force = self.tools[tool], -trajectory.tool_force[:, tool]
+        along = force @ path.axis
+        across = np.linalg.norm(force - np.outer(along, path.axis), axis=1)
+        return ToolCurve(self.times, path.travel @ path.axis, along, across)
 
     def motion(self, trajectory: Trajectory, probe: int) -> Motion:
         """Displacement and velocity of a probe along the push."""

@@ -8,7 +8,7 @@ of its radius below the plane z = 0, of which the side touches nothing; a plate,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ TOOLS = ("blunt", *SHAPES)
 BONDED, SLIDING = "bonded", "sliding"
 CONTACTS = (BONDED, SLIDING)
 """What a rigid tool does to the surface: hold what it touches at the start, or press on it only."""
+
+FLUSH = 1e-3
+"""Distance from a bonded plate, as a share of the body, within which the surface is held."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,35 @@ class RigidTool:
     travel: Callable[[Floats], Floats]
     bonded: bool = False
     friction: float = 0.0
+
+    def holds(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
+        """Which points (n, 3) with outward normals (n, 3) a bonded tool holds from its start on."""
+        offset = points - self.tip
+        along = offset @ self.axis
+        facing = normals @ self.axis < 0.0
+        if self.shape == PLATE:
+            return np.asarray(facing & (np.abs(along) <= FLUSH * np.ptp(points, axis=0).max()))
+        across = np.linalg.norm(offset - along[:, None] * self.axis, axis=1)
+        return np.asarray(facing & (across <= self.radius) & (np.abs(along) < self.radius))
+
+    def touching(self, points: Floats, normals: Floats) -> RigidTool:
+        """The tool moved along its axis so far that it touches what faces it of a surface.
+
+        Points (n, 3) with outward normals (n, 3); the tool itself if none is opposite. What lies
+        deeper in it than its radius, such as another lobe behind it, does not count, but does so
+        for a plate.
+        """
+        offset = points - self.tip
+        along = offset @ self.axis
+        across = np.linalg.norm(offset - along[:, None] * self.axis, axis=1)
+        opposite = normals @ self.axis < 0.0
+        if self.shape != PLATE:
+            opposite &= (across <= self.radius) & (along > -2.0 * self.radius)
+        if not opposite.any():
+            return self
+        if self.shape == SPHERE:
+            along = along + self.radius - np.sqrt(np.maximum(self.radius**2 - across**2, 0.0))
+        return replace(self, tip=self.tip + along[opposite].min() * self.axis)
 
     def gap(self, points: Floats, time: float) -> tuple[Floats, Floats]:
         """Distance [m] (n,) of points (n, 3) from the tool at a time [s], and its gradient (n, 3).

@@ -72,6 +72,7 @@ def check(results: Results) -> None:
     _check_motions("curves.csv", results.curves, _curves(record, times), times)
     _check_motions("bands.csv", results.bands, _bands(record, times), times)
     _check_motions("certified.csv", results.certified, _bounded(record, times), times)
+    _check_tools(results, times)
     _check_keys("similarity.csv", [row[:-1] for row in results.scores], _scored(record))
     for line, row in enumerate(results.scores, FIRST_LINE):
         if not 0.0 <= row.score <= 1.0:
@@ -84,6 +85,27 @@ def check(results: Results) -> None:
     _check_sensitivity(results)
     _check_fields(results)
     _check_fuzzy(results)
+
+
+def _check_tools(results: Results, times: Floats) -> None:
+    """Forces go by model, tool and time, as far as the model has a motion."""
+    scene, record = results.scene, results.record
+    names = ["tool", *(f"tool.{n}" for n in range(2, len(scene.tools) + 1))]
+    moved = [name for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
+    keys = [(model.name, tool) for model in record.models for tool in moved]
+    _agree("tools", [(one.model, one.tool) for one in record.tools], keys)
+    wanted = [
+        (model.name, tool)
+        for model in record.models
+        for tool in moved
+        for _ in range(_finite_samples(model, times))
+    ]
+    _check_keys("tool_force.csv", [row[:2] for row in results.tool_forces], wanted)
+    for line, row in enumerate(results.tool_scores, FIRST_LINE):
+        if (row.model, row.tool) not in keys or not 0.0 <= row.score <= 1.0:
+            raise ValueError(
+                f"tool_similarity.csv, line {line}: is no score in [0, 1] of a tool in a model"
+            )
 
 
 # --- results.json --------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ similarity.csv  score of each pair         errors.csv      differences of the wh
 sensitivity.csv choices of the fuzzy side  iso_18571.csv   parts of those scores
 score_errors.csv, score_differences.csv    what scores depend on, and their differences
 certified.csv   bound of a superposition's error
+tool_force.csv, tool_similarity.csv        force of rigid tools, and how like they are
 fields.npz      surface fields to draw     fuzzy.npz       sets and surfaces to draw
 MODEL.vtkhdf    motion of all nodes, if asked for
 SHA256SUMS      checksums of all these, which `sha256sum -c` verifies too
@@ -28,7 +29,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from study import folders
-from study.problem.response import Motion
+from study.problem.response import Motion, ToolCurve
 from study.results import arrays as npz
 from study.results import manifest
 from study.results.arrays import Arrays
@@ -45,6 +46,8 @@ from study.results.tables import (
     ScoreError,
     SensitivityEntry,
     SimilarityScore,
+    ToolForceSample,
+    ToolForceScore,
     read_table,
     write_table,
 )
@@ -79,6 +82,8 @@ class Results:
     curves: tuple[CurveSample, ...] = ()
     bands: tuple[BandSample, ...] = ()
     certified: tuple[CertifiedSample, ...] = ()
+    tool_forces: tuple[ToolForceSample, ...] = ()
+    tool_scores: tuple[ToolForceScore, ...] = ()
     scores: tuple[SimilarityScore, ...] = ()
     ratings: tuple[Iso18571Rating, ...] = ()
     score_errors: tuple[ScoreError, ...] = ()
@@ -99,6 +104,17 @@ class Results:
             if record.name == name:
                 return record
         raise KeyError(f"{name}: not among {', '.join(one.name for one in self.record.models)}")
+
+    def tool_force(self, model: str, tool: str) -> ToolCurve:
+        """Force of a rigid tool on a model's body, up to where a run was lost.
+
+        KeyError for a model or tool that there is not.
+        """
+        self.model(model)
+        if tool not in {one.tool for one in self.record.tools}:
+            raise KeyError(f"{tool}: is no rigid tool of this scene")
+        rows = [row[2:] for row in self.tool_forces if row.model == model and row.tool == tool]
+        return ToolCurve(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
 
     def curve(self, model: str, probe: str) -> Motion:
         """Time [s], displacement [m] and velocity [m/s] along the push, (samples,) each.
@@ -122,6 +138,9 @@ def write(results: Results, folder: Path) -> None:
     write_table(folder / "curves.csv", CurveSample, results.curves)
     write_table(folder / "bands.csv", BandSample, results.bands)
     write_table(folder / "certified.csv", CertifiedSample, results.certified)
+    if results.record.tools:
+        write_table(folder / "tool_force.csv", ToolForceSample, results.tool_forces)
+        write_table(folder / "tool_similarity.csv", ToolForceScore, results.tool_scores)
     write_table(folder / "similarity.csv", SimilarityScore, results.scores)
     write_table(folder / "iso_18571.csv", Iso18571Rating, results.ratings)
     write_table(folder / "score_errors.csv", ScoreError, results.score_errors)
@@ -197,6 +216,8 @@ def _content(folder: Path, table: Mapping[str, object]) -> Results:
         read_table(folder / "curves.csv", CurveSample),
         read_table(folder / "bands.csv", BandSample),
         read_table(folder / "certified.csv", CertifiedSample),
+        read_table(folder / "tool_force.csv", ToolForceSample) if record.tools else (),
+        read_table(folder / "tool_similarity.csv", ToolForceScore) if record.tools else (),
         read_table(folder / "similarity.csv", SimilarityScore),
         read_table(folder / "iso_18571.csv", Iso18571Rating),
         read_table(folder / "score_errors.csv", ScoreError),

@@ -20,10 +20,11 @@ DATA = frozenset(
         *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
         *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
         *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
+        *("tool_force.csv", "tool_similarity.csv"),
     }
 )
-ALWAYS = DATA - {"fields.npz", "fuzzy.npz"}
-"""What every run writes; a single point has no fields, and a scene may have no fuzzy systems."""
+ALWAYS = DATA - {"fields.npz", "fuzzy.npz", "tool_force.csv", "tool_similarity.csv"}
+"""What every run writes; a point has no fields, a scene maybe no fuzzy systems or rigid tools."""
 LINE = re.compile(r"(?P<digest>[0-9a-f]{64}) [ *](?P<name>[^/\0]+)")
 REMEDY = "restore the folder as the run left it, or run the scene again"
 HDF5 = b"\x89HDF\r\n\x1a\n"

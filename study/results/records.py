@@ -180,7 +180,9 @@ class ModelRecord:
 
     `label`: its name in print; `system`: the fuzzy system whose estimate it was given;
     `small_strain_modulus_pa`: Young's modulus it has at small strain; `time_step_errors`: by
-    control point, empty where they are not estimated.
+    control point, empty where they are not estimated. `tool_force_errors`: relative L2 error of
+    the force of each rigid tool, by steps and mesh as far as they are estimated; `tool_overlap_m`:
+    deepest overlap of body and tools, None without tools.
     """
 
     name: str
@@ -204,6 +206,8 @@ class ModelRecord:
     lattice: LatticeRecord | None = None
     point: PointRecord | None = None
     correction: CorrectionRecord | None = None
+    tool_force_errors: dict[str, float] = field(default_factory=dict)
+    tool_overlap_m: float | None = None
 
     @property
     def parts(self) -> int | None:
@@ -380,11 +384,29 @@ class StageRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ToolForce:
+    """Largest force [N] of a rigid tool on a model's body along its axis, when, and how deep.
+
+    `relative_error` of the force over time, L2, None where it is not estimated. `work_j`: what the
+    tool did on the body up to the end.
+    """
+
+    model: str
+    tool: str
+    peak_n: float
+    peak_at_s: float
+    peak_travel_m: float
+    work_j: float
+    relative_error: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class StudyRecord:
     """The whole of results.json but for the checksums of the other files.
 
     `references`: names of the models that the others are compared with, in order; `workers`: how
-    many processes its stages ran in side by side, which their wall times bear.
+    many processes its stages ran in side by side, which their wall times bear. `tools`: the force
+    of each rigid tool in each model, where there are any.
     """
 
     title: str
@@ -403,6 +425,7 @@ class StudyRecord:
     lattice_limits: LatticeLimits | None = None
     control_point: ControlPoint | None = None
     budgets: tuple[ErrorBudget, ...] = ()
+    tools: tuple[ToolForce, ...] = ()
     stages: tuple[StageRecord, ...] = ()
     workers: int = 1
     schema_version: int = SCHEMA_VERSION

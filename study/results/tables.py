@@ -21,6 +21,31 @@ class CurveSample(NamedTuple):
     velocity_m_per_s: float
 
 
+class ToolForceSample(NamedTuple):
+    """One sample of what a rigid tool does to a model's body: tool_force.csv.
+
+    `travel_m` of the tool and `force_n` are along its axis, `tangential_n` is across.
+    """
+
+    model: str
+    tool: str
+    time_s: float
+    travel_m: float
+    force_n: float
+    tangential_n: float
+
+
+class ToolForceScore(NamedTuple):
+    """Score of the force of a tool in a model against that in a reference: tool_similarity.csv."""
+
+    model: str
+    reference: str
+    tool: str
+    curve: str
+    measure: str
+    score: float
+
+
 class BandSample(NamedTuple):
     """One sample of the motion at both bounds of a stiffness interval: bands.csv."""
 

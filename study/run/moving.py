@@ -29,6 +29,10 @@ from study.stages.fingerprint import key
 Work = Callable[[Progress], Any]
 
 ORGAN, AT_REST, BUDGET = "organ", "lattice at rest", "error budget against {}"
+AT_REST_OF_ONE_LOAD = (
+    "What the lattice cannot do at rest, and the parts of its error, are told for one load on a "
+    "weightless body only."
+)
 WITH_LIMITS = "fem"
 """The reference that a lattice's limits are told against."""
 
@@ -102,6 +106,8 @@ class Moving:
     @cached_property
     def lattice(self) -> str | None:
         """Name of the first lattice that is no reference, if there is one: all are mended alike."""
+        if self.scene.features:  # what is told of a lattice at rest is of one load
+            return None
         names = (n for n, one in self.models.items() if isinstance(one, LatticeModel))
         return next((name for name in names if name not in references(self.scene)), None)
 
@@ -137,6 +143,8 @@ class Moving:
             if BUDGET.format(name) in given
         }
         notes += [f"There is no error budget: {way.why}." for way in ways.values() if way.why]
+        if self.scene.features:
+            notes.append(AT_REST_OF_ONE_LOAD)
         budgets = error_budgets(
             {name: way.found for name, way in ways.items() if way.found is not None},
             {name: one.run for name, one in moved.items()},

@@ -31,6 +31,7 @@ from study.results.tables import (
     ScoreDifference,
     ScoreError,
     SimilarityScore,
+    ToolForceScore,
 )
 from study.run.assumptions import assumptions
 from study.run.posed import Posed
@@ -40,6 +41,7 @@ from study.run.score_errors import error_rows, rating_rows
 from study.run.stages import ALONE, Means, Stage, Stages
 from study.run.suiting import suited
 from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
+from study.run.tool_forces import force_rows, force_scores, largest_forces
 from study.run.warnings import warnings
 from study.scene import Scene
 from study.scene.file import validate, write_scene
@@ -174,6 +176,7 @@ class Likeness:
     errors: tuple[ScoreError, ...]
     differences: tuple[ScoreDifference, ...]
     of_field: tuple[FieldDifference, ...]
+    of_tools: tuple[ToolForceScore, ...] = ()
 
 
 def _likeness_stage(scene: Scene, found: Compared) -> Stage[Likeness]:
@@ -199,7 +202,9 @@ def _likeness(
         ratings = tuple(rating_rows(response, sound, scores))
         has_field = response.volumes.size > 0
         of_field = difference_rows(response, sound, compared_with) if has_field else ()
-        return Likeness(scores, unscored, ratings, errors, apart, tuple(of_field))
+        of_tools, silent = force_scores(response, sound, compared_with)
+        notes = (*unscored, *silent)
+        return Likeness(scores, notes, ratings, errors, apart, tuple(of_field), of_tools)
 
 
 def _results(
@@ -233,11 +238,13 @@ def _results(
         lattice_limits=found.lattice_limits,
         control_point=found.control_point,
         budgets=found.budgets,
+        tools=tuple(largest_forces(response, runs)),
     )
+    trajectories = {name: run.trajectory for name, run in runs.items()}
     return Results(
         scene,
         record,
-        tuple(curve_rows(response, {name: run.trajectory for name, run in runs.items()})),
+        tuple(curve_rows(response, trajectories)),
         tuple(
             row
             for name, run in runs.items()
@@ -250,6 +257,8 @@ def _results(
             if run.certified is not None
             for row in certified_rows(response, name, run.certified)
         ),
+        tuple(force_rows(response, trajectories)),
+        alike.of_tools,
         alike.scores,
         alike.ratings,
         alike.errors,

@@ -7,6 +7,12 @@ from collections.abc import Iterator, Sequence
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.results.records import Check, ElementsRecord, ModelRecord
 from study.scene import Scene
+from study.scene.schema import Tool
+
+OVERLAP = 0.01
+"""Of a tool's travel, above which an overlap is told."""
+FINE = 2.0
+"""Spacings to a tool's radius, below which contact is told to be coarse."""
 
 
 def warnings(
@@ -35,7 +41,41 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.inverted_cells:
         yield (
             f"{record.inverted_cells} cells of {record.name} turned inside out: springs "
-            "do not resist that, so it has no scores. Reduce tool.force."
+            f"do not resist that, so it has no scores. {_less(scene)}"
+        )
+    yield from _of_tools(scene, record)
+
+
+def _less(scene: Scene) -> str:
+    """What deforms a lattice less."""
+    return "Move the tools less far." if _moved(scene) else "Reduce tool.force."
+
+
+def _moved(scene: Scene) -> list[Tool]:
+    return [tool for tool in scene.tools if tool.is_moved]
+
+
+def _of_tools(scene: Scene, record: ModelRecord) -> Iterator[str]:
+    """Tools that the body overlaps, or that a lattice is too coarse for."""
+    for tool in _moved(scene):
+        travel, overlap = abs(tool.displacement or 0.0) or tool.radius, record.tool_overlap_m or 0.0
+        if overlap > OVERLAP * travel:
+            yield (
+                f"The body of {record.name} overlaps its tools by up to {1e3 * overlap:.2g} mm, "
+                f"{100 * overlap / travel:.1f} % of the travel. Shorten the steps "
+                "(lattice.step_fraction), or give the tool more time."
+            )
+        if record.lattice is not None and scene.lattice.springs == "lattice":
+            yield from _of_coarse(scene, tool)
+
+
+def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
+    cells = tool.radius / scene.lattice.spacing
+    if tool.shape != "plate" and cells < FINE:
+        yield (
+            f"A tool of radius {1e3 * tool.radius:.3g} mm spans {cells:.2g} spacings of the "
+            f"lattice; below {FINE:g} its force is that of the lattice's own facets. Reduce "
+            "lattice.spacing."
         )
 
 

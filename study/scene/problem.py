@@ -80,7 +80,7 @@ def problem_of(scene: Scene) -> Problem:
         volume_rule,
         observation,
         tuple(places),
-        tuple(_rigid(name, one, surface) for name, one in _moved(scene)),
+        tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene)),
         tuple(
             Load(_tool(one, f"tool.{n}", surface), one.history.factor)
             for n, one in enumerate(scene.further_tools, 2)
@@ -98,21 +98,27 @@ def _moved(scene: Scene) -> list[tuple[str, Tool]]:
     return [(name, one) for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
 
 
-def _rigid(name: str, tool: Tool, surface: SurfaceMesh) -> RigidTool:
-    """A tool that starts with its tip off the surface, and faces as it would push."""
+def _rigid(name: str, tool: Tool, surface: SurfaceMesh, rule: SurfaceRule) -> RigidTool:
+    """A tool that starts off the surface that it touches first, and faces as it would push.
+
+    Over a surface that is not square to it a tool whose tip is at its place would start inside.
+    """
     patch = _tool(tool, name, surface)
-    tip = patch.centre - tool.clearance * patch.direction
     bonded = tool.contact == BONDED
-    return RigidTool(
+    placed = RigidTool(
         name,
         SHAPES[tool.shape],
         tool.radius,
-        tip,
+        patch.centre,
         patch.direction,
         _travel(tool, patch.direction),
         bonded,
         tool.friction,
     )
+    if bonded:
+        return placed
+    first = placed.touching(rule.points, rule.normals)
+    return replace(first, tip=first.tip - tool.clearance * patch.direction)
 
 
 def _extent(tool: Tool, patch: ToolPatch, times: Floats) -> Floats:

@@ -1,0 +1,78 @@
+"""What rigid tools do to the bodies of the models: rows, scores and the largest force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from study.models.model import ModelRun
+from study.problem.response import Response, ToolCurve
+from study.problem.trajectory import Trajectory
+from study.results.records import ToolForce
+from study.results.tables import ToolForceSample, ToolForceScore, pairs
+from study.similarity.score import TIME_HISTORY
+
+FORCE = "force"
+"""Name of the curve that is scored."""
+
+
+def force_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[ToolForceSample]:
+    """Finite samples of each model and tool."""
+    for model, trajectory in runs.items():
+        for number, tool in enumerate(response.tools):
+            curve = response.tool_curve(trajectory, number)
+            columns = (curve.time, curve.travel, curve.force, curve.tangential)
+            for values in zip(*columns, strict=True):
+                if np.isfinite(values).all():
+                    yield ToolForceSample(model, tool.name, *map(float, values))
+
+
+def force_scores(
+    response: Response, runs: Mapping[str, Trajectory], references: Sequence[str]
+) -> tuple[tuple[ToolForceScore, ...], tuple[str, ...]]:
+    """Scores of the force over time of all that finished, and a note on what has none."""
+    rows, notes = list[ToolForceScore](), list[str]()
+    for model, reference in pairs(list(runs), references):
+        for number, tool in enumerate(response.tools):
+            one, other = (response.tool_curve(runs[n], number).force for n in (model, reference))
+            why = _unfit(one, other)
+            if why:
+                notes.append(
+                    f"No score of the force of {tool.name} in {model} against {reference}: {why}."
+                )
+                continue
+            for measure in TIME_HISTORY:
+                score = measure.score(one, other)
+                rows.append(ToolForceScore(model, reference, tool.name, FORCE, measure.name, score))
+    return tuple(rows), tuple(notes)
+
+
+def _unfit(one: np.ndarray, other: np.ndarray) -> str:
+    if not (np.isfinite(one).all() and np.isfinite(other).all()):
+        return "one of the two has no force up to the end"
+    return "" if other.any() else "the reference feels none"
+
+
+def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator[ToolForce]:
+    """The largest force of each tool in each model, of what it has of a motion."""
+    for model, run in runs.items():
+        for number, tool in enumerate(response.tools):
+            curve = response.tool_curve(run.trajectory, number)
+            peak = int(np.nanargmax(np.abs(curve.force)))
+            yield ToolForce(
+                model=model,
+                tool=tool.name,
+                peak_n=float(curve.force[peak]),
+                peak_at_s=float(curve.time[peak]),
+                peak_travel_m=float(curve.travel[peak]),
+                work_j=_work(curve),
+                relative_error=run.record.tool_force_errors.get(tool.name),
+            )
+
+
+def _work(curve: ToolCurve) -> float:
+    """By the trapezoidal rule over the samples, along the axis, up to the last finite one."""
+    force, travel = curve.force, curve.travel
+    kept = np.isfinite(force)
+    return float(np.trapezoid(force[kept], travel[kept]))
