@@ -161,9 +161,9 @@ class SubspaceMotion:
     """Motion from rest in a subspace, exact under a load that is linear over a `step` [s].
 
     `factor`: share of the body's load at times [s] (t,), or of each of its loads (t, loads).
-    `displacement` [m] (n,) of all unknowns after the steps taken. `state` (m, 4): displacement, velocity, load and its slope of each mode of the
-    subspace, whose coordinates there are the columns of `modes` (m, m) and whose squared angular
-    frequencies [1/s^2] are `squares` (m,).
+    `displacement` [m] (n,) of all unknowns after the steps taken. `state` (m, 4): displacement,
+    velocity, load and its slope of each mode of the subspace, whose coordinates there are the
+    columns of `modes` (m, m) and whose squared angular frequencies [1/s^2] are `squares` (m,).
     """
 
     def __init__(
