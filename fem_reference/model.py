@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.dynamics import March, Oscillator, State, hermite, hht, march
 from fem_reference.elasticity import Body, discretise, loaded_surface
 from fem_reference.elements import AUTO
@@ -82,7 +83,7 @@ class Solution:
     point is farthest out, and `largest_rotation` [rad] likewise; linear elasticity is good for a
     few per cent of either. `start` [m] (n,): where the motion starts under what acts at all times,
     None where nothing does. `moving`: displacement [m] and velocity [m/s] (n,) of all unknowns at a
-    sample, counted from the given shape, None of steps in time.
+    sample, counted from the given shape, None of steps in time. `contact`: with moved tools.
     """
 
     trajectory: Trajectory
@@ -97,19 +98,26 @@ class Solution:
     superposed: Superposed | None = None
     start: Floats | None = None
     moving: Callable[[int], State] | None = None
+    contact: ContactOutcome | None = None
 
     @property
     def truncation(self) -> CurveChange | None:
         """How far the last quarter of a subspace changes the curves, None of steps in time."""
+        if self.contact is not None:
+            return self.contact.truncation
         return None if self.superposed is None else self.superposed.truncation
 
     @property
     def vectors(self) -> int | None:
         """Of the subspace, None of steps in time."""
+        if self.contact is not None:
+            return self.contact.vectors
         return None if self.superposed is None else self.superposed.subspace.load.size
 
     def rest(self, body: Body) -> Floats:
         """Displacement [m] (n,) of the body at rest under all loads in full."""
+        if self.contact is not None:
+            return self.contact.at_rest
         if self.superposed is None:
             return solve_static(body)
         moved = self.superposed.subspace.rest()

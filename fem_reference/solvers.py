@@ -24,11 +24,11 @@ def solver(body: Body, tolerance: float = TOLERANCE) -> Solver:
     """
     if body.unknowns > FACTORED_BELOW:
         return _factored_at_need(body, iterative(body, tolerance))
-    solve = _by_factors(body)
+    solve = by_factors(body)
     return lambda load, *_, **__: solve(load)
 
 
-def _by_factors(body: Body) -> Solve:
+def by_factors(body: Body) -> Solve:
     """Solution of K u = f by factors; the pressures are left out."""
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
@@ -50,7 +50,7 @@ def _factored_at_need(body: Body, iterations: Solver) -> Solver:
             except ValueError:
                 if not factors_fit(body.unknowns, body.element):
                     raise
-                factors.append(_by_factors(body))
+                factors.append(by_factors(body))
         found = factors[0](load)
         _check_balance(body, found, load)
         return found

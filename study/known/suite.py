@@ -41,6 +41,12 @@ PROBLEMS = (
     _problem("thick sphere", "Lame 1833", "thick_sphere:findings"),
     _problem("bent bar", "Saint-Venant 1856; Love 1927", "bent_bar:findings", quick=False),
     _problem("half space", "Boussinesq 1885; Johnson 1985", "half_space:findings", quick=False),
+    _problem(
+        "indentation",
+        "Hertz 1882; Boussinesq 1885; Spence 1968",
+        "indentation:findings",
+        quick=False,
+    ),
     _problem("torsion of a ball", "Lamb 1881", "torsional_modes:whole"),
     _problem("torsion in an eighth", "Lamb 1881", "torsional_modes:octant"),
     _problem("damped motion, steps", "Clough and Penzien 1993", "damped_motion:stepped"),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fem_reference import model as fem
 from fem_reference.burden import burden_of, laden
+from fem_reference.contact.motion import run as in_contact
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body, of_tissue
 from fem_reference.grid import Projection
@@ -28,6 +29,7 @@ from study.models.errors import (
     time_step_errors,
 )
 from study.models.grading import is_graded, next_graded
+from study.models.in_contact import contact_record, force_step_errors, rest_in_contact
 from study.models.keeping import recorded
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large
@@ -65,6 +67,8 @@ COARSER = 2
 """Meshes below that of the scene, as many as there are: three show the order of convergence."""
 GRADED = 3
 """Graded meshes at least, for the same reason."""
+MOST_HALVED = 8
+"""Times as many steps as usual, at most, that forces of contact may take."""
 FINER = 12
 """Levels above it that an accuracy may take, if they are not too large."""
 FRAME_RATE = 60.0
@@ -109,6 +113,7 @@ class PreparedElements:
     problem: Problem
     best: MeshSolution | None = field(default=None, init=False)
     _times: int = field(default=1, init=False)  # own steps, taken so many times as often
+    _force_steps: Floats = field(default_factory=lambda: np.zeros(0), init=False)
 
     @property
     def critical_time_step(self) -> float:
@@ -157,13 +162,13 @@ class PreparedElements:
         if longest is not None:
             every = whole_steps(float(seen.times[1] - seen.times[0]), longest)
             method = replace(method, steps_per_sample=every, times=1)
-        found = fem.run(self.body(), self.model.damping, self.problem.factors, seen, method)
+        found = self._motion(self.body(), method)
         return Simulation(found.trajectory, found.time_step)
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field; after a run, its."""
         best, body = self.best, self._best_body()
-        u = solve_static(body) if best is None else best.found.rest(body)
+        u = self._at_rest(body) if best is None else best.found.rest(body)
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
 
     def rest_at(self, poisson_ratio: float) -> Floats:
@@ -173,7 +178,13 @@ class PreparedElements:
         body = of_tissue(own, tissue, self.model.reference.element)
         start = None if self.best is None else self.best.found.rest(own)
         points = self.problem.observation.volume_points
-        return at_points(evaluation(body, points), solve_static(body, start=start))
+        return at_points(evaluation(body, points), self._at_rest(body, start))
+
+    def _at_rest(self, body: Body, start: Floats | None = None) -> Floats:
+        """Displacement [m] (n,) at rest, sought from a `start` near it."""
+        if self.problem.rigid_tools:
+            return rest_in_contact(self.problem, body)
+        return solve_static(body, start=start)
 
     def _best_body(self) -> Body:
         """That of the last run, or of the model's level, with its matrices."""
@@ -219,10 +230,19 @@ class PreparedElements:
             whole = coarsest.found.trajectory
             errors = time_step_errors(ORDER, self.problem.probes, whole, half.trajectory)
             missed = not all(check.passed for check in step_checks(self.model.name, errors))
-            if not (missed and self._pace().samples > 1):
+            self._force_steps = force_step_errors(whole, half.trajectory)
+            missed = missed or bool((self._force_steps > DISPLACEMENT_LIMIT).any())
+            if not (missed and self._may_halve()):
                 return coarsest, errors
             self._times *= 2
             coarsest = replace(coarsest, found=half)
+
+    def _may_halve(self) -> bool:
+        """Whether steps are the model's own, and could be shorter."""
+        if self.problem.rigid_tools:
+            own = self.model.reference.steps_per_sample is None
+            return own and self._times < MOST_HALVED
+        return self._pace().samples > 1
 
     def _pace(self) -> Pace:
         problem = self.problem
@@ -236,7 +256,7 @@ class PreparedElements:
 
     @property
     def _graded(self) -> bool:
-        return is_graded(self.model.reference, self.problem.geometry)
+        return is_graded(self.model.reference, self.problem)
 
     def _solve_graded(
         self, coarsest: MeshSolution, progress: Progress
@@ -346,18 +366,28 @@ class PreparedElements:
         with progress.stage(f"{name}, assembly"):
             body = self.body(level)
         with progress.stage(name) as advance:
-            problem = self.problem
-            arguments = (self.model.damping, problem.factors, problem.observation)
             near = None if coarser is None else coarser.near(body)
-            method = self.model.method(self._times)
-            return MeshSolution(level, body, fem.run(body, *arguments, method, advance, near))
+            found = self._motion(body, self.model.method(self._times), advance, near)
+            return MeshSolution(level, body, found)
+
+    def _motion(
+        self,
+        body: Body,
+        method: fem.Method,
+        advance: fem.Advance = lambda _: None,
+        near: Floats | None = None,
+    ) -> fem.Solution:
+        """The motion of a body, in contact where tools are moved."""
+        problem, damping = self.problem, self.model.damping
+        given = (damping, problem.factors, problem.observation, method, advance)
+        if problem.rigid_tools:
+            return in_contact(body, problem.rigid_tools, *given)
+        return fem.run(body, *given, near)
 
     def _halved(self, solved: MeshSolution, progress: Progress) -> fem.Solution:
-        problem = self.problem
         body = self._body_of(solved)
         with progress.stage(f"{self.model.name}: halved steps") as advance:
-            arguments = (self.model.damping, problem.factors, problem.observation)
-            return fem.run(body, *arguments, self.model.method(2 * self._times), advance)
+            return self._motion(body, self.model.method(2 * self._times), advance)
 
     def _at_large_strain(
         self, solved: Sequence[MeshSolution], progress: Progress
@@ -366,6 +396,8 @@ class PreparedElements:
         law, found = self.model.reference.large_strain, solved[-1].found
         if law == "none" or not is_large(found.largest_strain, found.largest_rotation):
             return None, ""
+        if self.problem.rigid_tools:
+            return None, f"No {law} solution is compared: tools are moved."
         count = len(self.problem.geometry.mesh.tetrahedra)
         own = min(solved, key=lambda one: abs(one.found.elements - count))
         with progress.stage(f"{self.model.name}: {law}"):
@@ -435,6 +467,7 @@ class PreparedElements:
             mesh_error=error,
             accuracy_missed=accuracy if missed else None,
             large_strain=strained,
+            contact=contact_record(self.problem, solved, self._force_steps, graded=self._graded),
         )
 
 
@@ -483,6 +516,8 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-ABLE = frozenset({"several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"})
+ABLE = frozenset(
+    {"moved-tools", "several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"}
+)
 
 KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)

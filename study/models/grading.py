@@ -10,7 +10,8 @@ from fem_reference.elements import ELEMENTS
 from fem_reference.observation import at_points, evaluation
 from fem_reference.recovery import goal_errors
 from fem_reference.solvers import solver
-from study.organ.geometry import MAX_TETRAHEDRA, Geometry, Level
+from study.models.in_contact import contact_errors
+from study.organ.geometry import MAX_TETRAHEDRA, Level
 from study.organ.grading import graded
 from study.problem.problem import Problem
 from study.scene import Reference
@@ -28,10 +29,13 @@ STEERING = 1e-7
 numbers, and should choose the same elements again."""
 
 
-def is_graded(reference: Reference, geometry: Geometry) -> bool:
-    """Whether meshes are finer where the error is: `auto` grades those of a mesh file."""
+def is_graded(reference: Reference, problem: Problem) -> bool:
+    """Whether meshes are finer where the error is.
+
+    `auto` grades those of a mesh file, and under moved tools, which take small elements there.
+    """
     if reference.refinement == "auto":
-        return geometry.is_file
+        return problem.geometry.is_file or bool(problem.rigid_tools)
     return reference.refinement == "graded"
 
 
@@ -41,7 +45,7 @@ def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
     growth = min(GROWTH, 0.9 * MAX_TETRAHEDRA / count)
     if growth < LEAST_GROWTH:
         return None
-    errors = probe_errors(problem, body)
+    errors = (contact_errors if problem.rigid_tools else probe_errors)(problem, body)
     order = 2.0 * (ELEMENTS[body.element].formal_order - 1.0)
     return graded(problem.geometry, level, errors, order, growth)
 

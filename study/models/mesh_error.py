@@ -51,13 +51,16 @@ def mesh_error(
 ) -> DiscretisationError | None:
     """Errors of the finest mesh by those before it; none of one mesh, or of elements that lock.
 
+    Nor are there any of a motion that ended early.
+
     `graded`: the meshes are refined where the error is, not everywhere alike. Locked elements
     approach a wrong solution for long, and seem to have converged. A subspace's truncation is added
     in squares to the errors of curves.
     """
-    if len(solved) < 2 or locks(problem, solved[-1]):
-        return None
     runs = [one.found.trajectory for one in solved]
+    diverged = any(run.status != "finished" for run in runs)
+    if len(solved) < 2 or locks(problem, solved[-1]) or diverged:
+        return None
     weights = problem.volume_rule.weights
     field = _estimate(solved, [run.volume_field[0] for run in runs], graded, weights)
     by_probe, orders = {}, {}
@@ -73,7 +76,7 @@ def mesh_error(
     return DiscretisationError(
         field_peak=field.error,
         field_order=field.observed,
-        formal_order=_formal_order(solved[-1]),
+        formal_order=formal_order(solved[-1]),
         by_probe=by_probe,
         order_by_probe=orders,
     )
@@ -85,13 +88,14 @@ def _estimate(
     graded: bool,
     weights: Floats | None = None,
 ) -> ErrorEstimate:
-    sizes, order = [one.level.size for one in solved], _formal_order(solved[-1])
+    sizes, order = [one.level.size for one in solved], formal_order(solved[-1])
     if graded:
         return graded_error(results, sizes, order, weights)
     return discretisation_error(results, sizes, order, weights)
 
 
-def _formal_order(solved: MeshSolution) -> float:
+def formal_order(solved: MeshSolution) -> float:
+    """Of the elements' convergence."""
     return ELEMENTS[solved.found.element].formal_order
 
 
@@ -125,4 +129,6 @@ def why_unknown(problem: Problem, solved: MeshSolution) -> str:
             "linear elements lock at this Poisson ratio and seem to have converged when they have "
             "not; leave reference.element out"
         )
+    if solved.found.trajectory.status != "finished":
+        return "its motion was not found to the end"
     return "it has no other mesh of this organ to compare with"

@@ -103,6 +103,32 @@ class CertifiedReduction:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ToolForceRecord:
+    """The largest force on a moved tool, and relative L2 errors of the force over time.
+
+    By the mesh, the steps and the last quarter of the subspace; None where it is not estimated.
+    """
+
+    peak_n: float
+    by_mesh: float | None
+    by_steps: float | None
+    by_subspace: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactRecord:
+    """What only finite elements under moved tools have, `forces` by the name of the tool.
+
+    `vertices` that may bear pressure; `penetration_m`: how deep any point of the surface was inside
+    a tool, for the surface is kept out in the mean over each vertex.
+    """
+
+    vertices: int
+    penetration_m: float
+    forces: dict[str, ToolForceRecord]
+
+
+@dataclass(frozen=True, kw_only=True)
 class ElementsRecord:
     """What only finite elements have.
 
@@ -124,6 +150,7 @@ class ElementsRecord:
     mesh_error: DiscretisationError | None = None
     accuracy_missed: float | None = None
     large_strain: LargeStrain | None = None
+    contact: ContactRecord | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,10 +104,10 @@ def displacement(points: Floats, tissue: Tissue) -> Floats:
     x = np.outer(r, np.cos(angle)).ravel()
     y = np.outer(r, np.sin(angle)).ravel()
     off = points[:, None] - np.stack([x, y, np.zeros_like(x)], axis=1)
-    return np.asarray(np.einsum("nqd,q->nd", _point_force(off, tissue), np.repeat(ring, 32)))
+    return np.asarray(np.einsum("nqd,q->nd", point_force(off, tissue), np.repeat(ring, 32)))
 
 
-def _point_force(off: Floats, tissue: Tissue) -> Floats:
+def point_force(off: Floats, tissue: Tissue) -> Floats:
     """Displacement per newton [m/N] (..., 3) at places relative to the force, which pushes down."""
     nu, scale = tissue.poisson_ratio, 1.0 / (4.0 * np.pi * shear_modulus(tissue))
     R, z = np.linalg.norm(off, axis=-1), -off[..., 2]

@@ -1,0 +1,365 @@
+"""Motion of a body under rigid tools that are moved.
+
+Modes that are too fast for the samples to show follow their forces at once: with them, a body that
+is held against a tool would be stiff at every step, and its force would never settle. The rest is
+stepped by the stiffly accurate diagonally implicit Runge-Kutta method of two stages and second
+order: Alexander (1977), SIAM J. Numer. Anal. 14:1006. Each stage ends with forces that keep the
+body out of the tools, and damps what the step cannot follow.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.contact.outcome import ContactOutcome
+from fem_reference.contact.reduction import Answered, Factors, Reduced, answered, krylov, reduced
+from fem_reference.contact.touch import Answer, Grip, UnsettledError
+from fem_reference.direct import Solve
+from fem_reference.elasticity import Body
+from fem_reference.model import Advance, Method, Solution, start_of
+from fem_reference.recording import Recorder
+from fem_reference.subspace import Subspace
+from fem_reference.superposition import GOOD, CurveChange, ProbeCurves, curve_change, fewer
+from study.problem.damping import RayleighDamping
+from study.problem.rigid import RigidTool
+from study.problem.trajectory import Observation, Trajectory
+
+Floats = NDArray[np.float64]
+
+GAMMA = 1.0 - np.sqrt(0.5)
+ORDER = 2
+OWN_STEPS = 200
+"""Fewest steps of a motion: forces are not as smooth as displacements."""
+GENERATIONS, MOST_GENERATIONS = 5, 15
+WAY = 9
+"""Places on the way to the peak at which a rest is found."""
+LESS = 0.75
+TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """State at a time [s].
+
+    `q`, `v` (m,): in the subspace; `r`, `s` (c,): forces as the dents follow them, and their rates
+    [N/s]; `grip`: the forces under the tools.
+    """
+
+    time: float
+    q: Floats
+    v: Floats
+    r: Floats
+    s: Floats
+    grip: Grip
+
+
+class Stages:
+    """Implicit stages of a reduced body, all of the same length [s].
+
+    `base` [m] (n,): where the body is without motion and tools.
+    """
+
+    def __init__(
+        self,
+        given: Answered,
+        body: Reduced,
+        damping: RayleighDamping,
+        factors: Factors,
+        base: Floats,
+        length: float,
+    ) -> None:
+        self.given, self.body, self.factors, self.length = given, body, factors, length
+        unknowns = given.touch.unknowns
+        self.base, self.shapes = base[unknowns], body.shapes[unknowns]
+        self.residual = body.residual[unknowns]
+        self.damped = 1.0 / (
+            1.0
+            + length * (damping.mass + damping.stiffness * body.squares)
+            + length**2 * body.squares
+        )
+        self.delay = damping.stiffness / (damping.stiffness + length)
+        lever = (self.shapes * (length**2 * self.damped)) @ body.pushed.T
+        self.lever = lever + (1.0 - self.delay) * self.residual
+        compliance = np.asarray(given.touch.means @ self.lever)
+        self.compliance = 0.5 * (compliance + compliance.T)
+
+    def loaded(self, time: float) -> Floats:
+        """Forces of the loads on the modes at a time [s]."""
+        return np.asarray(self.body.loads @ np.atleast_1d(self.factors(np.array([time]))[0]))
+
+    def reached(self, time: float, q: Floats, v: Floats, r: Floats, grip: Grip) -> Moving:
+        """The state at a time [s], from what the stage starts from, and the forces before."""
+        body, length = self.body, self.length
+        free = (v + length * (self.loaded(time) - body.squares * q)) * self.damped
+        left = self.delay * r
+        base = self.base + self.shapes @ (q + length * free) + self.residual @ left
+        answer = Answer(base, self.lever, self.compliance)
+        found = self.given.touch.settled(answer, grip, time)
+        speed = free + length * self.damped * (body.pushed.T @ found.force)
+        dented = left + (1.0 - self.delay) * found.force
+        rate = (dented - r) / length
+        return Moving(time, q + length * speed, speed, dented, rate, found)
+
+
+def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
+    """States from a start at rest on, a step [s] apart."""
+    now = start
+    yield now
+    for n in range(1, 2**62):
+        begun = (n - 1) * step
+        first = stages.reached(begun + GAMMA * step, now.q, now.v, now.r, now.grip)
+        rest = (1.0 - GAMMA) * step
+        acceleration = (first.v - now.v) / stages.length
+        now = stages.reached(
+            n * step,
+            now.q + rest * first.v,
+            now.v + rest * acceleration,
+            now.r + rest * first.s,
+            first.grip,
+        )
+        yield now
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """States at samples, as many as were reached, and why there are no more."""
+
+    states: tuple[Moving, ...]
+    unsettled: float | None
+
+    def curves(self, body: Reduced, recorder: Recorder) -> ProbeCurves:
+        """The motion of the control points."""
+        matrix = recorder.at_probes
+        modes, dents = (_seen(matrix, one) for one in (body.shapes, body.residual))
+        pairs = [((one.q, one.r), (one.v, one.s)) for one in self.states]
+        curves = [
+            np.array([modes @ a + dents @ b for a, b in (pair[k] for pair in pairs)])
+            for k in range(2)
+        ]
+        return ProbeCurves(*curves)
+
+    def forces(self, given: Answered) -> Floats:
+        """On the tools [N] (samples, tools, 3)."""
+        return np.array([given.touch.on_tools(one.grip.force) for one in self.states])
+
+
+def _seen(matrix: object, vectors: Floats) -> Floats:
+    """Of vectors (n, m) at probes (p, 3, m)."""
+    count = vectors.shape[1]
+    nodal = vectors.reshape(-1, 3 * count)
+    return np.asarray(matrix @ nodal).reshape(-1, 3, count)  # type: ignore[operator]
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A body under tools and what moves it."""
+
+    given: Answered
+    damping: RayleighDamping
+    factors: Factors
+    base: Floats
+    times: Floats
+    per_sample: int
+
+    @property
+    def step(self) -> float:
+        """Length of a step [s]."""
+        return float(self.times[1] - self.times[0]) / self.per_sample
+
+    @property
+    def highest(self) -> float:
+        """Angular frequency [1/s] above which samples show no vibration."""
+        return float(np.pi / (self.times[1] - self.times[0]))
+
+    def start(self, body: Reduced) -> Moving:
+        """At rest under what acts at all times, with the tools where they start."""
+        grip = self.given.at_rest(self.base, self.given.free, np.zeros(1))
+        q = (body.pushed.T @ grip.force) / body.squares
+        return Moving(0.0, q, np.zeros_like(q), grip.force, np.zeros_like(grip.force), grip)
+
+    def stages(self, body: Reduced) -> Stages:
+        """Of this motion."""
+        length = GAMMA * self.step
+        return Stages(self.given, body, self.damping, self.factors, self.base, length)
+
+    def sampled(self, body: Reduced, advance: Advance) -> Sampled:
+        """The motion in a subspace."""
+        states: list[Moving] = []
+        count = len(self.times)
+        steps = march(self.stages(body), self.start(body), self.step)
+        try:
+            for n, state in enumerate(islice(steps, (count - 1) * self.per_sample + 1)):
+                if n % self.per_sample == 0:
+                    states.append(state)
+                    advance(len(states) / count)
+        except UnsettledError:
+            return Sampled(tuple(states), float(self.times[len(states)]))
+        return Sampled(tuple(states), None)
+
+
+def run(
+    body: Body,
+    tools: tuple[RigidTool, ...],
+    damping: RayleighDamping,
+    factors: Factors,
+    observation: Observation,
+    method: Method,
+    advance: Advance = lambda _: None,
+) -> Solution:
+    """Motion from rest under loads and tools, whose forces are a result.
+
+    ValueError for a tool that meets nothing.
+    """
+    started = clock.perf_counter()
+    start, times = start_of(body), observation.times
+    recorder = Recorder(body, observation, start, len(tools))
+    base = recorder.start
+    peak = float(times[observation.frames[0]])
+    given = answered(body, tools, times, base, peak)
+    pressed = Pressed(given, damping, factors, base, times, steps_per_sample(method, times))
+    chosen, found, change = _enough(pressed, recorder, advance)
+    outcome = _outcome(pressed, chosen, found, change, _at_rest(given, base, peak))
+    _record(recorder, pressed, chosen, found)
+    sizes = body.node_count, len(body.mesh.tetrahedra), body.element
+    steps = (len(times) - 1) * pressed.per_sample
+    return Solution(
+        _trajectory(recorder, found),
+        *sizes,
+        pressed.step,
+        steps,
+        clock.perf_counter() - started,
+        recorder.strain,
+        recorder.rotation,
+        start=start,
+        moving=lambda sample: _state(pressed, chosen, found.states[sample]),
+        contact=outcome,
+    )
+
+
+def steps_per_sample(method: Method, times: Floats) -> int:
+    """As asked for, or as many as follow the forces."""
+    if method.steps_per_sample is not None:
+        return method.steps_per_sample * method.times
+    return -(-OWN_STEPS // (len(times) - 1)) * method.times
+
+
+def _enough(
+    pressed: Pressed, recorder: Recorder, advance: Advance
+) -> tuple[Reduced, Sampled, tuple[CurveChange, Floats]]:
+    """The motion in a subspace whose last quarter changes little, and by how much it does."""
+    generations = GENERATIONS
+    while True:
+        space = krylov(pressed.given, generations)
+        whole = reduced(pressed.given, space, pressed.highest)
+        found = pressed.sampled(whole, advance)
+        change = _change(pressed, space, whole, found, recorder)
+        good = change[0].displacement < GOOD and change[1].max(initial=0.0) < GOOD
+        if good or generations >= MOST_GENERATIONS or found.unsettled is not None:
+            return whole, found, change
+        generations += GENERATIONS
+
+
+def _change(
+    pressed: Pressed, space: Subspace, whole: Reduced, found: Sampled, recorder: Recorder
+) -> tuple[CurveChange, Floats]:
+    """Of curves and of the tools' forces by the last quarter of vectors and of frequencies."""
+    less = reduced(pressed.given, space.leading(fewer(space.load.size)), LESS * pressed.highest)
+    other = pressed.sampled(less, lambda _: None)
+    count = min(len(found.states), len(other.states))
+    curves = [
+        ProbeCurves(*(curve[:count] for curve in one.curves(body, recorder)))
+        for one, body in ((found, whole), (other, less))
+    ]
+    a, b = (one.forces(pressed.given)[:count] for one in (found, other))
+    sizes = np.maximum(np.linalg.norm(a, axis=(0, 2)), TINY)
+    return curve_change(curves[0], curves[1]), np.linalg.norm(a - b, axis=(0, 2)) / sizes
+
+
+def _state(pressed: Pressed, body: Reduced, state: Moving) -> tuple[Floats, Floats]:
+    """Displacement from the given shape [m] and velocity [m/s] (n,) of all unknowns."""
+    moved = pressed.base + body.shapes @ state.q + body.residual @ state.r
+    return moved, body.shapes @ state.v + body.residual @ state.s
+
+
+def _record(recorder: Recorder, pressed: Pressed, body: Reduced, found: Sampled) -> None:
+    """Keep what is observed; strain also where a control point is farthest out."""
+    curves = found.curves(body, recorder)
+    for sample, (u, v) in enumerate(zip(*curves, strict=True)):
+        recorder.motion(sample, u, v)
+    forces = found.forces(pressed.given)
+    recorder.trajectory.tool_force[: len(forces)] = forces
+    farthest = int(np.linalg.norm(curves.displacement, axis=2).max(axis=1).argmax())
+    for sample in {*recorder.observation.frames, farthest}:
+        if sample < len(found.states):
+            u = _state(pressed, body, found.states[sample])[0] - pressed.base
+            recorder.field(sample, u)
+            recorder.look(u)
+
+
+def _trajectory(recorder: Recorder, found: Sampled) -> Trajectory:
+    if found.unsettled is None:
+        return recorder.trajectory
+    return replace(recorder.trajectory, status="diverged", diverged_at=found.unsettled)
+
+
+def _outcome(
+    pressed: Pressed,
+    body: Reduced,
+    found: Sampled,
+    change: tuple[CurveChange, Floats],
+    rest: AtPeak,
+) -> ContactOutcome:
+    touch, unknowns = pressed.given.touch, pressed.given.touch.unknowns
+    deepest = max(
+        touch.penetration(_state(pressed, body, one)[0][unknowns], one.time) for one in found.states
+    )
+    vertices = sum(one.count for one in touch.patches)
+    return ContactOutcome(
+        vertices, body.size, *change, deepest, rest.displacement, rest.pushes, found.unsettled
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class AtPeak:
+    """Rest with the tools where they are at the peak, and all loads in full.
+
+    `displacement` [m] (n,); `pushes` [N] (tools, n): nodal forces; `forces` [N] (tools, 3): on the
+    tools; `solve`: of the body.
+    """
+
+    displacement: Floats
+    pushes: Floats
+    forces: Floats
+    solve: Solve
+
+
+def at_peak(body: Body, tools: tuple[RigidTool, ...], observation: Observation) -> AtPeak:
+    """The rest of a body. ValueError for a tool that meets nothing."""
+    base = Recorder(body, observation, start_of(body)).start
+    peak = float(observation.times[observation.frames[0]])
+    return _at_rest(answered(body, tools, observation.times, base, peak), base, peak)
+
+
+def _at_rest(given: Answered, base: Floats, peak: float) -> AtPeak:
+    loaded, touch = base + _under_loads(given), given.touch
+    way = np.linspace(0.0, peak, WAY) if peak > 0.0 else np.zeros(1)
+    grip = given.at_rest(loaded, given.free, way)
+    pushes = []
+    for part in touch.slices:
+        own = np.zeros_like(grip.force)
+        own[part] = grip.force[part]
+        pushes.append(touch.pushes @ own)
+    found = given.moved(loaded, grip)
+    return AtPeak(found, np.array(pushes), touch.on_tools(grip.force), given.solve)
+
+
+def _under_loads(given: Answered) -> Floats:
+    """Displacement [m] (n,) at rest under all loads in full, without tools and what is dead."""
+    whole = given.body.loads.sum(axis=1)
+    return given.solve(whole) if whole.any() else np.zeros_like(whole)

@@ -1,0 +1,168 @@
+"""The part of a body's surface that a rigid tool may touch, and the pressure there.
+
+The pressure is linear on the facets of quadratic elements, and the body may not enter the tool in
+the mean over the shape function of each vertex. Such a pair of spaces is stable, and as accurate as
+the elements are: Hueeber and Wohlmuth (2005), Comput. Methods Appl. Mech. Eng. 194:3147.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import skfem
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+
+from fem_reference.elasticity import Body, rows
+from study.problem.rigid import PLATE, SPHERE, RigidTool
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+PARTS = 4
+"""Of each edge of a facet, for the edge of a punch may run anywhere across it."""
+LEAST_SHARE = 0.02
+"""Of a vertex's shape function, that lies under the tool; one with less bears no pressure."""
+# Strang and Fix, three points inside a triangle, exact for squares of linear functions.
+_INSIDE = np.array([[1.0, 1.0, 4.0], [1.0, 4.0, 1.0], [4.0, 1.0, 1.0]]) / 6.0
+
+
+class Gaps(NamedTuple):
+    """Mean distance [m] (v,) from the tool at vertices, and the directions (v, 3) away from it.
+
+    Infinite where a vertex has nothing of the tool opposite.
+    """
+
+    distance: Floats
+    normal: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Integration points [m] (q, 3) under a tool, and the vertices that bear its pressure.
+
+    `shapes` (q, nodes): shape functions of the body; `shares` (v, q): of the points in the mean at
+    a vertex, each row of which adds up to one.
+    """
+
+    tool: RigidTool
+    points: Floats
+    shapes: csr_array
+    shares: csr_array
+
+    @property
+    def count(self) -> int:
+        """Number of vertices."""
+        return int(self.shares.shape[0])
+
+    @property
+    def spread(self) -> csr_array:
+        """Nodal forces (nodes, v) of a unit force at each vertex, or means of displacements."""
+        return csr_array((self.shares @ self.shapes).T)
+
+    def gaps(self, displacement: Floats, time: float) -> Gaps:
+        """Where the nodes have moved by a displacement [m] (nodes, 3), at a time [s]."""
+        distance, normal = self.tool.gap(self.points + self.shapes @ displacement, time)
+        opposite = np.isfinite(distance)
+        seen = self.shares @ opposite.astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = (self.shares @ np.where(opposite, distance, 0.0)) / seen
+        direction = self.shares @ normal
+        direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+        return Gaps(np.where(seen > LEAST_SHARE, mean, np.inf), direction)
+
+    def penetration(self, displacement: Floats, time: float) -> float:
+        """How deep [m] the deepest integration point is inside the tool."""
+        distance, _ = self.tool.gap(self.points + self.shapes @ displacement, time)
+        return float(max(0.0, -distance.min()))
+
+
+def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
+    """What a tool may touch of a body at times [s], with a `margin` [m] round it.
+
+    ValueError if there is nothing.
+    """
+    surface = _surface(body, np.asarray(body.nodes.mesh.boundary_facets()))
+    facing = _under(surface, tool, times, margin)
+    facets = surface.find[facing.any(axis=1)]
+    if not len(facets):
+        raise ValueError(
+            f"{tool.name}: never comes near the surface on a mesh of {body.nodes.mesh.nelements} "
+            f"tetrahedra; move {tool.name}.place, enlarge {tool.name}.displacement or radius, or "
+            "reduce reference.element_size"
+        )
+    fine = _surface(body, facets)
+    linear = skfem.FacetBasis(
+        fine.mesh, skfem.ElementTetP1(), fine.mapping, facets=facets, quadrature=_rule()
+    )
+    inside = _under(fine, tool, times, margin).ravel()
+    hats, weights = _values(linear), fine.dx.ravel()
+    under = csr_array(hats.T @ diags_array(np.where(inside, weights, 0.0)))
+    whole, part = hats.T @ weights, under.sum(axis=1)
+    kept = np.flatnonzero(part > LEAST_SHARE * np.maximum(whole, 1e-300))
+    shares = csr_array(diags_array(1.0 / part[kept]) @ under[kept])
+    points = rows(fine.global_coordinates()).reshape(-1, 3)
+    return Patch(tool, points[inside], _values(fine)[inside], shares[:, np.flatnonzero(inside)])
+
+
+def _surface(body: Body, facets: NDArray[np.int64]) -> Any:
+    nodes = body.nodes
+    return skfem.FacetBasis(
+        nodes.mesh, nodes.elem, nodes.mapping, facets=facets, quadrature=_rule()
+    )
+
+
+def _rule() -> tuple[Floats, Floats]:
+    """Points (2, q) and weights (q,) over a reference triangle that is cut into parts."""
+    corners, n = [], PARTS
+    for i in range(n):
+        for j in range(n - i):
+            corners.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < n - 1:
+                corners.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    points = _INSIDE @ (np.array(corners, dtype=np.float64) / n)
+    flat = points.reshape(-1, 2).T
+    return np.ascontiguousarray(flat), np.full(flat.shape[1], 0.5 / flat.shape[1])
+
+
+def _values(basis: Any) -> csr_array:
+    """Shape functions of a basis at its integration points (q, dofs)."""
+    values = np.stack([np.asarray(one[0]) for one in basis.basis])
+    columns = np.broadcast_to(basis.element_dofs[:, :, None], values.shape)
+    points = np.broadcast_to(np.arange(values[0].size).reshape(values[0].shape), values.shape)
+    entries = (values.ravel(), (points.ravel(), columns.ravel()))
+    found = csr_array(coo_array(entries, shape=(values[0].size, basis.N)))
+    found.eliminate_zeros()
+    return found
+
+
+def _under(surface: Any, tool: RigidTool, times: Floats, margin: float) -> Bools:
+    """Which integration points (facets, q) a tool may touch, or holds from the start."""
+    points, normals = rows(surface.global_coordinates()), rows(surface.normals)
+    facing = (normals @ tool.axis) < 0.0
+    flat = points.reshape(-1, 3)
+    if tool.bonded:
+        return np.asarray(facing & _held(flat, tool).reshape(facing.shape))
+    near = np.full(len(flat), np.inf)
+    for time in times:
+        near = np.minimum(near, tool.gap(flat, float(time))[0])
+    return np.asarray(facing & (near.reshape(facing.shape) < margin))
+
+
+def _held(points: Floats, tool: RigidTool) -> Bools:
+    """Which points (n, 3) a bonded tool holds: within its radius of the axis, near its tip."""
+    offset = points - tool.tip
+    along = offset @ tool.axis
+    if tool.shape == PLATE:
+        return np.asarray(along < tool.radius)
+    across = np.linalg.norm(offset - along[:, None] * tool.axis, axis=1)
+    return np.asarray((across <= tool.radius) & (np.abs(along) < tool.radius))
+
+
+def directions(tool: RigidTool) -> Floats:
+    """Directions (d, 3) in which a tool may push: its axis alone where that cannot change."""
+    if tool.shape == SPHERE or tool.bonded or tool.friction > 0.0:
+        return np.eye(3)
+    return tool.axis[None]

@@ -1,0 +1,250 @@
+"""A body at the places that tools may touch: what forces there do, and which there are.
+
+The body is linear, so that all it does is known from its answers to a unit force at each vertex
+under a tool. The tool is not: where a sphere touches, and in which direction it pushes, follow from
+the displacement, and are found by repeating the solution of a problem that is linear in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, hstack, kron
+
+from fem_reference.contact.law import Areas, dragged, forces
+from fem_reference.contact.patch import Gaps, Patch, directions
+from study.problem.rigid import RigidTool
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+ITERATIONS = 60
+HALVED_AFTER = 12
+"""Iterations that do not settle by then are taken half-way, and again."""
+SETTLED = 1e-6
+"""Change of the forces relative to the largest."""
+NEARLY = 1e-3
+"""The same, of forces that are taken although they go on changing."""
+
+
+class UnsettledError(ValueError):
+    """Forces between a body and a tool that are not found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the body does under forces: where its surface nodes are without any, and with a unit.
+
+    `base` [m] (3 s,): displacement of the surface nodes; `lever` [m/N] (3 s, c): that by a unit of
+    each force; `compliance` [m/N] (c, c): in the means at the vertices.
+    """
+
+    base: Floats
+    lever: Floats
+    compliance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """Forces [N] (c,), and the means [m] (c,) of the displacement at a time [s] under them."""
+
+    force: Floats
+    mean: Floats
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Patches of a body under tools; the forces are numbered patch by patch, vertex by vertex.
+
+    `nodes` (s,): those of the surface that the patches see.
+    """
+
+    patches: tuple[Patch, ...]
+    nodes: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, patches: Sequence[Patch]) -> Touch:
+        """Of patches, with all nodes that they see."""
+        seen = [np.flatnonzero(np.diff(one.shapes.tocsc().indptr)) for one in patches]
+        return cls(tuple(patches), np.unique(np.concatenate(seen)))
+
+    @cached_property
+    def rubs(self) -> bool:
+        """Whether any tool drags what it touches."""
+        return any(one.tool.friction > 0.0 for one in self.patches)
+
+    def directions(self, tool: RigidTool) -> Floats:
+        """Directions (d, 3) of a tool's forces."""
+        return np.eye(3) if self.rubs else directions(tool)
+
+    @cached_property
+    def slices(self) -> list[slice]:
+        """Of the forces of each patch."""
+        sizes = [one.count * len(self.directions(one.tool)) for one in self.patches]
+        ends = np.cumsum([0, *sizes])
+        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+
+    @cached_property
+    def pushes(self) -> csr_array:
+        """Nodal forces (3 nodes, c) of a unit of each force; transposed, means of displacements."""
+        parts = [kron(one.spread, csr_array(self.directions(one.tool).T)) for one in self.patches]
+        return csr_array(hstack(parts, format="csr"))
+
+    @cached_property
+    def means(self) -> csr_array:
+        """From displacements of the surface nodes (3 s,) to the means (c,)."""
+        return csr_array(self.pushes.T)[:, self.unknowns]
+
+    @cached_property
+    def unknowns(self) -> NDArray[np.int64]:
+        """Of the body, of the surface nodes (3 s,)."""
+        return np.asarray((3 * self.nodes[:, None] + np.arange(3)).ravel())
+
+    @cached_property
+    def _seeing(self) -> tuple[Patch, ...]:
+        """The patches with shape functions of the surface nodes alone."""
+        return tuple(
+            Patch(one.tool, one.points, csr_array(one.shapes[:, self.nodes]), one.shares)
+            for one in self.patches
+        )
+
+    def on_tools(self, force: Floats) -> Floats:
+        """What the body does to each tool [N] (tools, 3) under forces (c,)."""
+        found = [
+            -(force[part].reshape(one.count, -1).sum(axis=0) @ self.directions(one.tool))
+            for one, part in zip(self.patches, self.slices, strict=True)
+        ]
+        return np.array(found)
+
+    def penetration(self, surface: Floats, time: float) -> float:
+        """How deep [m] any point that a sliding tool may touch is inside it."""
+        moved = surface.reshape(-1, 3)
+        return max(
+            (one.penetration(moved, time) for one in self._seeing if not one.tool.bonded),
+            default=0.0,
+        )
+
+    def settled(self, answer: Answer, start: Grip, time: float) -> Grip:
+        """Forces that keep the body out of the tools at a time [s], from those before it.
+
+        `UnsettledError` if the iterations do not end.
+        """
+        force, change, share = start.force, np.inf, 1.0
+        for k in range(ITERATIONS):
+            wanted = self._sought(answer, force, start, time)
+            largest = float(np.abs(wanted).max(initial=0.0))
+            step = wanted - force
+            change = float(np.abs(step).max(initial=0.0)) / max(largest, 1e-300)
+            share = 1.0 if k < HALVED_AFTER else 0.5
+            force = force + share * step
+            if largest == 0.0 or change <= SETTLED:
+                break
+        if largest > 0.0 and change > NEARLY:
+            raise UnsettledError(f"the contact forces do not settle at {time:.4g} s")
+        return Grip(force, self.means @ (answer.base + answer.lever @ force), time)
+
+    def _sought(self, answer: Answer, force: Floats, start: Grip, time: float) -> Floats:
+        """Forces of the problem that is linear about the displacement under given ones."""
+        surface = answer.base + answer.lever @ force
+        gaps = [one.gaps(surface.reshape(-1, 3), time) for one in self._seeing]
+        moved = answer.compliance @ force
+        mean = self.means @ surface - moved
+        if self.rubs:
+            return self._dragged(answer, force, gaps, mean, start, time)
+        frame = np.concatenate(list(map(self._frame, self.patches, gaps)))
+        rows = np.add.reduceat(answer.compliance * frame, self._firsts, axis=1)
+        among = np.add.reduceat(rows * frame[:, None], self._firsts, axis=0)
+        pushed = np.add.reduceat(frame * moved, self._firsts)
+        offset = self._offsets(gaps, mean, time) - np.where(self._held, 0.0, pushed)
+        guess = np.add.reduceat(frame * force, self._firsts)
+        found = forces(Areas(among, offset, self._held), guess)
+        return np.asarray(frame * np.repeat(found, np.diff([*self._firsts, len(force)])))
+
+    @cached_property
+    def _held(self) -> Bools:
+        """Which unknown forces are those of bonded tools."""
+        counts = [one.count * (3 if one.tool.bonded else 1) for one in self.patches]
+        return np.repeat([one.tool.bonded for one in self.patches], counts)
+
+    @cached_property
+    def _firsts(self) -> NDArray[np.int64]:
+        """First of the forces that make up each unknown one: along its normal, or one by one."""
+        parts = [
+            np.arange(part.start, part.stop, self._together(one))
+            for one, part in zip(self.patches, self.slices, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def _together(self, one: Patch) -> int:
+        """How many forces make up an unknown one."""
+        return 1 if one.tool.bonded else len(self.directions(one.tool))
+
+    def _frame(self, one: Patch, gaps: Gaps) -> Floats:
+        """What each force of a patch is of its unknown one."""
+        if self._together(one) == 1:
+            return np.ones(one.count * len(self.directions(one.tool)))
+        return gaps.normal.ravel()
+
+    def _offsets(self, gaps: list[Gaps], mean: Floats, time: float) -> Floats:
+        """Gaps, or of bonded tools relative displacements without forces."""
+        found = []
+        for one, part, gap in zip(self.patches, self.slices, gaps, strict=True):
+            if one.tool.bonded:
+                travel = np.tile(one.tool.travel(np.array([time]))[0], one.count)
+                found.append(mean[part] - travel)
+            else:
+                found.append(gap.distance)
+        return np.concatenate(found)
+
+    def _dragged(
+        self,
+        answer: Answer,
+        force: Floats,
+        gaps: list[Gaps],
+        mean: Floats,
+        start: Grip,
+        time: float,
+    ) -> Floats:
+        """With friction: the frame of each vertex has its normal first."""
+        normals, offsets, friction = [], [], []
+        moved = answer.compliance @ force
+        for one, part, gap in zip(self.patches, self.slices, gaps, strict=True):
+            now, before = one.tool.travel(np.array([time, start.time]))
+            axes = _axes(gap.normal)
+            slip = (mean[part] - start.mean[part]).reshape(-1, 3) - (now - before)
+            if one.tool.bonded:
+                slip = mean[part].reshape(-1, 3) - now
+            own = np.einsum("vik,vi->vk", axes, slip)
+            if not one.tool.bonded:
+                pushed = np.einsum("vi,vi->v", gap.normal, moved[part].reshape(-1, 3))
+                own[:, 0] = gap.distance - pushed
+            normals.append(axes)
+            offsets.append(own)
+            coefficient = np.inf if one.tool.bonded else one.tool.friction
+            friction.append(np.full(one.count, coefficient))
+        axes = np.concatenate(normals)
+        count = len(axes)
+        blocks = answer.compliance.reshape(count, 3, count, 3)
+        turned = np.einsum("vik,viwj,wjl->vkwl", axes, blocks, axes, optimize=True)
+        guess = np.einsum("vik,vi->vk", axes, force.reshape(-1, 3))
+        found = dragged(
+            turned.reshape(3 * count, 3 * count),
+            np.concatenate(offsets),
+            np.concatenate(friction),
+            guess,
+        )
+        return np.asarray(np.einsum("vik,vk->vi", axes, found).ravel())
+
+
+def _axes(normals: Floats) -> Floats:
+    """Normal and two tangents (v, 3, 3) as columns."""
+    smallest = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, smallest)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normals, first, np.cross(normals, first)], axis=2)
