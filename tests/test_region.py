@@ -171,3 +171,10 @@ def test_the_table_is_written_only_where_it_is_used(scene, tmp_path):
     assert "[region]" in path.read_text()
     assert read_scene(str(path)).region == scene.region
     assert "[region]" not in write_scene(replace(scene, models=("tissue",)))
+
+
+def test_a_budget_is_of_lattices_with_the_same_cells():
+    """What cells of several sizes change would count as an error of the stiffness."""
+    words = ('models=["fem", "tissue", "region"]', "region.radius=8 mm")
+    found = run_study(read_scene("block", (*BLOCK, *words)))
+    assert [one.model for one in found.record.budgets] == ["tissue"]
