@@ -14,6 +14,8 @@ CONTENDERS = {
     "finite-elements": "finite elements in steps",
     "superposition": "superposition",
     "corrected": "corrected lattice",
+    "region": "region of interest",
+    "corrected-graded": "corrected, graded",
 }
 SPRINGS = {"True": "springs and volume term", "False": "springs alone"}
 """Name of a lattice by its setting `volume_term`."""
@@ -35,6 +37,7 @@ WORDS: dict[str, Callable[[str], str]] = {
     "integrator": lambda value: NAMES.get(value, value.replace("-", " ")),
     "vectors": lambda value: NAMES.get(value, value),
     "precision": lambda value: f"{value} precision",
+    "radius": lambda value: f"to {1e3 * float(value):.3g} mm from the tool",
     "count": lambda value: f"{value} vectors",
 }
 

@@ -357,7 +357,7 @@ def test_the_motion_that_is_tried_is_that_of_the_scene_s_law_geometry_and_integr
 
 def test_models_of_a_scene_are_tried_but_the_reference_and_those_of_estimates(small_scene):
     every = dataclasses.replace(small_scene, models=tuple(MODELS))
-    assert own_scene.tried(every) == ["tissue", "basafa", "superposition", "corrected"]
+    assert own_scene.tried(every) == ["tissue", "basafa", "region", "superposition", "corrected"]
     lattices = {
         name for name in own_scene.tried(every) if isinstance(model(every, name), LatticeModel)
     }

@@ -26,6 +26,7 @@ from study.tradeoff import study as study_module
 from study.tradeoff import table
 from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.errors import Errors, errors
+from study.tradeoff.geometry import with_large_displacements
 from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import SAMPLING, plain, sampled
@@ -466,29 +467,89 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
 
 
 @pytest.mark.slow
-def test_where_the_place_is_known_corrected_lattices_are_chosen_from_too(command, tmp_path):
+def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     """On this block no lattice down to half the scene's spacing promises as much."""
     words = ("recommend", "block", *OVERRIDES, "--error", "12 %")
     code, said = command(*words)
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
-    assert "corrected lattice of" in said
     assert "this place of the load only" in said
+    assert "MB kept while it steps" in said
     scene = read_scene(str(tmp_path / "block-12percent.toml"))
-    assert scene.models[-1] == "corrected"
-    assert scene.corrected.spacing is not None
+    assert scene.models[-1] in {"superposition", "corrected", "region"}
+
+
+def recommended(settings, contender="corrected"):
+    """The text of the block's scene with a configuration that was chosen."""
+    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None), 12_000_000)
+    chosen = advice.Candidate(
+        Configuration(contender, settings), advice.Promise(0.02, 0.01), cost, None
+    )
+    found = advice.Recommended(chosen, True, Errors("resolved", 0.02), None, 0.01, (chosen,))
+    return advice.recommended_scene(read_scene("block", SMALL), found)
 
 
 def test_a_recommended_corrected_lattice_has_its_spacing_in_the_scene():
-    scene = read_scene("block", SMALL)
-    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))
-    configuration = Configuration("corrected", {"spacing": 0.015})
-    chosen = advice.Candidate(configuration, advice.Promise(0.02, 0.01), cost, None)
-    found = advice.Recommended(chosen, True, Errors("resolved", 0.02), None, 0.01)
-    text = advice.recommended_scene(scene, found)
+    text = recommended({"spacing": 0.015})
     assert 'spacing = "0.015 m"' in text.split("[corrected]")[1]
     assert '"corrected",\n]' in text
+    assert "#     0.01 s    2.0 +- 1.0 %    12 MB  corrected lattice of 15 mm" in text
+
+
+@pytest.mark.parametrize("contender", ["region", "corrected-graded"])
+def test_a_recommended_graded_lattice_has_its_size_in_the_scene(contender, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(recommended({"spacing": 0.005, "radius": 0.02}, contender))
+    found = read_scene(str(path))
+    assert (found.region.spacing, found.region.radius) == (0.005, 0.02)
+    assert found.models[-1] == contender.removesuffix("-graded")
+    assert (found.corrected.coarse == "graded") is (contender == "corrected-graded")
+    assert "graded lattice of 5 mm within 20 mm of the tool" in path.read_text()
+
+
+def test_a_recommended_superposition_has_its_vectors_in_the_scene(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(recommended({"vectors": "ritz", "count": 12, "level": 0}, "superposition"))
+    assert read_scene(str(path)).superposition.count == 12
+
+
+def test_only_what_none_is_cheaper_and_better_than_stands_in_the_table():
+    lines = list(advice.table_of([MIDDLE, COARSE, candidate(0.21, 0.5)]))
+    assert len(lines) == 3
+    assert lines[1].startswith("     0.1 s   20.0")
+    assert list(advice.table_of([])) == []
+
+
+def test_what_follows_one_place_is_a_configuration_of_a_contender():
+    scene = read_scene("block", SMALL)
+    chosen = list(advice.bound(scene))
+    assert not any(one.any_load for one in chosen)
+    assert {one.contender for one in chosen} == {
+        *("superposition", "corrected", "corrected-graded", "region"),
+    }
+    for one in chosen:
+        one.model(scene)
+
+
+def test_large_displacements_are_what_a_correction_adds():
+    given = stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    count = len(given.problem.volume_rule.weights)
+    samples, probes = len(given.problem.observation.times), len(given.problem.probes)
+    task = Task("study.tradeoff.observation:observe", {})
+
+    def run(x):
+        values = [x] * (3 * count), [x] * (3 * samples * probes)
+        return Outcome(task, "done", vars(Observed(None, 0, None, 1e-3, *values)), "", 0.0)
+
+    known = Truth(np.ones((count, 3)), np.ones((samples, probes, 3)), 0.01, np.full(probes, 0.02))
+    found = with_large_displacements(known, run(2.0), run(2.2), run(2.25), given)
+    np.testing.assert_allclose(found.field, 1.25)
+    np.testing.assert_allclose(found.curves, 1.25)
+    assert found.field_error == pytest.approx(0.01 + 0.05 / 1.25)
+    np.testing.assert_allclose(found.curve_errors, 0.02 + 0.05 / 1.25)
+    lost = replace(run(2.0), value=vars(Observed(0.1, 0, None, 1e-3, None, None)))
+    assert with_large_displacements(known, lost, run(2.2), run(2.25), given) is None
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,7 @@ KIND = ModelKind(
     models=models,
     assumptions=assumptions,
     follows_law=True,
+    any_load=False,  # elsewhere it has large cells
     blind_to=("reference", "superposition", "basafa"),
     able=TISSUE.able,
 )

@@ -54,12 +54,14 @@ class Mending:
     """Displacement [m] (q, 3) at the peak as a lattice is mended: the stiffness first, then causes.
 
     `last`: what is left of the way to the reference once these are mended, at rest for finite
-    elements, at the peak, with its damping, for a lattice.
+    elements, at the peak, with its damping, for a lattice. `nodes`: how many it has; one of others
+    differs by its cells too.
     """
 
     causes: tuple[str, ...]
     fields: tuple[Floats, ...]
     last: Floats
+    nodes: int
 
     @property
     def finished(self) -> bool:
@@ -94,8 +96,9 @@ def error_budgets(
 ) -> tuple[ErrorBudget, ...]:
     """Budgets of the lattices that are no reference, against those that a lattice is mended toward.
 
-    Of the models that finished; there is none where a lattice diverges as it is mended. `rest`:
-    displacement [m] (q, 3) of finite elements at rest, by name.
+    Of the models that finished and have the nodes of the one that was mended; there is none where a
+    lattice diverges as it is mended. `rest`: displacement [m] (q, 3) of finite elements at rest, by
+    name.
     """
     sound = {n: run for n, run in runs.items() if run.trajectory.status == "finished"}
     found = list[ErrorBudget]()
@@ -106,6 +109,7 @@ def error_budgets(
             _budget(run, reference, mended, volumes)
             for n, run in sound.items()
             if run.record.lattice is not None and n not in mendings
+            if run.record.nodes == way.nodes
         ]
     return tuple(found)
 
@@ -176,7 +180,8 @@ def _toward_elements(lattice: PreparedLattice) -> Mending:
     if asked.geometry == "nonlinear":
         changes[GEOMETRY] = {"geometry": "linear"}
     steps = list(_steps(lattice, tissue.youngs_modulus, changes))
-    return Mending(tuple(changes), tuple(map(_moved, steps)), steps[-1].rest())
+    moved, nodes = tuple(map(_moved, steps)), len(lattice.assembly.mass)
+    return Mending(tuple(changes), moved, steps[-1].rest(), nodes)
 
 
 def _toward_benchmark(lattice: PreparedLattice, benchmark: PreparedLattice) -> Mending:
@@ -188,7 +193,8 @@ def _toward_benchmark(lattice: PreparedLattice, benchmark: PreparedLattice) -> M
         changes[LAW] = {"law": None}
     steps = list(_steps(lattice, benchmark.springs.modulus, changes))
     damped = _damped_as(steps[-1], benchmark)
-    return Mending(tuple(changes), tuple(map(_moved, steps)), _moved(damped))
+    moved, nodes = tuple(map(_moved, steps)), len(lattice.assembly.mass)
+    return Mending(tuple(changes), moved, _moved(damped), nodes)
 
 
 def _damped_as(lattice: PreparedLattice, other: PreparedLattice) -> PreparedLattice:

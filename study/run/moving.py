@@ -105,10 +105,14 @@ class Moving:
 
     @cached_property
     def lattice(self) -> str | None:
-        """Name of the first lattice that is no reference, if there is one: all are mended alike."""
+        """Name of the first lattice that is no reference, if there is one: all are mended alike.
+
+        One of cells of one size before any of several.
+        """
         if self.scene.features:  # what is told of a lattice at rest is of one load
             return None
-        names = (n for n, one in self.models.items() if isinstance(one, LatticeModel))
+        of_springs = {n: one for n, one in self.models.items() if isinstance(one, LatticeModel)}
+        names = sorted(of_springs, key=lambda name: of_springs[name].graded)
         return next((name for name in names if name not in references(self.scene)), None)
 
     @property

@@ -120,6 +120,20 @@ def _corrected(scene: Scene) -> Iterator[Settings]:
         yield {"spacing": spacing, "level": level, "step_fraction": FRACTION}
 
 
+def _region(scene: Scene) -> Iterator[Settings]:
+    """Graded lattices by how far their finest cells reach, in radii of the tool."""
+    for times in (0.5, 1.0, 1.5, 2.0):
+        finer = lattice_settings(scene, 0.5, step_fraction=FRACTION)
+        yield {**finer, "radius": times * scene.tool.radius}
+
+
+def _graded(scene: Scene) -> Iterator[Settings]:
+    """Corrected graded lattices, on one mesh of the elements."""
+    for times in (0.6, 1.0, 1.4):
+        radius, spacing = times * scene.tool.radius, 0.5 * scene.lattice.spacing
+        yield {"spacing": spacing, "radius": radius, "level": 1, "step_fraction": FRACTION}
+
+
 CONTENDERS: dict[str, Contender] = {
     "springs": Contender("tissue", _springs),
     "volume-springs": Contender("tissue", _volume_springs),
@@ -130,6 +144,8 @@ CONTENDERS: dict[str, Contender] = {
     "finite-elements": Contender("fem", _finite_elements, {"method": "tr-bdf2"}),
     "superposition": Contender("superposition", _superposition),
     "corrected": Contender("corrected", _corrected),
+    "region": Contender("region", _region),
+    "corrected-graded": Contender("corrected", _graded, {"coarse": "graded"}),
 }
 
 

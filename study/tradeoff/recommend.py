@@ -8,19 +8,20 @@ it. A promise is the fit with its spread, the reference's own error and what the
 recommended configuration is then run and timed afresh, and the next one taken where it does not
 keep up after all.
 
-Where the place of the load is known beforehand, corrected lattices are chosen from too. There are
+Where the place of the load is known beforehand, what follows it there only is chosen from too:
+Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
 few, and each promises what a run of it was off by, or the reference's own error if that is more.
+All are then judged by the reference with large displacements, `study.tradeoff.geometry`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from msm.integrators import INTEGRATORS
-from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
 from study.run.stated import Stated, arguments, stated
@@ -31,14 +32,16 @@ from study.sweep.canonical import restored
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.tradeoff import reference, study
+from study.tradeoff.chosen import DOUBLE, in_words, scene_with
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
+from study.tradeoff.geometry import with_large_displacements
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
 from study.tradeoff.reference import Truth
-from study.tradeoff.table import Cost
+from study.tradeoff.table import Cost, is_beaten
 from study.tradeoff.timing import QUICK_REPEATS
 
 FITTED = (2.5, 2.0, 1.75, 1.5, 1.25, 1.0)
@@ -49,10 +52,13 @@ ELEMENTS = 0.75
 SPREAD = 2.8
 """Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
 FEWEST = 3
-DOUBLE, SINGLE = "double", "single"
+SINGLE = "single"
 BESIDE = (2.0, 1.5, 1.0)
 """Spacings of corrected lattices, times that of the scene."""
-CORRECTED = "corrected"
+FINEST, REACHES = 0.5, (1.0, 1.5)
+"""Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
+reach from the tool, in its radii."""
+VECTORS = 16
 
 
 @dataclass(frozen=True)
@@ -82,16 +88,6 @@ class Candidate:
     frame: Frame | None
 
     @property
-    def spacing(self) -> float:
-        """Of its lattice [m]."""
-        return float(self.configuration.settings["spacing"])
-
-    @property
-    def is_corrected(self) -> bool:
-        """Whether it follows one place of the load only."""
-        return self.configuration.contender == CORRECTED
-
-    @property
     def wall_per_second(self) -> float:
         """Wall per simulated second."""
         return self.cost.timing.step[1] / self.cost.step
@@ -104,13 +100,17 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Recommended:
-    """A candidate, whether it meets the demand, and what it was measured to give."""
+    """A candidate, whether it meets the demand, and what it was measured to give.
+
+    `others`: those that it was chosen from.
+    """
 
     candidate: Candidate
     met: bool
     measured: Errors
     frame: Frame | None
     wall_per_second: float
+    others: tuple[Candidate, ...] = ()
 
 
 def recommend(
@@ -133,14 +133,16 @@ def recommend(
     solved, *outcomes = study.solved(coarser, tried, store, how)
     given = stated(**arguments(coarser))
     known = reference.truth(solved.value or {}, given)
+    followed = _followed(given, known, store, how) if known_place else None
+    known = known if followed is None else followed.known
     found = [errors(outcome, known, given) for outcome in outcomes[: len(spacings)]]
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
     kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
     curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
     every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
     candidates = _candidates(given, every, curve, added, wanted, progress)
-    if known_place:
-        candidates += _corrected(given, known, wanted, store, how, progress)
+    if followed is not None:
+        candidates += _bound(given, followed, wanted, progress)
     return _verified(given, known, candidates, wanted, store, how, progress)
 
 
@@ -226,19 +228,55 @@ def _candidates(
     ]
 
 
-def _corrected(
-    given: Stated, known: Truth, wanted: Demand, store: Store, how: How, progress: Progress
-) -> list[Candidate]:
-    """Corrected lattices on the mesh of the scene that is judged by, run and timed in turns."""
-    spacings = [tidy(times * given.scene.lattice.spacing) for times in BESIDE]
-    chosen = [Configuration(CORRECTED, {"spacing": h, "step_fraction": FRACTION}) for h in spacings]
+@dataclass(frozen=True)
+class Followers:
+    """What follows one place of the load only, run; `known`: what all are then judged by."""
+
+    chosen: tuple[Configuration, ...]
+    outcomes: tuple[Outcome, ...]
+    known: Truth
+
+
+def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
+    """Their elements on the mesh of the scene that is judged by.
+
+    Without runs that tell what geometry changes, those of small displacements are left out.
+    """
+    chosen = list(bound(given.scene))
     _, *outcomes = study.solved(given.scene, chosen, store, how)
-    found = [errors(one, known, given) for one in outcomes]
+    graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
+    near, far = outcomes[graded[0]], outcomes[graded[-1]]
+    whole = with_large_displacements(known, outcomes[0], near, far, given)
+    first = 0 if whole is not None else 1
+    return Followers(tuple(chosen[first:]), tuple(outcomes[first:]), whole or known)
+
+
+def _bound(
+    given: Stated, followed: Followers, wanted: Demand, progress: Progress
+) -> list[Candidate]:
+    """Candidates of those that were run, timed in turns."""
+    known = followed.known
+    found = [errors(one, known, given) for one in followed.outcomes]
+    costed = _costs(given, followed.chosen, progress)
     return [
         Candidate(one, _as_measured(error, known.field_error), cost, _frame(cost, wanted))
-        for one, error, cost in zip(chosen, found, _costs(given, chosen, progress), strict=True)
+        for one, error, cost in zip(followed.chosen, found, costed, strict=True)
         if error.status in {"resolved", "not resolved"}
     ]
+
+
+def bound(scene: Scene) -> Iterator[Configuration]:
+    """What follows one place of the load only: a subspace, graded and corrected lattices."""
+    yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
+    step = {"step_fraction": FRACTION}
+    for times in BESIDE:
+        h = tidy(times * scene.lattice.spacing)
+        yield Configuration("corrected", {"spacing": h, **step})
+    finest, term = tidy(FINEST * scene.lattice.spacing), lacks_poisson_ratio(scene)
+    for times in REACHES:
+        graded = {"spacing": finest, "radius": tidy(times * scene.tool.radius), **step}
+        yield Configuration("corrected-graded", graded)
+        yield Configuration("region", {**graded, "volume_term": term})
 
 
 def _as_measured(found: Errors, own: float) -> Promise:
@@ -248,7 +286,7 @@ def _as_measured(found: Errors, own: float) -> Promise:
 
 def _costs(given: Stated, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
     longest = [float("inf")] * len(chosen)  # that at rest is less
-    return study.costs(given, chosen, longest, QUICK_REPEATS, progress)
+    return study.costs(given, chosen, longest, QUICK_REPEATS, progress, sized=True)
 
 
 def _frame(cost: Cost, wanted: Demand) -> Frame | None:
@@ -292,7 +330,8 @@ def _verified(
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
         return _verified(given, known, others, wanted, store, how, progress)
-    return Recommended(chosen, met, measured, again, cost.timing.step[1] / cost.step)
+    wall = cost.timing.step[1] / cost.step
+    return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 
 
 def recommended_scene(scene: Scene, found: Recommended) -> str:
@@ -300,21 +339,8 @@ def recommended_scene(scene: Scene, found: Recommended) -> str:
 
     It names the model that was measured, springs of the tissue's own modulus, and the reference.
     """
-    head, one = "".join(f"# {line}\n" for line in lines(found)), found.candidate
-    if one.is_corrected:
-        return head + "\n" + write_scene(_with_corrected(scene, one.spacing))
-    chosen = one.configuration.model(scene)
-    assert isinstance(chosen, LatticeModel)  # noqa: S101 - what is not corrected is a lattice
-    models = tuple(dict.fromkeys(("fem", *scene.models, "tissue")))
-    return head + "\n" + write_scene(replace(scene, models=models, lattice=chosen.lattice))
-
-
-def _with_corrected(scene: Scene, spacing: float) -> Scene:
-    """The scene with a corrected lattice of a spacing [m]; the elements are its reference's."""
-    own = replace(scene.lattice, step_fraction=FRACTION, time_step=None, step_rate=None)
-    models = tuple(dict.fromkeys(("fem", *scene.models, "corrected")))
-    corrected = replace(scene.corrected, spacing=spacing)
-    return replace(scene, models=models, lattice=own, corrected=corrected)
+    head = "".join(f"# {line}\n" for line in lines(found))
+    return head + "\n" + write_scene(scene_with(scene, found.candidate.configuration))
 
 
 def lines(found: Recommended) -> list[str]:
@@ -332,9 +358,7 @@ def lines(found: Recommended) -> list[str]:
     if measured.field is not None:
         verdict = ", as promised" if promise.holds(measured.field) else ", not as promised"
     text = [
-        f"{'corrected ' * one.is_corrected}lattice of {1e3 * one.spacing:.3g} mm, explicit, in "
-        f"{one.configuration.settings.get('precision', DOUBLE)} precision, {FRACTION:g} of the "
-        "critical step",
+        in_words(one.configuration),
         f"field error promised {100 * promise.error:.1f} +- {100 * promise.bar:.1f} %, measured "
         f"{error}" + verdict,
     ]
@@ -345,13 +369,30 @@ def lines(found: Recommended) -> list[str]:
             + ("" if slow is None else f", 95 % of them within {1e3 * slow:.3g} ms")
         )
     text.append(f"{found.wall_per_second:.3g} s of wall per simulated second on this machine")
-    if one.is_corrected:
+    if one.cost.memory is not None:
+        text.append(f"{one.cost.memory / 1e6:.0f} MB kept while it steps, on top of the program's")
+    if not one.configuration.any_load:
         text.append(
-            "It follows this place of the load only. The error is that against linear elements: "
-            "what geometry changes, which the model has, counts as error."
+            "It follows this place of the load only. The error is that against linear elements "
+            "and what corrected lattices add to them."
         )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
         "fuzzy estimate have its error on top."
     )
-    return text
+    return [*text, *table_of(found.others)]
+
+
+def table_of(candidates: Sequence[Candidate]) -> Iterator[str]:
+    """Those that none is both cheaper and more accurate than, the cheapest first."""
+    places = [(one.promise.error, one.wall_per_second) for one in candidates]
+    front = [one for one, at in zip(candidates, places, strict=True) if not is_beaten(at, places)]
+    if not front:
+        return
+    yield "chosen from (wall per simulated second, expected error of the field, memory):"
+    for one in sorted(front, key=lambda one: one.wall_per_second):
+        memory = "" if one.cost.memory is None else f"{one.cost.memory / 1e6:.0f} MB"
+        yield (
+            f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
+            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {in_words(one.configuration)}"
+        )

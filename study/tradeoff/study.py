@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+import tracemalloc
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
@@ -110,23 +111,42 @@ def costs(
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
+    *,
+    sized: bool = False,
 ) -> list[Cost]:
-    """Setup and cost of configurations, at steps [s] that their runs took."""
+    """Setup and cost of configurations, at steps [s] that their runs took.
+
+    `sized`: with the memory that each keeps, which makes its set-up slower.
+    """
     with progress.stage("setting up") as advance:
         for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
             _stepper(given, next(one for one in chosen if one.contender == name))
-        ready, setups = [], []
+        ready, setups, memories = [], [], []
         for one in chosen:
             started = clock()
-            ready.append(_stepper(given, one))
+            stepper, memory = _weighed(given, one) if sized else (_stepper(given, one), None)
+            ready.append(stepper)
+            memories.append(memory)
             setups.append(clock() - started)
             advance(len(ready) / len(chosen))
     with progress.stage("timing") as advance:
         timings = in_turns(ready, repeats, clock, advance)
     return [
-        Cost(one.unknowns, setup, min(step, one.step), timing)
-        for one, setup, step, timing in zip(ready, setups, steps, timings, strict=True)
+        Cost(one.unknowns, setup, min(step, one.step), timing, memory)
+        for one, setup, step, timing, memory in zip(
+            ready, setups, steps, timings, memories, strict=True
+        )
     ]
+
+
+def _weighed(given: Stated, one: Configuration) -> tuple[Stepper, int]:
+    """A stepper, and the bytes of arrays and objects that it keeps; not of factors in C."""
+    tracemalloc.start()
+    try:
+        stepper = _stepper(given, one)
+        return stepper, tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
 
 
 def _stepper(given: Stated, one: Configuration) -> Stepper:

@@ -58,12 +58,16 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Cost:
-    """What a configuration costs: set up once [s], and by the step [s]."""
+    """What a configuration costs: set up once [s], and by the step [s].
+
+    `memory` [byte]: what it keeps while it steps, where that was looked at.
+    """
 
     unknowns: int
     setup: float
     step: float
     timing: Timing
+    memory: int | None = None
 
     @property
     def per_second(self) -> tuple[float, float, float]:

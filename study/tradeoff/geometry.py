@@ -1,0 +1,51 @@
+"""The reference with large displacements, which linear elements lack: from corrected lattices.
+
+What a corrected lattice moves beyond the same elements without it is what geometry changes. Added
+to the reference it gives what all models are judged by where the place of the load is known; its
+error is told by a second lattice, whose finest cells reach less far.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.run.stated import Stated
+from study.similarity.fields import relative_l2, relative_l2_of_curves
+from study.sweep.canonical import restored
+from study.sweep.runner import Outcome
+from study.tradeoff.observation import Observed
+from study.tradeoff.reference import Truth
+
+Floats = NDArray[np.float64]
+
+
+def with_large_displacements(
+    known: Truth, linear: Outcome, near: Outcome, far: Outcome, given: Stated
+) -> Truth | None:
+    """The reference with what geometry changes, None where one of the runs was not whole.
+
+    `linear`: elements alone; `near` and `far`: corrected by lattices, of which the second's finest
+    cells reach farther.
+    """
+    seen = [_seen(one, known) for one in (linear, near, far)]
+    if any(one is None for one in seen):
+        return None
+    (field, curves), (field_near, curves_near), (field_far, curves_far) = (
+        one for one in seen if one is not None
+    )
+    whole, moved = known.field + field_far - field, known.curves + curves_far - curves
+    volumes = given.problem.volume_rule.weights
+    own = relative_l2(whole + field_near - field_far, whole, volumes)
+    apart = relative_l2_of_curves(curves_near - curves_far, moved)
+    return Truth(whole, moved, known.field_error + own, known.curve_errors + apart)
+
+
+def _seen(outcome: Outcome, known: Truth) -> tuple[Floats, Floats] | None:
+    """Field and curves of a run, None where it was not whole."""
+    if outcome.value is None:
+        return None
+    found = restored(Observed, outcome.value)
+    if found.field is None or found.curves is None:
+        return None
+    return np.reshape(found.field, (-1, 3)), np.reshape(found.curves, known.curves.shape)

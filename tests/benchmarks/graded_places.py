@@ -1,0 +1,224 @@
+"""Graded lattices at places of the tool, against the uniform lattice of their finest cells.
+
+    python -m tests.benchmarks.graded_places [PLACES]
+
+writes reports/data/graded_places.csv, a row per place of `corrected_places.csv`, which has uniform
+and corrected lattices there, and graded_cost.csv, what each lattice costs in processor time at the
+built-in place. Places that are in the table are kept.
+
+Errors are relative L2 differences of the curve of the control point under the tool, as there: of a
+region of interest against the uniform lattice of 5 mm, of a graded corrected lattice of what it
+adds to the linear elements against what that lattice adds.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.models.lattice import LatticeModel, PreparedLattice, asked_step
+from study.models.remainder import PreparedRemainder
+from study.models.table import model
+from study.problem.problem import Problem
+from study.scene import Place, Scene
+from study.scene.problem import problem_of
+from study.tradeoff.timing import in_turns
+from tests.benchmarks import corrected_places
+from tests.benchmarks.corrected_places import written
+from tests.benchmarks.corrected_runs import VECTORS, scene
+
+Floats = NDArray[np.float64]
+
+TABLE = corrected_places.TABLE.with_name("graded_places.csv")
+COSTS = TABLE.with_name("graded_cost.csv")
+PLACES = 20
+EVERY = 5
+"""Of the places of the other table."""
+FINEST = 0.005
+TOLERANCE = 0.02
+REACHES = (1.0, 0.6)
+"""How far the finest cells of a corrected lattice reach, in radii of the tool."""
+TURNS = 5
+
+
+class Row(NamedTuple):
+    """A place as in the other table; lengths [m], relative errors, nodes that do not hang.
+
+    `region_apart`: what the region's rest is off, linear, by which its radius was chosen;
+    `region_error` of its motion. `graded_*`: of corrected lattices whose finest cells reach REACHES
+    radii of the tool. `uniform_10` and `uniform_8`, of lattices of one size, and `corrected_20`
+    and `corrected_10` are those of the other table.
+    """
+
+    at_x: float
+    at_z: float
+    radius_m: float
+    strain: float
+    force_n: float
+    region_radius_m: float
+    region_nodes: int
+    region_apart: float
+    region_error: float
+    graded_nodes: int
+    graded_error: float
+    graded_near_nodes: int
+    graded_near_error: float
+    uniform_10: float
+    uniform_8: float
+    corrected_20: float
+    corrected_10: float
+
+
+class Cost(NamedTuple):
+    """Processor time of a lattice's steps at the built-in place, the least of the turns.
+
+    `spacing_m`: of the finest cells; `nodes` that do not hang; `per_second` [s]: of a simulated
+    second. A corrected lattice is timed with its linear parts.
+    """
+
+    model: str
+    spacing_m: float
+    nodes: int
+    step_s: float
+    step_us: float
+    per_second: float
+
+
+def known() -> list[dict[str, float]]:
+    """Places of the other table, every so many."""
+    with corrected_places.TABLE.open(encoding="utf-8") as file:
+        rows = [{k: _number(v) for k, v in one.items()} for one in csv.DictReader(file)]
+    return rows[::EVERY]
+
+
+def _number(text: str) -> float:
+    return float(text) if text not in {"True", "False"} else float(text == "True")
+
+
+def placed(one: dict[str, float]) -> Scene:
+    """The scene with the tool at a place."""
+    given = scene()
+    place = Place(side="anterior", at=(one["at_x"], one["at_z"]))
+    tool = replace(given.tool, place=place, radius=one["radius_m"], force=one["force_n"])
+    points = {**given.control_points, "tool": place}
+    return replace(given, tool=tool, control_points=points)
+
+
+def row(one: dict[str, float]) -> Row:
+    """All errors at a place."""
+    given = placed(one)
+    problem = problem_of(given)
+    whole = lattice(given, "tissue", spacing=FINEST).prepare(problem)
+    truth = at_tool(problem, whole.simulate().trajectory.displacement)
+    linear = lattice(given, "tissue", spacing=FINEST, geometry="linear").prepare(problem)
+    added = truth - at_tool(problem, linear.simulate().trajectory.displacement)
+    region = lattice(given, "region", spacing=FINEST, tolerance=TOLERANCE).prepare(problem)
+    found = at_tool(problem, region.simulate().trajectory.displacement)
+    graded = [corrected(given, problem, reach, added, truth) for reach in REACHES]
+    return Row(
+        *(one[key] for key in ("at_x", "at_z", "radius_m", "strain", "force_n")),
+        region.region.radius,
+        free(region),
+        region.region.apart,
+        size(found - truth, truth),
+        *(value for pair in graded for value in pair),
+        *(one[key] for key in ("own_10", "own_8", "error_20", "error_10")),
+    )
+
+
+def lattice(given: Scene, name: str, **settings: float | str) -> LatticeModel:
+    """A lattice of the tissue with the volume term."""
+    return model(given, name).varied(volume_term=True, step_fraction=0.8, **settings)
+
+
+def corrected(
+    given: Scene, problem: Problem, reach: float, added: Floats, truth: Floats
+) -> tuple[int, float]:
+    """Free nodes of a graded lattice, and the error of what it adds to its linear motion."""
+    radius = reach * given.tool.radius
+    one = lattice(given, "region", spacing=FINEST, radius=radius).prepare(problem)
+    remainder = PreparedRemainder(one, VECTORS).run(asked_step(one.model.lattice))
+    return free(one), size(at_tool(problem, remainder.trajectory.displacement) - added, truth)
+
+
+def at_tool(problem: Problem, motion: Floats) -> Floats:
+    """Curve [m] (samples, 3) of the control point under the tool."""
+    return motion[:, problem.tool_probe]
+
+
+def free(one: PreparedLattice) -> int:
+    """Nodes that do not hang."""
+    return len(one.assembly.mass) - getattr(one.assembly.lattice, "hanging", 0)
+
+
+def size(difference: Floats, whole: Floats) -> float:
+    """Relative L2 norm."""
+    return float(np.linalg.norm(difference) / np.linalg.norm(whole))
+
+
+def costs() -> list[Cost]:
+    """Of all lattices in turns at the built-in place."""
+    given = scene()
+    problem = problem_of(given)
+    ready = dict(lattices(given, problem))
+    steppers = [one.stepper() for one in ready.values()]
+    timings = in_turns(steppers, TURNS, time.process_time)
+    found = []
+    for (name, one), stepper, timing in zip(ready.items(), steppers, timings, strict=True):
+        step = float(timing.walls.mean(axis=1).min())
+        own = one if isinstance(one, PreparedLattice) else one.coarse
+        cost = 1e6 * step, step / stepper.step
+        found.append(Cost(name, own.model.spacing, free(own), stepper.step, *cost))
+    return found
+
+
+def lattices(given: Scene, problem: Problem) -> Iterator[tuple[str, PreparedLattice]]:
+    """By name."""
+    for h in (0.01, 0.008, FINEST):
+        yield f"uniform {1e3 * h:.3g} mm", lattice(given, "tissue", spacing=h).prepare(problem)
+    for tolerance in (TOLERANCE, 0.01):
+        one = lattice(given, "region", spacing=FINEST, tolerance=tolerance)
+        yield f"region {100 * tolerance:.3g} %", one.prepare(problem)
+    both = model(given, "corrected")
+    for h in (0.02, 0.01, 0.008):
+        chosen = both.varied(spacing=h, step_fraction=0.8)
+        yield f"corrected {1e3 * h:.3g} mm", chosen.prepare(problem)
+    for reach in REACHES:
+        radius = reach * given.tool.radius
+        chosen = both.varied(coarse="graded", spacing=FINEST, radius=radius, step_fraction=0.8)
+        yield f"corrected, graded to {1e3 * radius:.3g} mm", chosen.prepare(problem)
+
+
+def kept() -> dict[tuple[float, float], Row]:
+    """Rows of the table that are there."""
+    if not TABLE.exists():
+        return {}
+    with TABLE.open(encoding="utf-8") as file:
+        whole = {"region_nodes", "graded_nodes", "graded_near_nodes"}
+        rows = [
+            Row(**{k: int(v) if k in whole else float(v) for k, v in one.items()})
+            for one in csv.DictReader(file)
+        ]
+    return {(one.at_x, one.at_z): one for one in rows}
+
+
+def main(places: int = PLACES) -> None:
+    """Write both tables, the first after each place."""
+    rows = kept()
+    for one in known()[:places]:
+        key = one["at_x"], one["at_z"]
+        if key not in rows:
+            rows[key] = row(one)
+            written(TABLE, list(rows.values()))
+    written(COSTS, costs())
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
