@@ -114,7 +114,7 @@ def beam(
     tip_force: float,
     watched: Floats,
     cells: tuple[int, ...] = (1, 2, 3),
-    spacings: tuple[float, ...] = (5e-3, 3.75e-3, 2.5e-3),
+    spacings: tuple[float, ...] = (7.5e-3, 5e-3, 3.75e-3),
 ) -> Specimen:
     """Half of the beam, clamped at x = -0.1 m, under its weight and a force on the upper tip edge.
 

@@ -58,7 +58,7 @@ def _sliding(tissue: Tissue) -> Iterator[Finding]:
     yield number_of(f"force of sliding plates [N], {label}", stress * EDGE**2, force, 1e-8)
     exact = body.points * (np.array([lateral, lateral, STRETCH]) - 1.0)
     off = float(np.abs(state.displacement - exact).max() / np.abs(exact).max())
-    yield error_of(f"displacement between sliding plates, {label}", off, 1e-8)
+    yield error_of(f"displacement, sliding plates, {label}", off, 1e-8)
 
 
 def uniaxial(tissue: Tissue, stretch: float) -> tuple[float, float]:
