@@ -364,7 +364,8 @@ def _check_fields(results: Results) -> None:
     if results.scene.is_point:
         return check_names(file, fields, [])
     names = [model.name for model in record.models]
-    surface = SURFACE | ({"inclusions": "ko3"} if results.scene.tissue.inclusion else {})
+    inside = {"inclusions": "ko3"} if results.scene.tissue.inclusion else {}
+    surface = {**SURFACE, **inside}
     check_names(file, fields, [*surface, *names])
     shapes = {**surface, **dict.fromkeys(names, "2n3")}
     check_shapes(file, fields, shapes, {"p": len(record.probes)})
