@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, of_tissue
 from msm.calibration import lame
-from msm.lattice import composed
+from msm.lattice import CellLattice, composed
 from msm.model import critical_time_step
 from msm.springs import connect
 from msm.statics import static_displacement
@@ -142,6 +142,7 @@ def _with_ball(make: Make, contrast: float, nu: float | None) -> VariedTissue:
 def _lattice(make: Make, tissue: VariedTissue) -> tuple[Assembly, Material]:
     """A block of whole cells of the tissue; its springs are those of `make` around."""
     plain, material = lattice_of(make)
+    assert isinstance(plain.lattice, CellLattice)  # noqa: S101 - as it is made of whole cells
     body = replace(
         plain,
         composition=composed(plain.lattice, tissue),
