@@ -59,7 +59,7 @@ class Views:
     """What is drawn of the organ: its surfaces, on sheets, as a camera sees them.
 
     `anchors` (probes + 1,): vertices at the tool and at the control points; `hidden`: whether they
-    lie on the far side.
+    lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest.
     """
 
     camera: Camera
@@ -70,6 +70,7 @@ class Views:
     hidden: NDArray[np.bool_]
     probes: tuple[str, ...]
     sheets: list[Sheet]
+    inclusions: Floats
 
 
 def drawable(results: Results) -> list[str]:
@@ -105,6 +106,7 @@ def views(results: Results) -> Views | None:
         hidden=_normals(rest, triangles)[anchors] @ camera.toward < 0.0,
         probes=results.record.probes,
         sheets=sheets,
+        inclusions=fields.get("inclusions", np.zeros((0, 0, 3))),
     )
 
 
@@ -211,12 +213,23 @@ def _draw_flat(axes: Axes, views: Views, panel: Panel, sheet: Sheet) -> None:
 def _mark(axes: Axes, views: Views, places: Floats) -> None:
     """The tool's arrow and numbered control points, which move with the surface."""
     camera = views.camera
+    for outline in views.inclusions:
+        _mark_inclusion(axes, camera.project(outline))
     length = ARROW_SHARE * 2.0 * camera.half_width
     shaft = camera.project(np.stack([places[0] - length * views.push, places[0]]))
     arrow = {"arrowstyle": "-|>", "color": "#D00000", "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tuple(shaft[1]), tuple(shaft[0]), arrowprops=arrow)
     for i, place in enumerate(camera.project(places[1:])):
         _mark_point(axes, place, str(i + 1), bool(views.hidden[i + 1]))
+
+
+def _mark_inclusion(axes: Axes, seen: Floats) -> None:
+    """The outline of a region inside, which does not move with the surface."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(seen).vertices
+    closed = seen[[*hull, hull[0]]]
+    axes.plot(closed[:, 0], closed[:, 1], ":", color="black", lw=1.1)
 
 
 def _mark_point(axes: Axes, place: Floats, text: str, hidden: bool) -> None:
@@ -245,6 +258,7 @@ def _draw_key(axes: Axes, views: Views, sheet: Sheet) -> None:
     _draw_scale_bar(axes, views.camera)
     names = [f"{i}  {short(name, 20)}" for i, name in enumerate(views.probes[:6], 1)]
     names += ["…"] if len(views.probes) > len(names) else []
+    names += ["⋯  inclusion, at rest"] if len(views.inclusions) else []
     text = "\n".join(["→  tool", *names])
     axes.text(0.5, 0.52, text, transform=axes.transAxes, va="top", fontsize=6.5, linespacing=1.25)
 

@@ -75,6 +75,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         elements,
         fixed_step,
         fuzzy_readings,
+        inclusions,
         large_strain,
         lattice_shapes,
         long_steps,
@@ -92,6 +93,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         lattice_shapes,
         elements,
         large_strain,
+        inclusions,
         fuzzy_readings,
         curves,
     ):

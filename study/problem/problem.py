@@ -16,7 +16,7 @@ from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
-from study.problem.varied import notes_of
+from study.problem.varied import OUTLINE, VariedTissue, notes_of
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +73,13 @@ class Problem:
     def notes(self) -> tuple[str, ...]:
         """What was found or assumed of the organ, and how much of it is of other tissue."""
         return (*self.geometry.notes, *notes_of(self.geometry.mesh, self.tissue))
+
+    @property
+    def inclusions(self) -> Floats:
+        """Points [m] (regions, OUTLINE, 3) of the surface of each region of other tissue."""
+        regions = self.tissue.regions if isinstance(self.tissue, VariedTissue) else ()
+        outlines = [one.outline for one in regions if len(one.outline)]
+        return np.stack(outlines) if outlines else np.zeros((0, OUTLINE, 3))
 
     @property
     def tool_probe(self) -> int:

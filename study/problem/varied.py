@@ -11,7 +11,7 @@ larger by half a cell, this leaves a fifth of the error of a ball; soft regions 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
@@ -31,6 +31,8 @@ CHUNK = 2048
 """Cells that are sampled at once: 512 points of each take 25 MB."""
 SAMPLES = 512
 """Points in a tetrahedron: a cut through one is told to 1 % of its volume in the mean."""
+OUTLINE = 200
+"""Points of a region's surface that pictures have."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +41,8 @@ class Region:
 
     `distance`: at points [m] (..., 3) a function of the shape (...) that is negative inside and
     nowhere larger in size than the distance from the surface. Poisson ratio and density are those
-    of the tissue around it unless they are given.
+    of the tissue around it unless they are given. `outline` [m] (OUTLINE, 3): points of its
+    surface, for pictures.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Region:
     youngs_modulus: float
     poisson_ratio: float | None = None
     density: float | None = None
+    outline: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def ratio(self, around: float) -> float:
         """Its Poisson ratio in tissue of another one."""
@@ -210,3 +214,12 @@ class Ellipsoid:
         """Exact for a ball: no gradient of the scaled radius exceeds 1 over the least semi-axis."""
         scaled = np.linalg.norm((points - self.centre) / self.semi_axes, axis=-1)
         return np.asarray((scaled - 1.0) * self.semi_axes.min())
+
+    @property
+    def outline(self) -> Floats:
+        """Points [m] (OUTLINE, 3) of its surface, spread by the golden angle."""
+        height = np.linspace(-1.0, 1.0, OUTLINE)
+        turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(OUTLINE)
+        across = np.sqrt(1.0 - height**2)
+        ball = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+        return np.asarray(self.centre + self.semi_axes * ball)

@@ -381,13 +381,15 @@ def _check_sensitivity(results: Results) -> None:
 
 
 def _check_fields(results: Results) -> None:
-    """Surface, tool and control points, and each model's displacement at the peak and the end."""
+    """Surface, tool, control points, inclusions, and displacements at the peak and the end."""
     file, fields, record = "fields.npz", results.fields, results.record
     if results.scene.is_point:
         return check_names(file, fields, [])
     names = [model.name for model in record.models]
-    check_names(file, fields, [*SURFACE, *names])
-    shapes = {**SURFACE, **dict.fromkeys(names, "2n3")}
+    inside = {"inclusions": "ko3"} if results.scene.tissue.inclusion else {}
+    surface = {**SURFACE, **inside}
+    check_names(file, fields, [*surface, *names])
+    shapes = {**surface, **dict.fromkeys(names, "2n3")}
     check_shapes(file, fields, shapes, {"p": len(record.probes)})
     lost = {model.name for model in record.models if model.status == "diverged"}
     check_numbers(file, {name: array for name, array in fields.items() if name not in lost})

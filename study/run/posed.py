@@ -31,7 +31,10 @@ BLIND_TO = (
 
 @dataclass(frozen=True)
 class Posed:
-    """What is seen of a problem: where, on which surface, and of which mesh (by its SHA-256)."""
+    """What is seen of a problem: where, on which surface, and of which mesh (by its SHA-256).
+
+    `inclusions` [m] (regions, points, 3): points of the surface of each.
+    """
 
     response: Response
     points: Floats
@@ -41,6 +44,7 @@ class Posed:
     notes: tuple[str, ...]
     dimensionless: Dimensionless
     mesh: str
+    inclusions: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +78,7 @@ class Posing:
             problem.notes,
             dimensionless(self.scene, problem),
             self.mesh,
+            problem.inclusions,
         )
 
     @property

@@ -157,12 +157,13 @@ def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -
 
 
 def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
-    """Surface, tool and probes, and the displacement of each model on the surface."""
+    """Surface, tool, probes and inclusions, and each model's displacement on the surface."""
     return {
         "points": posed.points,
         "triangles": posed.triangles,
         "tool": posed.tool,
         "probes": posed.probes,
+        **({"inclusions": posed.inclusions} if len(posed.inclusions) else {}),
     } | {name: run.trajectory.surface_field for name, run in runs.items()}
 
 

@@ -13,7 +13,7 @@ from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.signed_distance import SignedDistance
 from study.mesh.tetrahedra import boundary, volumes
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue, of_tetrahedra
+from study.problem.varied import OUTLINE, Ellipsoid, Region, VariedTissue, of_tetrahedra
 from study.scene.place import resolve
 from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
 
@@ -53,16 +53,19 @@ def tissue_of(table: OrganTissue, mesh: TetrahedralMesh, surface: SurfaceMesh) -
 
 
 def _region(one: Inclusion, name: str, surface: SurfaceMesh) -> Region:
+    distance, outline = _shape(one, name, surface)
     return Region(
         name=name,
-        distance=_distance(one, name, surface),
+        distance=distance,
         youngs_modulus=one.youngs_modulus,
         poisson_ratio=one.poisson_ratio,
         density=one.density,
+        outline=outline,
     )
 
 
-def _distance(one: Inclusion, name: str, surface: SurfaceMesh) -> Distance:
+def _shape(one: Inclusion, name: str, surface: SurfaceMesh) -> tuple[Distance, Floats]:
+    """Distance from an inclusion, and points of its surface."""
     if one.mesh is not None:
         from study.mesh.load import load_mesh
 
@@ -71,11 +74,13 @@ def _distance(one: Inclusion, name: str, surface: SurfaceMesh) -> Distance:
         except ValueError as error:
             raise ValueError(f"{name}.mesh: {error}") from error
         closed = loaded if isinstance(loaded, SurfaceMesh) else boundary(loaded)
-        return SignedDistance(closed)
+        some = np.linspace(0, len(closed.points) - 1, OUTLINE).astype(int)
+        return SignedDistance(closed), closed.points[some]
     assert one.place is not None  # noqa: S101 - as was checked with the scene
     centre, _ = resolve(_unmoved(one.place), surface)
     semi_axes = one.semi_axes or (one.radius, one.radius, one.radius)
-    return Ellipsoid(centre, np.array(semi_axes, dtype=float))
+    shape = Ellipsoid(centre, np.array(semi_axes, dtype=float))
+    return shape, shape.outline
 
 
 def _unmoved(place: Place) -> Place:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_reference.elements import ElementName
 from fem_reference.grid import straight
-from study.known.finding import Finding, error_of
+from study.known.finding import Finding, error_of, observed_order
 from study.known.inclusion import STRAIN, BallInclusion
 from study.known.verification.solid import at_rest, solid
 from study.mesh.kinds import TetrahedralMesh
@@ -27,6 +27,7 @@ RADIUS, HALF = 0.01, 0.03
 """[m]"""
 CELLS = 6
 """Along each edge of the cube."""
+FINER, FINER_LIMIT = (4, 7), 0.25
 CONTRASTS = (1.0, 10.0, 1000.0, 0.1)
 RATIOS = (("p2", 0.25), ("p2", 0.45), ("taylor-hood", 0.49))
 LIMITS = {1.0: 1e-10, 10.0: 0.3, 1000.0: 0.3, 0.1: 0.5}
@@ -40,6 +41,10 @@ def findings() -> Iterator[Finding]:
             found = error(name, nu, contrast)
             label = f"ball of {contrast:g} times the modulus, {name}, nu {nu:g}"
             yield error_of(label, found, LIMITS[contrast])
+    errors = [error("p2", 0.45, 10.0, count) for count in FINER]
+    order = observed_order(errors, FINER[1] / FINER[0])
+    label = f"ball of 10 times the modulus, {FINER[1]} cells an edge"
+    yield error_of(label, errors[-1], FINER_LIMIT, order=order)
 
 
 def error(name: ElementName, nu: float, contrast: float, cells: int = CELLS) -> float:
