@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import NoConvergence, anderson
 from scipy.sparse import csr_array
 
 from msm.kernel import kernel
@@ -19,6 +20,8 @@ AT_REST = 1e-9
 FOUND = 1e-7
 """Of the longest spring, how far the unloaded shape, loaded again, may miss the given one."""
 ROUNDS = 60
+MIXED = 6
+"""Earlier shapes that Anderson's mixing looks back at (1965, J. ACM 12:547)."""
 
 
 def sagged(law: Law, net: Network, dead: Floats) -> Floats:
@@ -41,8 +44,8 @@ def sagged(law: Law, net: Network, dead: Floats) -> Floats:
 def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
     """The network with the rest lengths and volumes with which it is at rest as it is given.
 
-    And the dead load [N] (n, 3) with what the foundation bears of it. The unloaded shape is moved
-    against what it sags too far, until it sags to the given one. Forces of small displacements are
+    And the dead load [N] (n, 3) with what the foundation bears of it. The unloaded shape is sought
+    that sags to the given one. Forces of small displacements are
     those of the given shape as it is, and nothing is left of the load. ValueError if no shape is
     found.
     """
@@ -50,18 +53,27 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
         return net, np.zeros_like(dead)
     entries = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
     support = csr_array(entries, shape=(len(dead), len(dead)))
-    size = float(net.length.max())
-    raised, found, borne = np.zeros_like(dead), net, dead
-    for _ in range(ROUNDS):
-        off = sagged(law, found, borne)
-        if np.abs(off).max() <= FOUND * size:
-            return found, borne
-        raised -= off
-        found, borne = from_shape(net, raised), dead + support @ raised
-    raise ValueError(
-        "gravity.given: no unloaded shape was found that sags to the given one; reduce "
-        "gravity.acceleration, or set gravity.given to unloaded"
-    )
+
+    def borne(raised: Floats) -> Floats:
+        """The load less what a foundation bears that is at rest under the unloaded shape."""
+        return dead + support @ raised
+
+    def missed(raised: Floats) -> Floats:
+        """Where an unloaded shape sags to, off the given one."""
+        return sagged(law, from_shape(net, raised), borne(raised))
+
+    enough = FOUND * float(net.length.max())
+    try:
+        # Its own first step goes back by what was missed; alone these steps need not converge.
+        raised = anderson(
+            missed, np.zeros_like(dead), alpha=-1.0, M=MIXED, maxiter=ROUNDS, f_tol=enough
+        )
+    except NoConvergence:
+        raise ValueError(
+            "gravity.given: no unloaded shape was found that sags to the given one; reduce "
+            "gravity.acceleration, or set gravity.given to unloaded"
+        ) from None
+    return from_shape(net, raised), borne(raised)
 
 
 def from_shape(net: Network, u: Floats) -> Network:

@@ -22,7 +22,7 @@ from study.scene.text import key_lines, parsed, read_text
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-BUILT_IN = ("liver", "block", "paper")
+BUILT_IN = ("liver", "press", "block", "paper")
 FILES = (("organ", "mesh"), ("fuzzy", "rule_base"))
 """Tables and their keys that name a file."""
 SUITED: tuple[str, ...] = get_args(SuitedKey)
