@@ -9,6 +9,7 @@ from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
 from reports.organ_ranking import organ_ranking
+from reports.page.answer import answer
 from reports.paper import TABLE_III_SPREAD
 from reports.ranking import columns, tool_probe
 from reports.ranking_study import is_ranked, ranking_study
@@ -31,6 +32,7 @@ def document(results: Results) -> dict[str, object]:
         "title": words(title),
         "running_title": short(title, 80),
         "warnings": [words(text) for text in record.warnings],
+        "answer": _answer(results),
         "glance": summary.glance(results),
         "summary": summary.sentences(results),
         "reference_spacing": reference_spacing(results),
@@ -83,6 +85,15 @@ def _scene(results: Results) -> list[Group]:
     """Groups of the scene's values, and the numbers that follow from them."""
     groups, rows = tables.scene_groups(results), tables.dimensionless_rows(results)
     return [*groups, {"name": "size and dimensionless numbers", "rows": rows}] if rows else groups
+
+
+def _answer(results: Results) -> dict[str, object]:
+    """Which model, how wrong, how fast, what limits it; three numbers with their errors."""
+    found = answer(results)
+    return {
+        "sentences": [words(line) for line in found.sentences],
+        "numbers": [[words(one.name), one.value, one.error] for one in found.numbers],
+    }
 
 
 def _limits(results: Results) -> dict[str, str] | None:
