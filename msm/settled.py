@@ -56,7 +56,7 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
 
     def borne(raised: Floats) -> Floats:
         """The load less what a foundation bears that is at rest under the unloaded shape."""
-        return dead + support @ raised
+        return np.asarray(dead + support @ raised)
 
     def missed(raised: Floats) -> Floats:
         """Where an unloaded shape sags to, off the given one."""

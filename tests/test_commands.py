@@ -230,7 +230,12 @@ def test_check_tells_what_would_be_run(typed, tmp_path):
 
 def test_scenes_are_listed_with_their_titles(typed):
     done = typed("scenes")
-    assert [line.split()[0] for line in done.stdout.splitlines()] == ["liver", "press", "block", "paper"]
+    assert [line.split()[0] for line in done.stdout.splitlines()] == [
+        "liver",
+        "press",
+        "block",
+        "paper",
+    ]
 
 
 def test_estimate_speaks_kpa_to_people_and_si_to_programs(typed):
