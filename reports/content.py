@@ -17,6 +17,7 @@ from reports.reference import is_built_in_liver, reference
 from reports.reference_spacing import reference_spacing
 from reports.robustness import robustness
 from reports.rule_view import view_names
+from reports.tool_force import force_rows, overlap
 from reports.validation import validation
 from reports.verification import verification
 from study.results.folder import Results
@@ -50,6 +51,8 @@ def document(results: Results) -> dict[str, object]:
         "rule_count": str(record.fuzzy.rule_count or ""),
         "probes_left_out": len(record.probes) - len(shown_probes(results)),
         "has_band": bool(results.bands),
+        "tool_forces": force_rows(results),
+        "tool_overlap": overlap(results),
         "similarity": tables.similarity_tables(results),
         "measure_count": len(columns(results)),
         "tool_probe": words(tool_probe(results)),

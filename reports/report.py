@@ -30,6 +30,7 @@ from reports.renders import Pictures, render_once
 from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
+from reports.tool_force import force_figure
 from reports.validation_figure import validation_figure
 from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
@@ -149,6 +150,7 @@ def _plots(results: Results) -> Figures:
         "sensitivity": sensitivity_figure(results.sensitivity),
         "differences": difference_figure(results),
         "budget": budget_figure(results),
+        "tool_force": force_figure(results),
         "reference_spacing": reference_spacing_figure(results),
         **robustness_figures(results),
     }

@@ -80,6 +80,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         lattice_shapes,
         long_steps,
         own_scene,
+        rigid_tools,
     )
 
     yield from own_scene.cases(scene)
@@ -90,6 +91,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         damping,
         drift,
         collapse,
+        rigid_tools,
         lattice_shapes,
         elements,
         large_strain,
