@@ -21,6 +21,7 @@ from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
+from study.scene.file import read_scene
 
 SIZE = (0.06, 0.06, 0.03)
 TOP = np.array([0.03, 0.03, 0.03])
@@ -278,6 +279,16 @@ def test_gravity_moves_the_start_and_leaves_the_motion():
     assert np.linalg.norm(sag) > 1e-4
     assert b.displacement == pytest.approx(a.displacement + sag, abs=1e-9)
     assert b.velocity == pytest.approx(a.velocity, abs=1e-9)
+
+
+def test_steps_in_time_are_refused_under_a_moved_tool(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        'title = "t"\nmodels = ["fem"]\n[tool]\nshape = "sphere"\ndisplacement = "5 mm"\n'
+        '[reference]\nmethod = "tr-bdf2"\n'
+    )
+    with pytest.raises(ValueError, match=r"reference\.method: tr-bdf2 cannot follow"):
+        read_scene(str(path))
 
 
 @pytest.mark.slow
