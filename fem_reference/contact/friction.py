@@ -29,13 +29,14 @@ def relaxed(compliance: Floats, offset: Floats, friction: Floats, start: Floats)
         largest, changed = 0.0, 0.0
         for i in range(count):
             k = 3 * i
-            own = compliance[k : k + 3, k : k + 3]
+            own = compliance[k : k + 3, k : k + 3].copy()
             free = gap[k : k + 3] - own @ force[i]
             new = _of_area(own, free, friction[i], force[i])
             change = new - force[i]
             size = np.abs(change).max()
             if size > 0.0:
-                gap += compliance[:, k : k + 3] @ change
+                for j in range(3):  # rows, as the compliance is symmetric
+                    gap += change[j] * compliance[k + j]
             force[i] = new
             changed, largest = max(changed, size), max(largest, np.abs(new).max())
         if changed <= TOLERANCE * largest:

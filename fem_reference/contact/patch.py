@@ -64,7 +64,7 @@ class Patch:
 
     def gaps(self, displacement: Floats, time: float) -> Gaps:
         """Where the nodes have moved by a displacement [m] (nodes, 3), at a time [s]."""
-        distance, normal = self.tool.gap(self.points + self.shapes @ displacement, time)
+        distance, normal = self.tool.gap(self._moved(displacement), time)
         opposite = np.isfinite(distance)
         seen = self.shares @ opposite.astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -73,9 +73,19 @@ class Patch:
         direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
         return Gaps(np.where(seen > LEAST_SHARE, mean, np.inf), direction)
 
+    def _moved(self, displacement: Floats) -> Floats:
+        """Points (q, 3) where they are; of a flat tool, whose edge they would cross, along it only.
+
+        By how far they move across it is small beside its radius where strains are small.
+        """
+        moved = self.shapes @ displacement
+        if self.tool.shape != SPHERE:
+            moved = np.outer(moved @ self.tool.axis, self.tool.axis)
+        return np.asarray(self.points + moved)
+
     def penetration(self, displacement: Floats, time: float) -> float:
         """How deep [m] the deepest integration point is inside the tool."""
-        distance, _ = self.tool.gap(self.points + self.shapes @ displacement, time)
+        distance, _ = self.tool.gap(self._moved(displacement), time)
         return float(max(0.0, -distance.min()))
 
 

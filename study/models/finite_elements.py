@@ -29,7 +29,7 @@ from study.models.errors import (
     time_step_errors,
 )
 from study.models.grading import is_graded, next_graded
-from study.models.in_contact import contact_record, force_step_errors, rest_in_contact
+from study.models.in_contact import contact_record, force_step_errors, resolving, rest_in_contact
 from study.models.keeping import recorded
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large
@@ -306,7 +306,8 @@ class PreparedElements:
     @property
     def coarsest(self) -> Level:
         """The first mesh that a run takes."""
-        return next(self._usable(range(-COARSER, 0)), self._level_zero)
+        found = next(self._usable(range(-COARSER, 0)), self._level_zero)
+        return resolving(self.problem, found) if self._graded else found
 
     @property
     def _level_zero(self) -> Level:

@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 
 GROWTH = 4.0
 """Elements of a mesh over those of the one before."""
+GROWTH_IN_CONTACT = 2.0
+"""The same under tools that are moved, whose first mesh is already fine there."""
 LEAST_GROWTH = 1.4
 """By less, two meshes are too alike to show the error."""
 
@@ -42,7 +44,8 @@ def is_graded(reference: Reference, problem: Problem) -> bool:
 def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
     """A mesh of more elements, where the control points at rest need them; None if too large."""
     count = len(level.mesh.tetrahedra)
-    growth = min(GROWTH, 0.9 * MAX_TETRAHEDRA / count)
+    usual = GROWTH_IN_CONTACT if problem.rigid_tools else GROWTH
+    growth = min(usual, 0.9 * MAX_TETRAHEDRA / count)
     if growth < LEAST_GROWTH:
         return None
     errors = (contact_errors if problem.rigid_tools else probe_errors)(problem, body)

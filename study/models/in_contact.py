@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from fem_reference.contact.motion import at_peak
 from fem_reference.dynamics import ORDER
@@ -14,13 +16,47 @@ from fem_reference.error_estimate import discretisation_error, graded_error
 from fem_reference.observation import at_points, evaluation
 from fem_reference.recovery import goal_errors
 from study.models.mesh_error import MeshSolution, formal_order
+from study.organ.geometry import Level
+from study.organ.grading import resolved
 from study.problem.problem import Problem
+from study.problem.rigid import PLATE, PUNCH
 from study.problem.trajectory import Trajectory
 from study.results.records import ContactRecord, ToolForceRecord
 
 Floats = NDArray[np.float64]
 
 TINY = 1e-300
+ACROSS, ROUND = 1.4, 1.0
+"""Longest edge under a tool over the radius of what it touches, and where that holds, likewise."""
+PLACES = 33
+HALF = 0.5
+"""A tetrahedron reaches as far from its centre as this share of its longest edge, about."""
+
+
+def resolving(problem: Problem, level: Level) -> Level:
+    """A mesh on which what the tools touch is seen at all, for its error to tell of the rest."""
+    return resolved(problem.geometry, level, partial(_wanted, problem)) or level
+
+
+def _wanted(problem: Problem, centres: Floats, longest: Floats) -> Floats:
+    """Longest edge [m] (n,) of tetrahedra that have such centres (n, 3) and edges."""
+    found = np.full(len(centres), np.inf)
+    for tool in problem.rigid_tools:
+        if tool.shape == PLATE:  # as wide as the body: its meshes show it
+            continue
+        times = problem.observation.times
+        travel = tool.travel(times[:: max(1, len(times) // PLACES)])
+        depth = max(float((travel @ tool.axis).max()), TINY)
+        share = 1.0 if tool.shape == PUNCH else min(1.0, depth / tool.radius) ** 0.5
+        radius = share * tool.radius
+        away = _distance(centres, tool.tip + travel) - HALF * longest
+        found = np.where(away < ROUND * radius, np.minimum(found, ACROSS * radius), found)
+    return found
+
+
+def _distance(points: Floats, places: Floats) -> Floats:
+    """Of points (n, 3) to the nearest of places (k, 3)."""
+    return np.asarray(cKDTree(places).query(points)[0])
 
 
 def rest_in_contact(problem: Problem, body: Body) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
@@ -15,6 +17,8 @@ Floats = NDArray[np.float64]
 MOST_PARTS = 64.0
 """Of an element at once: beyond, its error was not known well enough."""
 TRIALS = 6
+ROUNDS, TOO_MANY = 40, 8
+"""Of bisection, and tetrahedra round the organ over those that it may have."""
 TOLERANCE = 0.05
 """Of the number of elements added."""
 
@@ -33,6 +37,30 @@ def graded(
     np.add.at(share, background.origins, errors)
     wanted = (growth - 1.0) * np.count_nonzero(np.bincount(background.origins))
     lattice = equidistributed(background.mesh, share, order, int(wanted)).mesh
+    return _level(geometry, level, lattice)
+
+
+def resolved(
+    geometry: Geometry, level: Level, wanted: Callable[[Floats, Floats], Floats]
+) -> Level | None:
+    """A mesh whose edges are no longer than is wanted; None where it would be too large.
+
+    `wanted` [m] (n,) of tetrahedra: by their centres [m] (n, 3) and longest edges [m] (n,).
+    """
+    lattice = level.mesh if level.background is None else level.background.mesh
+    for _ in range(ROUNDS):
+        corner = lattice.points[lattice.tetrahedra]
+        edges = corner[:, [0, 0, 0, 1, 1, 2]] - corner[:, [1, 2, 3, 2, 3, 3]]
+        longest = np.linalg.norm(edges, axis=2).max(axis=1)
+        parts = np.where(longest > wanted(corner.mean(axis=1), longest), 2.0, 1.0)
+        if (parts == 1.0).all() or len(parts) > TOO_MANY * MAX_TETRAHEDRA:
+            break
+        lattice = cut_into(lattice, parts).mesh
+    return _level(geometry, level, lattice)
+
+
+def _level(geometry: Geometry, level: Level, lattice: TetrahedralMesh) -> Level | None:
+    """What a background has of the organ, its size by the number of elements."""
     cut = None if geometry.cut is None else geometry.cut(lattice)
     mesh = lattice if cut is None else cut.mesh
     if len(mesh.tetrahedra) > MAX_TETRAHEDRA:

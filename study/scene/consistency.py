@@ -85,6 +85,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     yield from _support_contradictions(scene)
     yield from _inclusion_contradictions(scene)
     yield from _feature_contradictions(scene)
+    yield from _contact_contradictions(scene)
     if scene.require is not None:
         yield from _require_contradictions(scene, scene.require)
     if scene.is_point:
@@ -364,6 +365,17 @@ def _feature_contradictions(scene: Scene) -> Iterator[str]:
                     f"models: {name} cannot follow {FEATURES[feature]}; leave it out"
                     + (f"; {', '.join(able)} can" if able else "")
                 )
+
+
+def _contact_contradictions(scene: Scene) -> Iterator[str]:
+    """The reference follows moved tools in a subspace of its own."""
+    if "fem" not in scene.models or "moved-tools" not in scene.features:
+        return
+    if scene.reference.method != "ritz-vectors":
+        yield (
+            f"reference.method: {scene.reference.method} cannot follow tools that are moved; leave "
+            "it out"
+        )
 
 
 def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:

@@ -1,0 +1,297 @@
+"""Rigid tools against the finite elements: the law of contact, closed forms, press and lift."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from fem_reference import model as fem
+from fem_reference.burden import Burden, laden
+from fem_reference.contact.law import Areas, dragged, forces
+from fem_reference.contact.motion import Pressed, at_peak, run
+from fem_reference.contact.reduction import answered, krylov, reduced
+from fem_reference.elasticity import discretise
+from study.known import pressed
+from study.known.pressed import DOWN
+from study.known.verification import indentation
+from study.organ.block import block_mesh
+from study.problem.contact import Foundation, ToolPatch, Weight
+from study.problem.damping import RayleighDamping
+from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
+from study.problem.tissue import Tissue
+from study.problem.trajectory import Observation
+from study.scene.file import read_scene
+
+SIZE = (0.06, 0.06, 0.03)
+TOP = np.array([0.03, 0.03, 0.03])
+TISSUE = Tissue(poisson_ratio=0.4)
+DAMPING = RayleighDamping(30.0)
+NOTHING = np.zeros((0, 3))
+
+
+def observed(duration, samples, peak):
+    return Observation(
+        np.linspace(0.0, duration, samples), TOP[None], (peak, samples - 1), NOTHING, NOTHING
+    )
+
+
+def block(cell=0.015, nu=0.4):
+    mesh = block_mesh(SIZE, cell)
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    tissue = Tissue(poisson_ratio=nu)
+    return discretise(mesh, tissue, Foundation(DOWN, 0.0, 1e-3, 1e7), blunt, "p2")
+
+
+def tool(shape=SPHERE, depth=3e-3, corners=(0.0, 0.1, 0.2, 0.3), **settings):
+    """Pressed in, held and lifted again by as much again as it went in."""
+    heights = np.array([0.0, depth, depth, -depth])[: len(corners)]
+
+    def travel(times):
+        return np.outer(np.interp(times, corners, heights), DOWN)
+
+    return RigidTool("tool", shape, 0.015, TOP, DOWN, travel, **settings)
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    body, sphere = block(), tool()
+    return body, run(body, (sphere,), DAMPING, np.zeros_like, observed(0.4, 81, 40), fem.Method())
+
+
+def test_a_body_is_pushed_and_never_pulled(cycle):
+    force = cycle[1].trajectory.tool_force[:, 0] @ DOWN
+    assert force.min() < -0.01
+    assert force.max() <= 1e-12
+
+
+def test_a_lifted_tool_is_left_and_the_body_comes_to_rest(cycle):
+    found = cycle[1].trajectory
+    assert (found.tool_force[-10:] == 0.0).all()
+    assert np.abs(found.displacement[-1]).max() < 0.05 * np.abs(found.displacement).max()
+
+
+def test_the_tools_work_is_what_damping_takes():
+    """Of a punch that goes in and out smoothly, at every sample beside the largest work."""
+    body, times = block(), np.linspace(0.0, 0.4, 161)
+    nothing = np.zeros(len(body.load))
+
+    def travel(at):
+        return np.outer(1.5e-3 * (1.0 - np.cos(2.0 * np.pi * np.minimum(at / 0.3, 1.0))), DOWN)
+
+    punch = RigidTool("tool", PUNCH, 0.015, TOP, DOWN, travel)
+    given = answered(body, (punch,), times, nothing, 0.15)
+    pressing = Pressed(given, DAMPING, np.zeros_like, nothing, times, 2)
+    among = reduced(given, krylov(given, 3), pressing.highest)
+    states = pressing.sampled(among, lambda _: None).states
+    force = np.array([-given.touch.on_tools(one.grip.force)[0] for one in states])
+    steps = 0.5 * (force[1:] + force[:-1]) * np.diff(travel(times), axis=0)
+    work = np.append(0.0, np.cumsum(steps.sum(axis=1)))
+    power = [DAMPING.mass * float(one.v @ one.v) for one in states]
+    taken = cumulative_trapezoid(power, times, initial=0.0)
+    dents = given.touch.pushes.T @ among.residual
+    held = [
+        0.5 * float(one.v @ one.v + among.squares @ one.q**2 + one.r @ dents @ one.r)
+        for one in states
+    ]
+    assert work.max() > 2.0 * work[-1] > 0.0  # most of it comes back
+    assert taken + held == pytest.approx(work, abs=0.02 * work.max())
+
+
+def test_a_tool_that_is_held_ends_at_rest():
+    body, sphere = block(), tool(corners=(0.0, 0.1, 1.0))
+    seen = observed(1.0, 41, 40)
+    moved = run(body, (sphere,), DAMPING, np.zeros_like, seen, fem.Method())
+    rest = at_peak(body, (sphere,), seen)
+    assert moved.trajectory.tool_force[-1] == pytest.approx(rest.forces, rel=1e-3, abs=1e-6)
+
+
+def test_halving_the_steps_changes_the_force_little(cycle):
+    body, found = cycle
+    half = run(
+        body, (tool(),), DAMPING, np.zeros_like, observed(0.4, 81, 40), fem.Method(times=2)
+    ).trajectory.tool_force
+    change = np.linalg.norm(found.trajectory.tool_force - half) / np.linalg.norm(half)
+    assert 0.0 < change < 0.1
+
+
+@pytest.mark.parametrize("shape", [SPHERE, PUNCH, PLATE])
+def test_the_support_takes_what_a_tool_gives(shape):
+    body = block()
+    rest = at_peak(body, (tool(shape, depth=1e-3),), observed(0.4, 41, 15))
+    taken = (body.support @ rest.displacement).reshape(-1, 3).sum(axis=0)
+    assert rest.forces[0] == pytest.approx(-rest.pushes[0].reshape(-1, 3).sum(axis=0))
+    assert taken @ DOWN == pytest.approx(-(rest.forces[0] @ DOWN), rel=1e-6)
+
+
+def test_a_plate_on_a_column_is_uniaxial_compression():
+    """Force E A d / L of a column of nu 0 that is shortened by d in all, its base held stiffly."""
+    tissue = Tissue(poisson_ratio=0.0)
+    stiff = 1e9
+    mesh = block_mesh((0.04, 0.04, 0.06), 0.02)
+    blunt = ToolPatch(np.array([0.02, 0.02, 0.06]), DOWN, 0.03, 0.0)
+    body = discretise(mesh, tissue, Foundation(DOWN, 0.0, 1e-3, stiff), blunt, "p2")
+
+    def travel(times):
+        return np.outer(times, 1e-3 * DOWN)
+
+    plate = RigidTool("tool", PLATE, 1.0, np.array([0.02, 0.02, 0.06]), DOWN, travel)
+    found = at_peak(body, (plate,), observed(1.0, 3, 2)).forces[0] @ DOWN
+    exact = -(0.04**2) * 1e-3 / (0.06 / tissue.youngs_modulus + 1.0 / stiff)
+    assert found == pytest.approx(exact, rel=1e-6)
+
+
+def test_a_bonded_tool_pulls_as_it_pushes():
+    body, seen = block(), observed(0.1, 3, 2)
+    push, pull = (
+        at_peak(body, (tool(PUNCH, depth=d, corners=(0.0, 0.1), bonded=True),), seen).forces[0]
+        for d in (1e-3, -1e-3)
+    )
+    assert push == pytest.approx(-pull, rel=1e-9)
+    free = at_peak(body, (tool(PUNCH, depth=-1e-3, corners=(0.0, 0.1)),), seen).forces
+    assert (free == 0.0).all()
+
+
+@pytest.mark.parametrize("friction", [0.3, 2.0])
+def test_friction_stays_inside_its_cone(friction):
+    """A sphere that is pressed in and dragged aside."""
+    aside = np.array([1.0, 0.0, 0.0])
+
+    def travel(times):
+        down = np.interp(times, [0.0, 0.5], [0.0, 2e-3])
+        along = np.interp(times, [0.5, 1.0], [0.0, 1e-3])
+        return np.outer(down, DOWN) + np.outer(along, aside)
+
+    sphere = RigidTool("tool", SPHERE, 0.015, TOP, DOWN, travel, friction=friction)
+    body, seen = block(), observed(1.0, 9, 8)
+    found = at_peak(body, (sphere,), seen).forces[0]
+    smooth = at_peak(body, (RigidTool("tool", SPHERE, 0.015, TOP, DOWN, travel),), seen).forces[0]
+    assert found[0] < smooth[0] - 1e-3  # dragged back by what it rubs on
+    assert abs(found[0]) < 1.5 * (friction + 0.2) * abs(found[2])
+
+
+def test_friction_of_nothing_is_none():
+    rng = np.random.default_rng(1)
+    A = rng.normal(size=(12, 12))
+    A = A @ A.T + np.eye(12)
+    offset = rng.normal(size=(4, 3))
+    found = dragged(A, offset, np.zeros(4), np.zeros((4, 3)))
+    normal = np.arange(0, 12, 3)
+    held = np.zeros(4, dtype=bool)
+    exact = forces(Areas(A[np.ix_(normal, normal)], offset[:, 0], held), np.zeros(4))
+    assert found[:, 0] == pytest.approx(exact, abs=1e-7)
+    assert np.abs(found[:, 1:]).max() == 0.0
+
+
+def test_the_law_of_contact_holds_at_every_area():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        A = rng.normal(size=(9, 9))
+        A = A @ A.T + 0.1 * np.eye(9)
+        offset, held = rng.normal(size=9), np.arange(9) < 2
+        found = forces(Areas(A, offset, held), np.zeros(9))
+        gap = A @ found + offset
+        assert np.abs(gap[held]).max() < 1e-9
+        assert found[~held].min() >= 0.0
+        assert gap[~held].min() > -1e-9
+        assert abs(found[~held] @ gap[~held]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("friction", "slides"), [(0.2, True), (5.0, False)], ids=["slides", "sticks"]
+)
+def test_an_area_slides_at_the_limit_or_sticks(friction, slides):
+    offset = np.array([[-1.0, 0.5, 0.0]])
+    found = dragged(np.eye(3), offset, np.array([friction]), np.zeros((1, 3)))[0]
+    assert found[0] == pytest.approx(1.0)
+    assert found[1] == pytest.approx(-0.2 if slides else -0.5, rel=1e-6)
+
+
+def test_a_tool_that_meets_nothing_is_refused():
+    far = RigidTool("tool", SPHERE, 0.015, TOP + 1.0, DOWN, lambda t: np.zeros((len(t), 3)))
+    with pytest.raises(ValueError, match=r"tool\.place"):
+        at_peak(block(), (far,), observed(1.0, 3, 2))
+
+
+def test_a_column_hangs_as_in_closed_form():
+    """Base on a foundation, gravity away from it: the strain at z is rho g (L - z) / E."""
+    tissue = Tissue(poisson_ratio=0.0)
+    g, k, length = 9.81, 1e6, 0.06
+    body = pressed.column(block_mesh((0.04, 0.04, length), 0.02), tissue, "p2", k, 0.0)
+    hung = laden(body, Burden(gravity=np.array([0.0, 0.0, g])))
+    found = fem.start_of(hung).reshape(-1, 3)
+    z, weight = body.points[:, 2], tissue.density * g
+    exact = weight * length / k + weight * (length * z - 0.5 * z**2) / tissue.youngs_modulus
+    assert found[:, 2] == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_given_shape_under_gravity_stays_where_it_is():
+    g = np.array([0.0, 0.0, -9.81])
+    assert laden(block(), Burden(gravity=g, given_loaded=True)).dead is None
+
+
+def test_weights_add_their_mass_and_hang_on_the_body():
+    patch = ToolPatch(TOP, DOWN, 0.02, 1.0)
+    bare, g = block(), np.array([0.0, 0.0, -9.81])
+    held = laden(bare, Burden(weights=(Weight(patch, 0.05),), gravity=g))
+    assert (held.mass.sum() - bare.mass.sum()) / 3.0 == pytest.approx(0.05)
+    whole = bare.mass.sum() / 3.0 + 0.05
+    assert held.dead.reshape(-1, 3).sum(axis=0) == pytest.approx(whole * g)
+
+
+@pytest.mark.parametrize("method", ["ritz-vectors", "tr-bdf2"])
+def test_several_loads_move_a_body_as_each_of_them_does(method):
+    seen = observed(0.3, 31, 10)
+    other = ToolPatch(TOP - [0.02, 0.0, 0.0], DOWN, 0.015, 0.1)
+    bare = discretise(
+        block_mesh(SIZE, 0.015),
+        TISSUE,
+        Foundation(DOWN, 0.0, 1e-3, 1e7),
+        ToolPatch(TOP, DOWN, 0.02, 0.1),
+        "p2",
+    )
+    both = laden(bare, Burden(loads=(other,)))
+
+    def histories(times):
+        return np.column_stack([np.minimum(times / 0.1, 1.0), np.sin(10.0 * times)])
+
+    def moved(factors):
+        return fem.run(both, DAMPING, factors, seen, fem.Method(method)).trajectory.displacement
+
+    whole = moved(histories)
+    parts = [moved(lambda t, k=k: histories(t) * (np.arange(2) == k)) for k in range(2)]
+    assert np.abs(whole - sum(parts)).max() < 2e-3 * np.abs(whole).max()
+    assert np.abs(parts[1]).max() > 0.05 * np.abs(whole).max()
+
+
+def test_gravity_moves_the_start_and_leaves_the_motion():
+    seen = observed(0.3, 31, 10)
+    bare = discretise(
+        block_mesh(SIZE, 0.015),
+        TISSUE,
+        Foundation(DOWN, 0.0, 1e-3, 1e7),
+        ToolPatch(TOP, DOWN, 0.02, 0.1),
+        "p2",
+    )
+    hung = laden(bare, Burden(gravity=np.array([2.0, 0.0, -9.81])))
+    a, b = (fem.run(one, DAMPING, np.ones_like, seen).trajectory for one in (bare, hung))
+    sag = b.displacement[0, 0]
+    assert np.linalg.norm(sag) > 1e-4
+    assert b.displacement == pytest.approx(a.displacement + sag, abs=1e-9)
+    assert b.velocity == pytest.approx(a.velocity, abs=1e-9)
+
+
+def test_steps_in_time_are_refused_under_a_moved_tool(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        'title = "t"\nmodels = ["fem"]\n[tool]\nshape = "sphere"\ndisplacement = "5 mm"\n'
+        '[reference]\nmethod = "tr-bdf2"\n'
+    )
+    with pytest.raises(ValueError, match=r"reference\.method: tr-bdf2 cannot follow"):
+        read_scene(str(path))
+
+
+@pytest.mark.slow
+def test_forces_of_spheres_and_punches_are_those_of_closed_form():
+    for finding in indentation.findings():
+        assert finding.difference < finding.limit, finding.quantity
