@@ -44,7 +44,7 @@ from study.results.tables import (
     paired,
 )
 from study.scene.file import write_scene
-from study.scene.schema import Fuzzy, Place, Scene, Time, Tissue
+from study.scene.schema import Fuzzy, OrganTissue, Place, Scene, Time
 from study.similarity.score import MEASURES
 
 TITLE = "An octahedron under a tool"
@@ -158,7 +158,7 @@ def _scene(models: list[str], probes: list[str], title: str) -> Scene:
         models=tuple(dict.fromkeys("msm" if model in FUZZY else model for model in models)),
         fuzzy=Fuzzy(systems=tuple(_systems(models)), sensitivity_readings=0),
         time=Time(duration=1.0, samples=SAMPLES),
-        tissue=Tissue(youngs_modulus=10e3),
+        tissue=OrganTissue(youngs_modulus=10e3),
         control_points=dict.fromkeys(probes, Place(side="anterior", at=(0.5, 0.5))),
     )
 
