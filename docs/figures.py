@@ -549,6 +549,91 @@ def verification() -> Iterator[tuple[str, str]]:
         yield name, f"{float(lines[key]['order']):.2f}"
 
 
+def validation() -> Iterator[tuple[str, str]]:
+    """Models beside measurements on silicone."""
+    lines = measured("validation")
+    models = list(dict.fromkeys(line["model"] for line in lines))
+    forces = [f"force at {strain} %" for strain in (10, 20, 30)]
+    rows = [
+        [f"{model}, {faces}", *(_force(lines, model, faces, force) for force in forces)]
+        for faces in ("bonded", "sliding")
+        for model in models
+    ]
+    spread = [_median_of(lines, "uncertainty", models[0], "bonded", force) for force in forces]
+    rows.append(["uncertainty of the measurement", *(f"{100 * one:.1f} %" for one in spread)])
+    yield "validated-cylinders", table(("model, faces", "10 %", "20 %", "30 %"), rows)
+    alone, free = (
+        [line for line in lines if (line["quantity"], line["case"]) == (name, "weight alone")]
+        for name in ("tip down, mean of markers", "frequency of free motion")
+    )
+    tip, frequency = (
+        f"{float(own[0]['measured']):.2f} ± {float(own[0]['uncertainty']):.2f}"
+        for own in (alone, free)
+    )
+    yield (
+        "validated-beam",
+        table(
+            ("model", "modulus fitted [kPa]", f"tip, measured {tip}", f"measured {frequency} Hz"),
+            [
+                [line["model"], f"{1e-3 * float(line['modulus_pa']):.0f}", _own(line), _own(other)]
+                for line, other in zip(alone, free, strict=True)
+            ],
+        ),
+    )
+    yield "validated-cube", table(("model", "at 5 %", "at 18.25 %"), _beads(lines, models))
+    yield from _headline(lines)
+
+
+def _own(line: Line) -> str:
+    """A model's number and its own error."""
+    return f"{float(line['found']):.2f} ± {float(line['numerical']):.2f}"
+
+
+def _median_of(lines: list[Line], column: str, model: str, faces: str, quantity: str) -> float:
+    """Median over the materials of a column over the measured force."""
+    wanted = (model, faces, quantity)
+    return median(
+        float(line[column]) / float(line["measured"])
+        for line in lines
+        if (line["model"], line["faces"], line["quantity"]) == wanted and line["found"]
+    )
+
+
+def _force(lines: list[Line], model: str, faces: str, quantity: str) -> str:
+    try:
+        off = _median_of(lines, "found", model, faces, quantity) - 1.0
+    except ValueError:  # of no material
+        return "gives way"
+    return f"{100 * off:+.1f} %"
+
+
+def _beads(lines: list[Line], models: list[str]) -> Iterator[list[str]]:
+    left = {
+        (line["model"], line["case"], line["faces"]): f"{float(line['found']):.2f}"
+        for line in lines
+        if line["quantity"] == "residual of beads, rms" and line["found"]
+    }
+    for model in models:
+        pairs = (
+            [left.get((model, case, faces), "none") for faces in ("bonded", "sliding")]
+            for case in ("5 %", "18.25 %")
+        )
+        yield [model, *map(" / ".join, pairs)]
+
+
+def _headline(lines: list[Line]) -> Iterator[tuple[str, str]]:
+    """What README.md says of it."""
+    model = "neo-Hookean FE"
+    for strain in (10, 30):
+        force = f"force at {strain} %"
+        off = _median_of(lines, "found", model, "bonded", force) - 1.0
+        spread = _median_of(lines, "uncertainty", model, "bonded", force)
+        yield f"measured-{strain}", f"{100 * off:+.1f} ± {100 * spread:.1f} %"
+    for name in ("springs alone", "springs and volume term"):
+        (row,) = _beads(lines, [name])
+        yield f"beads-{name.split()[-1]}", f"{row[2].partition(' / ')[0]} mm"
+
+
 def stability() -> Iterator[tuple[str, str]]:
     """Every model at its extremes."""
     lines = measured("stability")
@@ -602,7 +687,7 @@ def figures() -> dict[str, str]:
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
     models = (error_bar_livers, certified, tradeoff, corrected)
-    groups = (*fuzzy, *lattice, *models, verification, stability, ranking, organ)
+    groups = (*fuzzy, *lattice, *models, verification, validation, stability, ranking, organ)
     return {name: text for group in groups for name, text in group()}
 
 

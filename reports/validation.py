@@ -17,6 +17,10 @@ from study.results.folder import Results
 
 NAME = "validation"
 CYLINDERS, CANTILEVER, CUBE = "cylinders", "cantilever", "cube"
+ROUNDING = 1e-9
+"""An own error that is only this, relative."""
+ONE_AXIS = "residual along"
+"""How quantities begin that the table has of each axis beside the whole."""
 WITHIN = {"True": "within", "False": "beyond", "": DASH}
 
 
@@ -58,10 +62,12 @@ def cylinder_rows(lines: list[Line]) -> list[Group]:
     groups: list[Group] = []
     for faces in _faces(lines, CYLINDERS):
         rows: Table = []
+        before = ""
         for (model, quantity), own in of_cylinders(lines, faces).items():
             found = summed(own)
-            cells = [model, quantity] if not rows or rows[-1][0] != model else ["", quantity]
+            cells = [model if model != before else "", quantity]
             rows.append([*cells, *_median_cells(found)] if found else [*cells, *_none(own)])
+            before = model
         groups.append({"name": f"faces {faces}", "rows": rows})
     return groups
 
@@ -112,7 +118,7 @@ def _median_cells(found: Median) -> list[str]:
         _signed(found.difference),
         f"{_signed(found.least)} to {_signed(found.largest)}",
         percent(found.uncertainty),
-        DASH if found.own is None else percent(found.own),
+        DASH if found.own is None else percent(found.own if found.own > ROUNDING else 0.0),
         answered + (f", {lacking} without an answer" if lacking else ""),
     ]
 
@@ -124,7 +130,7 @@ def _none(lines: list[Line]) -> list[str]:
 def _by_faces(lines: list[Line], problem: str) -> Iterator[tuple[str, Table]]:
     for faces in _faces(lines, problem):
         own = [line for line in lines if (line["problem"], line["faces"]) == (problem, faces)]
-        yield faces, [_body_row(line) for line in own]
+        yield faces, [_body_row(x) for x in own if not x["quantity"].startswith(ONE_AXIS)]
 
 
 def _body_row(line: Line) -> list[str]:

@@ -372,6 +372,11 @@ def test_a_report_that_is_not_made_costs_no_results(typed, error, monkeypatch):
     [
         ("verify", "--out", "no/such.csv"),
         ("verify", "--out", "folder"),
+        ("validate", "--out", "no/such.csv"),
+        ("validate", "--out", "folder"),
+        ("validate", "block", "--data", "no/such"),
+        ("fit", "block", "--curve", "no/such.csv", "--free", "tissue.youngs_modulus"),
+        ("fit", "block", "--curve", "c.csv", "--free", "tissue.density", "--out", "file"),
         ("tradeoff", "block", "--out", "file"),
         ("tradeoff", "block", "--out", "file/deep"),
         ("tradeoff", "block", "--out", "folder"),

@@ -178,6 +178,8 @@ def test_a_difference_is_within_twice_the_uncertainty_and_the_own_error():
     assert not compared(found=11.4).within
     assert compared(found=11.0, numerical=math.nan).within
     assert not compared(found=math.nan).within
+    assert not compared(coverage=1.0).within
+    assert not compared(uncertainty=math.nan).judged
     assert not compared(found=math.nan).answered
 
 

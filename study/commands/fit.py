@@ -42,11 +42,14 @@ def fit(
     as_json
         Print JSON instead of lines.
     """
+    from study.folders import refuse_unwritable
     from study.progress import on_stderr
     from study.scene.file import read_scene
     from study.validation import fit_table, fitting
     from study.validation.own_data import read_curve
 
+    if out is not None:
+        refuse_unwritable(out, lambda _: None, "fit")
     measured, posed = read_curve(curve), read_scene(scene, overrides or ())
     with on_stderr() as progress:
         found = fitting.fit(posed, measured, free, model, progress, probe)

@@ -74,7 +74,7 @@ def cube(
     faces: str,
     watched: Floats,
     cells: tuple[int, ...] = (2, 3, 4),
-    spaced: tuple[int, ...] = (4, 6, 8),
+    spaced: tuple[int, ...] = (3, 4, 6),
 ) -> Specimen:
     """A quarter of the cube, held at its base at z = 0, under a plate that comes down by its edge.
 

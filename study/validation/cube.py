@@ -110,6 +110,7 @@ def _rows(
             unit="mm",
             measured=0.0,
             uncertainty=1e3 * float(noise),
+            coverage=1.0,
             found=1e3 * float(values[-1]),
             numerical=1e3 * own_error(values, sizes),
             fitted=FITTED,

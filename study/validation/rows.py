@@ -20,9 +20,11 @@ ORDER = 2.0
 class Comparison:
     """A quantity in its `unit`: measured with its standard uncertainty, and found by a model.
 
-    `numerical`: error of the model's own by its meshes or spacings, nan of one alone. `modulus`:
-    Young's modulus [Pa] it was found with, nan where none matters. `fitted`: what of the model was
-    fitted to the measurement. `note`: why a number is missing, or what else is to know.
+    `numerical`: error of the model's own by its meshes or spacings, nan of one alone. `coverage`:
+    uncertainties within which the difference counts as explained, 1 for what noise alone would
+    leave of many readings. `modulus`: Young's modulus [Pa] it was found with, nan where none
+    matters. `fitted`: what of the model was fitted to the measurement. `note`: why a number is
+    missing, or what else is to know.
     """
 
     problem: str
@@ -35,6 +37,7 @@ class Comparison:
     uncertainty: float
     found: float
     numerical: float
+    coverage: float = COVERAGE
     modulus: float = math.nan
     fitted: str = ""
     note: str = ""
@@ -53,7 +56,7 @@ class Comparison:
     def within(self) -> bool:
         """Whether the difference is explained by both uncertainties."""
         own = 0.0 if math.isnan(self.numerical) else self.numerical
-        return abs(self.difference) <= COVERAGE * self.uncertainty + own
+        return abs(self.difference) <= self.coverage * self.uncertainty + own
 
     @property
     def answered(self) -> bool:

@@ -3,7 +3,8 @@
 The CSV has a row per comparison: problem, case, faces, model, quantity, unit; measured and its
 standard uncertainty; found and its own numerical error, empty where it is not known; modulus_pa,
 empty where none matters; fitted, what of the model was fitted to the measurement; within, whether
-the difference is explained by twice the uncertainty and the numerical error; note.
+the difference is explained by twice the uncertainty, once where it is what noise leaves of many
+beads, and the numerical error; note.
 """
 
 from __future__ import annotations
