@@ -14,13 +14,15 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
+from msm.assembly import arrays
 from study.export import ExportRequest, export
 from study.handover import step_lattice
-from study.handover.lattice import lattices
+from study.handover.lattice import check_forces, lattices
 from study.handover.sofa import PLUGINS
 from study.handover.write import ARRAYS
 from study.progress import Silent
 from study.results.folder import write
+from study.run.ready import ready
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 
@@ -140,6 +142,17 @@ def test_results_are_exported_with_their_own_curves_and_those_of_another_run_ref
     write(replace(results, curves=curves), tmp_path / "other")
     with pytest.raises(ValueError, match="moves otherwise than its results say"):
         export(ExportRequest(target=str(tmp_path / "other"), to="lattice"), Silent())
+
+
+def test_a_force_that_the_stepper_does_not_know_is_refused():
+    given = ready(scene('models=["basafa"]'))
+    one = given.models["basafa"]
+    found = lattices(scene('models=["basafa"]'), Silent())
+    net, law = arrays(one.assembly, one.springs.material), one.springs.material.law
+    check_forces(net, law, found.shared, found.models[0])
+    other = net._replace(value=1.0001 * net.value)
+    with pytest.raises(ValueError, match="forces that the exported stepper does not know"):
+        check_forces(other, law, found.shared, found.models[0])
 
 
 @pytest.mark.parametrize(

@@ -194,11 +194,15 @@ def _difference(found: Nearest) -> str:
     if found.error is None:
         return f"{percent(found.share)} (the error of that is not known)"
     if found.share < found.error:
-        return f"less than {percent(found.error)}, which is the reference's own error"
+        return f"less than {percent(found.error)}, which is {_whose(found)}"
     by = "which shows in no digit" if found.error < NEGLIGIBLE * found.share else "shown by ±"
-    return (
-        f"{_stated(100.0 * found.share, 100.0 * found.error)} % (the reference's own error, {by})"
-    )
+    stated = _stated(100.0 * found.share, 100.0 * found.error)
+    return f"{stated} % ({_whose(found)}, {by})"
+
+
+def _whose(found: Nearest) -> str:
+    """What the error of a difference is the error of."""
+    return "the reference's own error" if found.is_field else "the numerical error of both curves"
 
 
 def _stated(value: float, error: float) -> str:
@@ -276,7 +280,9 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
         yield Number(f"difference {what}", f"< {percent(found.error)}", "not resolved")
     else:
         value = f"{_stated(100.0 * found.share, 100.0 * found.error)} %"
-        yield Number(f"difference {what}", value, "± is the reference's own error")
+        is_seen = found.error >= NEGLIGIBLE * found.share
+        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} shows in no digit"
+        yield Number(f"difference {what}", value, kind)
     own = _peak(results, found.model.name)
     if own != DASH:
         error = curve_error(found.model, tool_probe(results))

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import arrays
+from msm.forces import internal_forces
 from msm.integrators import INTEGRATORS
 from msm.laws import LAWS, Law, force_law_of, initial_stiffness
 from msm.network import Network
+from study.handover import step_lattice
 from study.models.lattice import PreparedLattice
 from study.problem.problem import Problem
 from study.progress import Progress
@@ -25,6 +27,8 @@ STEPPED = "symplectic-euler"
 LAWS_STEPPED = ("hooke", "basafa")
 DIGITS = 1e-9
 """By how much of its largest value a curve of this run may differ from the stored one."""
+WAVE = 0.02
+"""Of the shortest spring: a displacement that strains all springs and cells."""
 # As msm.lattice has them: x is the highest bit, z the lowest.
 CORNERS = np.array([[(c >> 2) & 1, (c >> 1) & 1, c & 1] for c in range(8)])
 
@@ -77,13 +81,27 @@ def lattices(scene: Scene, progress: Progress) -> ExportedLattices:
     prepared = {name: one for name, one in found.models.items() if isinstance(one, PreparedLattice)}
     if not prepared:
         raise ValueError("models: none of them is a lattice; add msm, basafa or reading")
-    first = next(iter(prepared.values()))
-    return ExportedLattices(
-        scene.title,
-        found.problem,
-        _shared(first),
-        tuple(_model(one, progress) for one in prepared.values()),
-    )
+    shared = _shared(next(iter(prepared.values())))
+    models = tuple(_model(one, progress) for one in prepared.values())
+    for one, model in zip(prepared.values(), models, strict=True):
+        check_forces(_network(one), one.springs.material.law, shared, model)
+    return ExportedLattices(scene.title, found.problem, shared, models)
+
+
+def check_forces(net: Network, law: Law, shared: Arrays, model: ExportedModel) -> None:
+    """ValueError unless the exported stepper has the forces of the run on a wavy displacement."""
+    waves = np.sin(7.0 * np.arange(net.load.size)).reshape(net.load.shape)
+    u = WAVE * net.length.min() * waves
+    force = np.empty_like(u)
+    internal_forces(law, net, u, force)
+    constants = {"name": model.law.name, **model.law.constants}
+    known = shared | model.arrays
+    found = step_lattice.internal_force(known, constants, u)  # type: ignore[no-untyped-call] # a script
+    if np.abs(found - force).max() > DIGITS * np.abs(force).max():
+        raise ValueError(
+            f"--to lattice: {model.name} has forces that the exported stepper does not know; leave "
+            "out what goes beyond springs, volume term and an elastic foundation"
+        )
 
 
 def _refuse(scene: Scene) -> None:
