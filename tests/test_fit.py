@@ -74,6 +74,14 @@ def test_what_a_curve_does_not_determine_is_refused():
         solve(compliant, replace(curve([1.0]), times=TIMES[:1]), [E])
 
 
+def test_models_that_there_are_not_are_refused():
+    scene = read_scene("block")
+    with pytest.raises(ValueError, match="--model nope: is not one of"):
+        fit(scene, curve(TIMES), ["tissue.youngs_modulus"], "nope", QUIET)
+    with pytest.raises(ValueError, match=r"organ\.shape"):
+        fit(read_scene("paper"), curve(TIMES), ["tissue.youngs_modulus"], "fem", QUIET)
+
+
 def test_only_positive_quantities_of_the_scene_are_free():
     scene = read_scene("block")
     assert free_of(scene, "tissue.youngs_modulus") == E

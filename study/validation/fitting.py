@@ -22,7 +22,7 @@ from scipy.stats import t as student
 from study.annotation.quantity import Quantity
 from study.models.estimates import estimates
 from study.models.model import Model
-from study.models.table import is_tuned, models_of
+from study.models.table import MODELS, is_tuned, models_of
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
@@ -132,6 +132,10 @@ def fit(
     ValueError for keys, a model or a probe that there are not, and for a curve that does not
     determine the quantities.
     """
+    if model not in MODELS:
+        raise ValueError(f"--model {model}: is not one of {', '.join(MODELS)}")
+    if scene.is_point:
+        raise ValueError("organ.shape: a single point has no body to be fitted; give an organ")
     free = [free_of(scene, key) for key in keys]
     if len({one.key for one in free}) < len(free) or not free:
         raise ValueError("--free: give each quantity once, one at least")
