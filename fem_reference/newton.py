@@ -127,9 +127,17 @@ def _with_pressure(
             f"law: of elements with a pressure of their own, {law!r} is not worked out; give "
             "neo-hookean, or discretise with element 'p2', good to a Poisson ratio of 0.48"
         )
+    if body.composition is not None:
+        raise ValueError(
+            "tissue.inclusion: of elements with a pressure of their own, bodies of several tissues "
+            "are not worked out at large strain; discretise with element 'p2', good to a Poisson "
+            "ratio of 0.48"
+        )
     mixed = on_nodes(body.nodes, tissue, body.support)
-    held_nowhere = np.full((body.node_count, 3), np.nan)
-    found = solve_driven(mixed, Drive(held_nowhere, body.load), load_factors)
+    held = np.full((body.node_count, 3), np.nan)
+    if body.fixed is not None:
+        held[body.fixed.reshape(-1, 3)] = 0.0
+    found = solve_driven(mixed, Drive(held, body.whole_load), load_factors)
     return Path(tuple(map(_of_driven, found.states)), found.reached, found.failure)
 
 
