@@ -255,3 +255,20 @@ def test_a_run_goes_on_to_the_same_bits(tmp_path):
     assert (again.trajectory.tool_force == whole.trajectory.tool_force).all()
     assert (again.trajectory.displacement == whole.trajectory.displacement).all()
     assert again.overlap == whole.overlap
+
+
+@pytest.mark.parametrize(("shape", "times"), [("sphere", 1.64), ("punch", 1.50)])
+def test_the_distance_from_the_half_space_is_the_one_that_is_told(shape, times):
+    """Hertz's force, 4/3 E* sqrt(R) d^1.5, and that of a flat punch, 2 E* R d; docs/tools.md."""
+    wide = ('organ.size=["120 mm", "120 mm", "80 mm"]', "support.stiffness=1 GPa/m")
+    slow = ("tool.displacement=2 mm", "tool.history.ramp=0.1 s", "tool.history.hold=100 s")
+    one = ("tissue.poisson_ratio=0.25", "reference.element_size=15 mm", "damping.ratio=0.5")
+    problem, prepared = posed(*wide, *slow, *one, f"tool.shape={shape}")
+    stepper = stepper_of(prepared)
+    while stepper.t < 0.8:
+        stepper.advance(50, 0.8 * stepper.limit_at_rest)
+    modulus, radius, depth = 9.5e3 / (1.0 - 0.25**2), 0.02, 2e-3
+    hertz = 4.0 / 3.0 * modulus * np.sqrt(radius) * depth**1.5
+    exact = {"sphere": hertz, "punch": 2.0 * modulus * radius * depth}[shape]
+    force = -stepper.tool_force[0] @ problem.rigid_tools[0].axis
+    assert force / exact == pytest.approx(times, rel=0.01)
