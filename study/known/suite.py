@@ -76,6 +76,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         large_strain,
         lattice_shapes,
         long_steps,
+        moved_tools,
         own_scene,
     )
 
@@ -90,6 +91,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         lattice_shapes,
         elements,
         large_strain,
+        moved_tools,
         fuzzy_readings,
         curves,
     ):
