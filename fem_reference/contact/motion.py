@@ -224,7 +224,7 @@ def run(
     given = answered(body, tools, times, base, peak)
     pressed = Pressed(given, damping, factors, base, times, steps_per_sample(method, times))
     chosen, found, change = _enough(pressed, recorder, advance)
-    outcome = _outcome(pressed, chosen, found, change, _at_rest(given, base, peak))
+    outcome = _outcome(pressed, chosen, found, change, _rest(pressed, chosen, found, peak))
     _record(recorder, pressed, chosen, found)
     sizes = body.node_count, len(body.mesh.tetrahedra), body.element
     steps = (len(times) - 1) * pressed.per_sample
@@ -357,6 +357,18 @@ def _at_rest(given: Answered, base: Floats, peak: float) -> AtPeak:
         pushes.append(touch.pushes @ own)
     found = given.moved(loaded, grip)
     return AtPeak(found, np.array(pushes), touch.on_tools(grip.force), given.solve)
+
+
+def _rest(pressed: Pressed, body: Reduced, found: Sampled, peak: float) -> AtPeak:
+    """Rest at the peak, or where no forces are found for it, the state there or the last before."""
+    given, touch = pressed.given, pressed.given.touch
+    try:
+        return _at_rest(given, pressed.base, peak)
+    except UnsettledError:
+        state = next((one for one in found.states if one.time >= peak), found.states[-1])
+        pushes = np.zeros((len(touch.patches), len(pressed.base)))
+        moved = _state(pressed, body, state)[0]
+        return AtPeak(moved, pushes, touch.on_tools(state.grip.force), given.solve)
 
 
 def _under_loads(given: Answered) -> Floats:

@@ -25,6 +25,7 @@ PARTS = 4
 """Of each edge of a facet, for the edge of a punch may run anywhere across it."""
 LEAST_SHARE = 0.02
 """Of a vertex's shape function, that lies under the tool; one with less bears no pressure."""
+ROUNDING = 1e-12
 # Strang and Fix, three points inside a triangle, exact for squares of linear functions.
 _INSIDE = np.array([[1.0, 1.0, 4.0], [1.0, 4.0, 1.0], [4.0, 1.0, 1.0]]) / 6.0
 
@@ -111,7 +112,7 @@ def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
     hats, weights = _values(linear), fine.dx.ravel()
     under = csr_array(hats.T @ diags_array(np.where(inside, weights, 0.0)))
     whole, part = hats.T @ weights, under.sum(axis=1)
-    kept = np.flatnonzero(part > LEAST_SHARE * np.maximum(whole, 1e-300))
+    kept = np.flatnonzero(part > LEAST_SHARE * whole)
     shares = csr_array(diags_array(1.0 / part[kept]) @ under[kept])
     points = rows(fine.global_coordinates()).reshape(-1, 3)
     return Patch(tool, points[inside], _values(fine)[inside], shares[:, np.flatnonzero(inside)])
@@ -140,6 +141,7 @@ def _rule() -> tuple[Floats, Floats]:
 def _values(basis: Any) -> csr_array:
     """Shape functions of a basis at its integration points (q, dofs)."""
     values = np.stack([np.asarray(one[0]) for one in basis.basis])
+    values[np.abs(values) < ROUNDING] = 0.0  # of nodes that are not on the facet
     columns = np.broadcast_to(basis.element_dofs[:, :, None], values.shape)
     points = np.broadcast_to(np.arange(values[0].size).reshape(values[0].shape), values.shape)
     entries = (values.ravel(), (points.ravel(), columns.ravel()))

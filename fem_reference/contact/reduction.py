@@ -20,7 +20,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from fem_reference.contact.patch import patch
-from fem_reference.contact.touch import Answer, Grip, Touch
+from fem_reference.contact.touch import Answer, Grip, Touch, UnsettledError
 from fem_reference.direct import Solve
 from fem_reference.elasticity import Body
 from fem_reference.memory import factors_fit
@@ -111,7 +111,10 @@ def answered(
         solve = solve or _solver(body, columns)
         found = Answered(body, touch, solve, _solved(solve, touch.pushes))
         way = np.linspace(0.0, peak, 9)
-        grip = found.at_rest(displacement, found.free, way if peak > 0.0 else way[:1])
+        try:
+            grip = found.at_rest(displacement, found.free, way if peak > 0.0 else way[:1])
+        except UnsettledError:
+            break  # what comes of it shows where the motion ends
         deep = _beside(body, touch, found.moved(displacement, grip), peak)
         if deep <= OVERLOOKED * max(map(_travelled, tools, [times] * len(tools))):
             break

@@ -25,7 +25,9 @@ Bools = NDArray[np.bool_]
 
 ITERATIONS = 60
 HALVED_AFTER = 12
-"""Iterations that do not settle by then are taken half-way, and again."""
+"""After so many iterations they are taken half-way, after as many again a quarter, and so on."""
+ROUNDING = 1e-14
+"""[m]"""
 SETTLED = 1e-6
 """Change of the forces relative to the largest."""
 NEARLY = 1e-3
@@ -135,18 +137,21 @@ class Touch:
 
         `UnsettledError` if the iterations do not end.
         """
-        force, change, share = start.force, np.inf, 1.0
+        force, change = start.force, np.inf
+        # Below, forces move nothing by more than rounding does.
+        least = ROUNDING / max(float(answer.compliance.diagonal().max()), 1e-300)
         for k in range(ITERATIONS):
-            wanted = self._sought(answer, force, start, time)
-            largest = float(np.abs(wanted).max(initial=0.0))
-            step = wanted - force
-            change = float(np.abs(step).max(initial=0.0)) / max(largest, 1e-300)
-            share = 1.0 if k < HALVED_AFTER else 0.5
-            force = force + share * step
-            if largest == 0.0 or change <= SETTLED:
+            step = self._sought(answer, force, start, time) - force
+            largest = max(float(np.abs(force + step).max(initial=0.0)), least)
+            change = float(np.abs(step).max(initial=0.0)) / largest
+            force = force + 0.5 ** (k // HALVED_AFTER) * step
+            if change <= SETTLED or change * largest <= least:
                 break
-        if largest > 0.0 and change > NEARLY:
-            raise UnsettledError(f"the contact forces do not settle at {time:.4g} s")
+        if change > NEARLY and change * largest > least:
+            raise UnsettledError(
+                f"the contact forces do not settle at {time:.4g} s; reduce tool.displacement, or "
+                "reference.element_size"
+            )
         return Grip(force, self.means @ (answer.base + answer.lever @ force), time)
 
     def _sought(self, answer: Answer, force: Floats, start: Grip, time: float) -> Floats:

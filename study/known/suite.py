@@ -79,6 +79,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         large_strain,
         lattice_shapes,
         long_steps,
+        moved_tools,
         own_scene,
         rigid_tools,
     )
@@ -96,6 +97,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         elements,
         large_strain,
         inclusions,
+        moved_tools,
         fuzzy_readings,
         curves,
     ):
