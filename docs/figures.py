@@ -437,6 +437,45 @@ def corrected() -> Iterator[tuple[str, str]]:
     yield from _at_1_khz(costs)
 
 
+GRADED_HEAD = (
+    *("largest strain", "places", "region for 2 %", "lattice of 10 mm", "8 mm"),
+    *("corrected, 20 mm", "10 mm", "graded, to 0.6 radii", "to 1 radius"),
+)
+
+
+def graded() -> Iterator[tuple[str, str]]:
+    """Regions of interest and graded corrected lattices at places of the tool, and their cost."""
+    places, costs = measured("graded_places"), measured("graded_cost")
+    errors = [float(one["region_error"]) for one in places]
+    yield "graded-count", str(len(places))
+    yield "graded-kept", str(sum(error <= TOLERANCE for error in errors))
+    yield "graded-worst", percent(max(errors))
+    yield "graded-rest", span([float(one["region_apart"]) for one in places], percent)
+    yield "graded-nodes", span([float(one["region_nodes"]) for one in places], "{:.0f}".format)
+    near = [float(one["graded_near_nodes"]) for one in places]
+    yield "graded-near-nodes", span(near, "{:.0f}".format)
+    yield "graded-places", table(GRADED_HEAD, [_graded(places, *one) for one in STRAINS])
+    yield "graded-cost", table(GRADED_COST_HEAD, map(_graded_cost, costs))
+
+
+def _graded(lines: list[Line], words: str, above: float, up_to: float) -> list[str]:
+    """Median and worst of each column over the places of a range of strain."""
+    found = [line for line in lines if above < float(line["strain"]) <= up_to]
+    columns = (
+        *("region_error", "uniform_10", "uniform_8", "corrected_20", "corrected_10"),
+        *("graded_near_error", "graded_error"),
+    )
+    return [words, str(len(found)), *(_median_and_worst(found, name) for name in columns)]
+
+
+GRADED_COST_HEAD = ("lattice", "free nodes", "processor time of a simulated second", "of a step")
+
+
+def _graded_cost(line: Line) -> list[str]:
+    step = f"{float(line['step_us']):.0f} µs of {1e3 * float(line['step_s']):.2g} ms"
+    return [line["model"], line["nodes"], f"{float(line['per_second']):.2g} s", step]
+
+
 PLACES_HEAD = (
     *("largest strain", "places", "nonlinear part", "corrected, 20 mm", "15 mm", "10 mm", "8 mm"),
     *("corrected at rest only, 20 mm", "lattice alone, 10 mm", "5 mm"),
@@ -686,7 +725,7 @@ def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
-    models = (error_bar_livers, certified, tradeoff, corrected)
+    models = (error_bar_livers, certified, tradeoff, corrected, graded)
     groups = (*fuzzy, *lattice, *models, verification, validation, stability, ranking, organ)
     return {name: text for group in groups for name, text in group()}
 

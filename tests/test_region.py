@@ -11,6 +11,7 @@ from study.problem.rigid import SPHERE, RigidTool
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
+from tests.benchmarks import graded_places
 
 BLOCK = (
     'organ.size=["60 mm", "40 mm", "30 mm"]',
@@ -178,3 +179,31 @@ def test_a_budget_is_of_lattices_with_the_same_cells():
     words = ('models=["fem", "tissue", "region"]', "region.radius=8 mm")
     found = run_study(read_scene("block", (*BLOCK, *words)))
     assert [one.model for one in found.record.budgets] == ["tissue"]
+
+
+# --- at places of the tool on the liver -----------------------------------------------------------
+
+
+def test_places_on_the_liver_are_those_of_the_corrected_lattice():
+    """The table is committed; `tests.benchmarks.graded_places` writes it."""
+    others = {(one["at_x"], one["at_z"]): one for one in graded_places.known()}
+    rows = list(graded_places.kept().values())
+    assert len(rows) >= 12
+    for one in rows:
+        assert others[one.at_x, one.at_z]["own_10"] == pytest.approx(one.uniform_10)
+        assert one.region_apart <= graded_places.TOLERANCE
+
+
+def test_on_the_liver_motion_keeps_the_tolerance_of_rest():
+    rows = list(graded_places.kept().values())
+    assert all(one.region_error < 1.25 * graded_places.TOLERANCE for one in rows)
+    assert all(one.region_error < min(one.uniform_10, one.uniform_8) for one in rows)
+
+
+def test_on_the_liver_a_graded_correction_beats_one_of_more_nodes():
+    """In the median and at large strain, where what a coarse lattice adds is not small."""
+    rows = [one for one in graded_places.kept().values() if one.strain > 0.05]
+    gain = [one.corrected_10 / one.graded_error for one in rows]
+    assert np.median(gain) > 2.0
+    assert max(one.graded_error for one in rows) < max(one.corrected_10 for one in rows)
+    assert max(one.graded_nodes for one in rows) < 2525

@@ -80,7 +80,7 @@ class Cost(NamedTuple):
     """Processor time of a lattice's steps at the built-in place, the least of the turns.
 
     `spacing_m`: of the finest cells; `nodes` that do not hang; `per_second` [s]: of a simulated
-    second. A corrected lattice is timed with its linear parts.
+    second. Of a corrected lattice it is the coarse part alone.
     """
 
     model: str
@@ -173,9 +173,8 @@ def costs() -> list[Cost]:
     found = []
     for (name, one), stepper, timing in zip(ready.items(), steppers, timings, strict=True):
         step = float(timing.walls.mean(axis=1).min())
-        own = one if isinstance(one, PreparedLattice) else one.coarse
         cost = 1e6 * step, step / stepper.step
-        found.append(Cost(name, own.model.spacing, free(own), stepper.step, *cost))
+        found.append(Cost(name, one.model.spacing, free(one), stepper.step, *cost))
     return found
 
 
@@ -183,17 +182,12 @@ def lattices(given: Scene, problem: Problem) -> Iterator[tuple[str, PreparedLatt
     """By name."""
     for h in (0.01, 0.008, FINEST):
         yield f"uniform {1e3 * h:.3g} mm", lattice(given, "tissue", spacing=h).prepare(problem)
-    for tolerance in (TOLERANCE, 0.01):
-        one = lattice(given, "region", spacing=FINEST, tolerance=tolerance)
-        yield f"region {100 * tolerance:.3g} %", one.prepare(problem)
-    both = model(given, "corrected")
-    for h in (0.02, 0.01, 0.008):
-        chosen = both.varied(spacing=h, step_fraction=0.8)
-        yield f"corrected {1e3 * h:.3g} mm", chosen.prepare(problem)
+    one = lattice(given, "region", spacing=FINEST, tolerance=TOLERANCE)
+    yield f"region for {100 * TOLERANCE:.3g} %", one.prepare(problem)
     for reach in REACHES:
         radius = reach * given.tool.radius
-        chosen = both.varied(coarse="graded", spacing=FINEST, radius=radius, step_fraction=0.8)
-        yield f"corrected, graded to {1e3 * radius:.3g} mm", chosen.prepare(problem)
+        one = lattice(given, "region", spacing=FINEST, radius=radius)
+        yield f"graded to {1e3 * radius:.3g} mm", one.prepare(problem)
 
 
 def kept() -> dict[tuple[float, float], Row]:
