@@ -67,7 +67,7 @@ COARSER = 2
 """Meshes below that of the scene, as many as there are: three show the order of convergence."""
 GRADED = 3
 """Graded meshes at least, for the same reason."""
-MOST_HALVED = 8
+MOST_HALVED = 2
 """Times as many steps as usual, at most, that forces of contact may take."""
 FINER = 12
 """Levels above it that an accuracy may take, if they are not too large."""

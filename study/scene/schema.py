@@ -451,7 +451,8 @@ class Scene:
     def is_graded(self) -> bool:
         """Whether meshes of the reference are finer where the error comes from."""
         asked = self.reference.refinement
-        return asked == "graded" or (asked == "auto" and self.organ.mesh is not None)
+        grades = self.organ.mesh is not None or any(tool.is_moved for tool in self.tools)
+        return asked == "graded" or (asked == "auto" and grades)
 
     @property
     def is_point(self) -> bool:
