@@ -414,8 +414,8 @@ class StageRecord:
 class ToolForce:
     """Largest force [N] of a rigid tool on a model's body along its axis, when, and how deep.
 
-    `relative_error` of the force over time, L2, None where it is not estimated. `work_j`: what the
-    tool did on the body up to the end.
+    `relative_error` of the force over time, L2, None where it is not estimated: by the steps, of
+    finite elements by mesh and subspace too. `work_j`: what the tool did on the body up to the end.
     """
 
     model: str

@@ -9,7 +9,7 @@ import numpy as np
 from study.models.model import ModelRun
 from study.problem.response import Response, ToolCurve
 from study.problem.trajectory import Trajectory
-from study.results.records import ToolForce
+from study.results.records import ModelRecord, ToolForce
 from study.results.tables import ToolForceSample, ToolForceScore, pairs
 from study.similarity.score import TIME_HISTORY
 
@@ -67,8 +67,18 @@ def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator
                 peak_at_s=float(curve.time[peak]),
                 peak_travel_m=float(curve.travel[peak]),
                 work_j=_work(curve),
-                relative_error=run.record.tool_force_errors.get(tool.name),
+                relative_error=_relative_error(run.record, tool.name),
             )
+
+
+def _relative_error(record: ModelRecord, tool: str) -> float | None:
+    """Of a force over time: by steps of a lattice, by all that is estimated of elements."""
+    contact = None if record.elements is None else record.elements.contact
+    if contact is None or tool not in contact.forces:
+        return record.tool_force_errors.get(tool)
+    found = contact.forces[tool]
+    parts = (found.by_mesh, found.by_steps, found.by_subspace)
+    return None if found.by_mesh is None else sum(part or 0.0 for part in parts)
 
 
 def _work(curve: ToolCurve) -> float:

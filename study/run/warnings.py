@@ -31,7 +31,7 @@ def warnings(
 def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.elements is not None:
         if record.lattice is None:  # which adds what is not linear
-            yield from _of_linear(record, record.elements)
+            yield from _of_linear(scene, record, record.elements)
         yield from _of_mesh(scene, record.elements)
     if record.status == "diverged":
         yield (
@@ -79,18 +79,18 @@ def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
         )
 
 
-def _of_linear(record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+def _of_linear(scene: Scene, record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
     if strain is not None and strain > STRAIN_LIMIT:
         yield (
             f"The largest strain of {_name(record)} is {100 * strain:.1f} %; above "
             f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(elements)}. "
-            "Reduce tool.force or enlarge tool.radius."
+            f"{_less(scene)[:-1]} or enlarge tool.radius."
         )
     if rotation is not None and rotation > ROTATION_LIMIT:
         yield (
             f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
-            "it should not be trusted. Reduce tool.force or hold the organ better."
+            f"it should not be trusted. {_less(scene)[:-1]} or hold the organ better."
         )
 
 
