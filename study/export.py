@@ -99,10 +99,9 @@ def export(request: ExportRequest, progress: Progress) -> Path:
 
 
 def _refuse_unheld(to: str, scene: Scene) -> None:
-    """ValueError for what a format of one tissue on an elastic foundation has no place for."""
-    beyond = [name for name in ("inclusions", "fixed-surfaces") if name in scene.features]
-    if beyond and to not in MESHES:
-        what = " and ".join(FEATURES[name] for name in beyond)
+    """ValueError for what a format of one tissue, foundation and load has no place for."""
+    if scene.features and to not in (*MESHES, LATTICE):
+        what = " and ".join(FEATURES[name] for name in scene.features)
         raise ValueError(f"--to {to}: holds no {what}; use one of {', '.join(MESHES)}")
 
 

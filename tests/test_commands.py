@@ -370,3 +370,20 @@ def test_a_page_is_not_opened_that_is_not_made(typed):
     done = typed("run", "paper", "--open", "--no-html")
     assert done.returncode == 2
     assert "--open: opens report.html" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["recommend", "press", "--rate", "60 Hz"], "recommend: is of a single load"),
+        (["robustness", "press", "--size", "16"], "robustness: is of a single load"),
+        (["export", "press", "--to", "vtu"], "holds no rigid tools that are moved and gravity"),
+        (["run", "press", "--set", "require.error=2 %"], "require: is of a single load"),
+    ],
+)
+def test_a_study_of_a_single_load_refuses_more(typed, command, said):
+    """What cannot follow a scene says so at once, and writes nothing."""
+    ended = typed(*command)
+    assert ended.returncode == 2
+    assert said in " ".join(ended.stderr.split())
+    assert not list(Path().iterdir())

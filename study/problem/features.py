@@ -1,5 +1,9 @@
 """What a scene may ask beyond one load on a homogeneous, weightless body."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 FEATURES = {
     "moved-tools": "rigid tools that are moved",
     "several-loads": "several loads",
@@ -9,3 +13,17 @@ FEATURES = {
     "fixed-surfaces": "clamped or sliding supports",
 }
 """Names of what a model must be able to follow, in the words of a message."""
+
+BESIDE_ONE_LOAD = ("moved-tools", "several-loads", "gravity", "weights")
+"""Of these, what acts beside a single load of a given force."""
+
+
+def refuse_beside_one_load(features: Iterable[str], what: str) -> None:
+    """ValueError where a study that is of a single load is asked for more."""
+    present = set(features)
+    found = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in present]
+    if found:
+        raise ValueError(
+            f"{what}: is of a single load of a given force, and the scene has "
+            f"{' and '.join(found)}; leave these out, or use run"
+        )

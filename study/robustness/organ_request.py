@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.features import refuse_beside_one_load
 from study.results.tables import write_table
 from study.robustness import rows, summary
 from study.robustness.design import check_size
@@ -83,7 +84,9 @@ class OrganRequest:
     @cached_property
     def given(self) -> Plain:
         """The scene as every draw has it, as plain values. ValueError of one that will not do."""
-        return arguments(prepared(read_suited(self.scene, self.overrides)))
+        scene = read_suited(self.scene, self.overrides)
+        refuse_beside_one_load(scene.features, "robustness")
+        return arguments(prepared(scene))
 
     @cached_property
     def about(self) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msm.calibration import SPRING_POISSON_RATIO
 from study.annotation.choice import Choice
-from study.problem.features import FEATURES
+from study.problem.features import FEATURES, refuse_beside_one_load
 from study.problem.rigid import SLIDING
 from study.scene import graded
 from study.scene.law import SpringLaw
@@ -380,6 +380,10 @@ def _contact_contradictions(scene: Scene) -> Iterator[str]:
 
 def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
     """Wants that contradict each other, or that a single point has no part in."""
+    try:
+        refuse_beside_one_load(scene.features, "require")
+    except ValueError as error:
+        yield str(error)
     wanted = set(required.quantities)
     if not wanted & {"rest", "history"}:
         yield "require.quantities: name rest, history or both; field says where, not what"

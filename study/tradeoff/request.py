@@ -11,6 +11,7 @@ import numpy as np
 
 from study.folders import check_file, write_text
 from study.models.table import model
+from study.problem.features import refuse_beside_one_load
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.ready import set_up
@@ -73,6 +74,7 @@ def _ready(request: TradeoffRequest) -> Scene:
 
 def _set_up(scene: Scene) -> Problem:
     """The problem of a scene on which its reference can be solved. ValueError if it cannot."""
+    refuse_beside_one_load(scene.features, "tradeoff and recommend")
     problem = stated(**arguments(scene)).problem
     set_up([model(scene, "fem")], problem)
     return problem
