@@ -257,7 +257,7 @@ def test_results_on_a_mesh_that_is_no_more_are_refused(tmp_path, small_results):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("block", "--to", "abaqus"), "--to abaqus: use one of calculix, vtu, gmsh"),
+        (("block", "--to", "abaqus"), "--to abaqus: use one of calculix, vtu, lattice, gmsh"),
         (("paper", "--to", "vtu"), "organ.shape: a point has no finite elements"),
         (("no-such", "--to", "vtu"), "neither a file nor a built-in scene"),
         ((".", "--to", "vtu"), "no results here"),

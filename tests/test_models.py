@@ -395,7 +395,7 @@ def within(hint):
 CHOICES = {
     path: (choice, default)
     for path, choice, default in choices(Scene)
-    if not path.startswith("further_tools.")  # those of `tool`, in files as entries of its list
+    if not path.startswith("further_")  # those of `tool` and `support`, in files entries of lists
 }
 
 

@@ -280,7 +280,7 @@ def test_rate_of_what_does_not_move_is_refused():
 def moved(record, times, status="finished"):
     """A run of so many times a ramp at both control points."""
     curve = times * np.linspace(0.0, 1.0, 5)[:, None, None] * np.ones((5, 2, 3))
-    return ModelRun(Trajectory(curve, curve, curve, curve, status), record)
+    return ModelRun(Trajectory(curve, curve, curve, curve, status=status), record)
 
 
 def checked(scene, results, lattice, **required):

@@ -117,7 +117,10 @@ def _rigid(name: str, tool: Tool, surface: SurfaceMesh, rule: SurfaceRule) -> Ri
     )
     if bonded:
         return placed
-    first = placed.touching(rule.points, rule.normals)
+    # The place itself too: points of the rule lie round it, and a sphere would sink in between.
+    points = np.vstack([rule.points, patch.centre])
+    normals = np.vstack([rule.normals, -patch.direction])
+    first = placed.touching(points, normals)
     return replace(first, tip=first.tip - tool.clearance * patch.direction)
 
 
