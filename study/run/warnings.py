@@ -36,7 +36,7 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.status == "diverged":
         yield (
             f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
-            f"{_remedy(scene)}"
+            f"{_remedy(scene, record)}"
         )
     if record.inverted_cells:
         yield (
@@ -121,11 +121,17 @@ def _at_large_strain(elements: ElementsRecord) -> str:
     return f", and at rest it differs by {share:.1f} % from a {found.law} solid"
 
 
-def _remedy(scene: Scene) -> str:
+def _remedy(scene: Scene, record: ModelRecord) -> str:
     """What keeps a run from diverging."""
+    if record.lattice is None and _moved(scene):  # elements, whose contact did not settle
+        return "Move the tools less far, or reduce reference.element_size."
     lattice = scene.lattice
     for key, value in (("time_step", lattice.time_step), ("step_rate", lattice.step_rate)):
         if value is not None:
             verb = "Shorten" if key == "time_step" else "Raise"
             return f"{verb} lattice.{key}, or leave it out so that steps follow the limit."
-    return "Reduce lattice.step_fraction or the load."
+    return (
+        f"Reduce lattice.step_fraction. {_less(scene)}"
+        if _moved(scene)
+        else "Reduce lattice.step_fraction or the load."
+    )
