@@ -57,7 +57,11 @@ def pivots(matrix: csc_array) -> Pivots:
     return Pivots(int((pivot < 0.0).sum()), bool(in_place), entries * EPSILON * largest)
 
 
-def _factors(matrix: csc_array) -> Any:
+def symmetric_factors(matrix: csc_array) -> Any:
+    """Sparse factors by symmetric elimination, whose pivots have the signs of the eigenvalues.
+
+    None if the matrix is singular.
+    """
     try:
         return splu(
             csc_array(matrix),
@@ -66,4 +70,11 @@ def _factors(matrix: csc_array) -> Any:
             options={"SymmetricMode": True},
         )
     except RuntimeError:
-        raise ValueError("the stiffness is singular: the support does not hold the body") from None
+        return None
+
+
+def _factors(matrix: csc_array) -> Any:
+    found = symmetric_factors(matrix)
+    if found is None:
+        raise ValueError("the stiffness is singular: the support does not hold the body")
+    return found

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
+from fem_reference.direct import symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
 
@@ -127,7 +127,7 @@ def solve_linear(body: MixedSolid, drive: Drive) -> DrivenState:
     free = _free(body, drive)
     w[: body.size] = np.where(drive.free, 0.0, drive.prescribed.ravel())
     forces = _load(body, drive, 1.0)
-    factors = _factorised(matrix[free][:, free])
+    factors = symmetric_factors(matrix[free][:, free])
     if factors is None:
         raise ValueError("the stiffness is singular: nothing holds the body")
     w[free] = factors.solve((forces - matrix @ w)[free])
@@ -211,7 +211,7 @@ def _rest(body: MixedSolid, drive: Drive, start: _Rest, factor: float) -> _Rest:
         behind[held] = goal - w[held]
         residuals.append(_unbalanced(body, lacking, free) / _scale(body, lacking, factor, drive))
         matrix = body.tangent(w)
-        factors = _factorised(matrix[free][:, free])
+        factors = symmetric_factors(matrix[free][:, free])
         if residuals[-1] <= TOLERANCE and not behind.any():
             # On the way an indefinite tangent is no harm; at rest the body would leave it.
             failure = "" if _is_stable(factors, body.pressures) else "the body gives way"
@@ -268,22 +268,6 @@ def _step_length(
                 break
         length = 0.5 * length if length > SHORTEST_STEP else 0.0
     return length
-
-
-def _factorised(matrix: csc_array) -> Any:
-    """Sparse factors by symmetric elimination, whose pivots have the signs of the eigenvalues.
-
-    None if the matrix is singular.
-    """
-    try:
-        return splu(
-            csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
 
 
 def _is_stable(factors: Any, pressures: int) -> bool:

@@ -110,11 +110,11 @@ def _drawing_alike() -> Iterator[None]:
     It draws from numpy's global generator, which is left as it was.
     """
     before = np.random.get_state()  # noqa: NPY002 - the one that pyamg draws from
-    np.random.seed(0)  # noqa: NPY002
+    np.random.seed(0)  # noqa: NPY002 - as above
     try:
         yield
     finally:
-        np.random.set_state(before)  # noqa: NPY002
+        np.random.set_state(before)  # noqa: NPY002 - as above
 
 
 def rigid_motions(points: Floats) -> Floats:

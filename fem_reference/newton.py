@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
+from fem_reference.direct import symmetric_factors
 from fem_reference.driven import Drive, DrivenState, solve_driven
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
@@ -193,7 +192,7 @@ def _rest(problem: HyperelasticSolid, start: Floats, factor: float) -> _Rest:
     while len(residuals) <= MOST_ITERATIONS:
         unbalanced = load - problem.internal_force(u)
         residuals.append(float(np.linalg.norm(unbalanced) / np.linalg.norm(load)))
-        factors = _factorised(problem.tangent(u))
+        factors = symmetric_factors(problem.tangent(u))
         if residuals[-1] <= TOLERANCE:
             # On the way an indefinite tangent is no harm; at rest the body would leave it.
             failure = "" if _definite(factors) else "the body gives way"
@@ -224,22 +223,6 @@ def _step_length(
                 break
         length = 0.5 * length if length > SHORTEST_STEP else 0.0
     return length
-
-
-def _factorised(matrix: csc_array) -> Any:
-    """Sparse factors by symmetric elimination, whose pivots have the signs of the eigenvalues.
-
-    None if the matrix is singular.
-    """
-    try:
-        return splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
 
 
 def _solution(factors: Any, force: Floats) -> Floats:

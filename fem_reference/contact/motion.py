@@ -16,6 +16,7 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.contact.reduction import Answered, Factors, Reduced, answered, krylov, reduced
@@ -149,11 +150,11 @@ class Sampled:
         return np.array([given.touch.on_tools(one.grip.force) for one in self.states])
 
 
-def _seen(matrix: object, vectors: Floats) -> Floats:
+def _seen(matrix: csr_array, vectors: Floats) -> Floats:
     """Of vectors (n, m) at probes (p, 3, m)."""
     count = vectors.shape[1]
     nodal = vectors.reshape(-1, 3 * count)
-    return np.asarray(matrix @ nodal).reshape(-1, 3, count)  # type: ignore[operator]
+    return np.asarray(matrix @ nodal).reshape(-1, 3, count)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,6 +59,8 @@ def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator
     for model, run in runs.items():
         for number, tool in enumerate(response.tools):
             curve = response.tool_curve(run.trajectory, number)
+            if np.isnan(curve.force).all():  # lost before it was looked at
+                continue
             peak = int(np.nanargmax(np.abs(curve.force)))
             yield ToolForce(
                 model=model,
@@ -77,8 +79,9 @@ def _relative_error(record: ModelRecord, tool: str) -> float | None:
     if contact is None or tool not in contact.forces:
         return record.tool_force_errors.get(tool)
     found = contact.forces[tool]
-    parts = (found.by_mesh, found.by_steps, found.by_subspace)
-    return None if found.by_mesh is None else sum(part or 0.0 for part in parts)
+    if found.by_mesh is None or found.by_steps is None:
+        return None
+    return found.by_mesh + found.by_steps + (found.by_subspace or 0.0)
 
 
 def _work(curve: ToolCurve) -> float:

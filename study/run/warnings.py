@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
@@ -55,10 +56,18 @@ def _moved(scene: Scene) -> list[Tool]:
     return [tool for tool in scene.tools if tool.is_moved]
 
 
+def _travel(tool: Tool) -> float:
+    """How far a tool is moved at most [m]."""
+    if tool.displacement is not None:
+        return abs(tool.displacement)
+    ways = ((point.travel,) if point.offset is None else point.offset for point in tool.path)
+    return max(math.hypot(*(part or 0.0 for part in way)) for way in ways)
+
+
 def _of_tools(scene: Scene, record: ModelRecord) -> Iterator[str]:
     """Tools that the body overlaps, or that a lattice is too coarse for."""
     for tool in _moved(scene):
-        travel, overlap = abs(tool.displacement or 0.0) or tool.radius, record.tool_overlap_m or 0.0
+        travel, overlap = _travel(tool) or tool.radius, record.tool_overlap_m or 0.0
         if overlap > OVERLAP * travel:
             yield (
                 f"The body of {record.name} overlaps its tools by up to {1e3 * overlap:.2g} mm, "
