@@ -1,5 +1,6 @@
 """The liver's fuzzy system: five aetiologies in, one stiffness out, everything in kPa."""
 
+from dataclasses import replace
 from functools import lru_cache
 from math import hypot
 
@@ -16,11 +17,11 @@ from fuzzy.liver.readings import disease_sets, reading_named
 from fuzzy.liver.rules import rule_base
 from fuzzy.liver.settings import FOOTPRINTS, NO_READING, LiverSettings
 from fuzzy.liver.table1 import AETIOLOGIES
+from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Variable
 
 
-@lru_cache(maxsize=64)
 def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES) -> FuzzySystem:
     """The fuzzy system of Table I over the elastography sets, in kPa.
 
@@ -28,6 +29,12 @@ def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES
     ValueError for an unknown disease, or if no antecedent is left.
     """
     _require_known(present)
+    return _built(replace(settings, options=InferenceOptions()), present)
+
+
+@lru_cache(maxsize=128)
+def _built(settings: LiverSettings, present: tuple[str, ...]) -> FuzzySystem:
+    """Kept, for tens of thousands of rules take a while; how they are evaluated plays no part."""
     if settings.base.follows:
         return following_system(placement(settings.knowledge), settings, present)
     records = _input_records(settings)

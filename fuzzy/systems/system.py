@@ -5,15 +5,20 @@ with the same consequent meet only through their strengths, since max_r min(w_r,
 min(max_r w_r, mu(y)), so they are merged to one height per output set before the output is sampled.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
+from itertools import chain
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fuzzy.systems.sets import FUNCTION_KINDS, Array, FuzzySet
 
+Indices = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 Membership = Callable[[FuzzySet, Array], Array]
 Connective = Literal["and", "or"]
 
@@ -101,6 +106,18 @@ class Rule:
             raise ValueError(f"rule connective {self.connective!r}: use and, or")
 
 
+class RulesAlike(NamedTuple):
+    """Rules of one connective and number of terms, by index, whose strengths are found together.
+
+    `terms`: for each term in turn, its input, its set, and whether it is negated, in every rule.
+    """
+
+    connective: Connective
+    rules: Indices
+    weights: Array
+    terms: tuple[tuple[Indices, Indices, Booleans], ...]
+
+
 @dataclass(frozen=True)
 class Operators:
     """AND, OR, implication, aggregation and defuzzification, by MATLAB's names.
@@ -150,13 +167,17 @@ class FuzzySystem:
         _check_output(self.output)
         if not self.rules:
             raise ValueError("the system has no rules: give at least one")
-        for number, rule in enumerate(self.rules, start=1):
-            if not _fits(rule, self):
-                raise ValueError(
-                    f"rule {number}: {rule} names an input or a set the system does not have"
-                )
+        _check_rules(self)
         _check_kinds(self)
         _check_operators(self)
+
+    @cached_property
+    def rules_alike(self) -> tuple[RulesAlike, ...]:
+        """The rules in groups: one at a time, thousands of them would be slow."""
+        groups = defaultdict[tuple[Connective, int], list[int]](list)
+        for number, rule in enumerate(self.rules):
+            groups[rule.connective, len(rule.antecedents)].append(number)
+        return tuple(_alike(self.rules, connective, n) for (connective, _), n in groups.items())
 
     @property
     def is_sugeno(self) -> bool:
@@ -164,12 +185,33 @@ class FuzzySystem:
         return self.output.sets[0].kind in FUNCTION_KINDS
 
 
-def _fits(rule: Rule, system: FuzzySystem) -> bool:
-    known = all(
-        0 <= term.input < len(system.inputs) and 0 <= term.set < len(system.inputs[term.input].sets)
-        for term in rule.antecedents
+def _alike(rules: Sequence[Rule], connective: Connective, numbers: list[int]) -> RulesAlike:
+    alike = [rules[n] for n in numbers]
+    flat = np.fromiter(chain.from_iterable(chain.from_iterable(r.antecedents for r in alike)), int)
+    terms = flat.reshape(len(alike), -1, len(Term._fields))
+    return RulesAlike(
+        connective,
+        np.array(numbers),
+        np.array([rule.weight for rule in alike]),
+        tuple((one[:, 0], one[:, 1], one[:, 2].astype(bool)) for one in terms.swapaxes(0, 1)),
     )
-    return bool(rule.antecedents) and known and 0 <= rule.consequent < len(system.output.sets)
+
+
+def _check_rules(system: FuzzySystem) -> None:
+    counts = np.array([len(variable.sets) for variable in system.inputs])
+    outputs = len(system.output.sets)
+    fit = np.array([0 <= rule.consequent < outputs for rule in system.rules])
+    for group in system.rules_alike:
+        fit[group.rules] &= bool(group.terms)  # every rule has an antecedent
+        for inputs, sets, _ in group.terms:
+            known = (inputs >= 0) & (inputs < len(counts))
+            of_input = np.where(known, inputs, 0)
+            fit[group.rules] &= known & (sets >= 0) & (sets < counts[of_input])
+    for number in np.flatnonzero(~fit):
+        raise ValueError(
+            f"rule {number + 1}: {system.rules[number]} names an input or a set the system does "
+            "not have"
+        )
 
 
 def _check_output(output: Variable) -> None:
@@ -242,29 +284,37 @@ def firing_strengths(
     """
     degrees = _degrees(system, X, membership)
     others = degrees if opposite is None else _degrees(system, X, opposite)
-    return np.array([_strength(rule, degrees, others, system.operators) for rule in system.rules])
+    strengths = np.empty((len(system.rules), len(X)))
+    for group in system.rules_alike:
+        join = _join(group.connective, system.operators)
+        terms = (_of_terms(*term, degrees, others) for term in group.terms)
+        strengths[group.rules] = group.weights[:, None] * reduce(join, terms)
+    return strengths
 
 
 def _degrees(system: FuzzySystem, X: Array, membership: Membership) -> list[Array]:
     return [memberships(variable, X[:, i], membership) for i, variable in enumerate(system.inputs)]
 
 
-def _strength(rule: Rule, degrees: list[Array], others: list[Array], operators: Operators) -> Array:
-    terms = [
-        1.0 - others[t.input][t.set] if t.negated else degrees[t.input][t.set]
-        for t in rule.antecedents
-    ]
-    return rule.weight * _joined(terms, rule.connective, operators)
+def _of_terms(
+    inputs: Indices, sets: Indices, negated: Booleans, degrees: list[Array], others: list[Array]
+) -> Array:
+    """Degree of one term of each of several rules, shape (rules, N)."""
+    found = np.empty((len(inputs), max(one.shape[-1] for one in degrees)))
+    for i in np.unique(inputs):
+        plain, opposed = (np.flatnonzero((inputs == i) & which) for which in (~negated, negated))
+        found[plain] = degrees[i][sets[plain]]
+        found[opposed] = 1.0 - others[i][sets[opposed]]
+    return found
 
 
-def _joined(terms: Sequence[Array], connective: Connective, operators: Operators) -> Array:
+def _join(connective: Connective, operators: Operators) -> Callable[[Array, Array], Array]:
     if connective == "and":
-        join = np.minimum if operators.conjunction == "min" else np.multiply
-        return np.asarray(join.reduce(terms))
+        return np.minimum if operators.conjunction == "min" else np.multiply
     if operators.disjunction == "max":
-        return np.asarray(np.maximum.reduce(terms))
+        return np.maximum
     # Folded, for 1 - (1 - a)(1 - b) would lose the digits of small degrees.
-    return np.asarray(reduce(lambda a, b: a + b * (1.0 - a), terms))
+    return lambda a, b: a + b * (1.0 - a)
 
 
 def merged(system: FuzzySystem, strengths: Array, merge: str = "max") -> Array:
