@@ -21,6 +21,7 @@ from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, S
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.mesh.tetrahedra import volumes
+from study.models.at_depth import AtDepth
 from study.models.errors import (
     place,
     rounding_checks,
@@ -343,7 +344,10 @@ class PreparedLattice:
         return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
 
     def stepper(self) -> Stepper:
-        """The lattice at rest; between its steps the limit is looked at as often as in a run."""
+        """The lattice at rest; between its steps the limit is looked at as often as in a run.
+
+        Under tools that are moved it restarts where they are deepest.
+        """
         lattice = self.model.lattice
         motion = LatticeStepper(
             self.assembly,
@@ -354,6 +358,11 @@ class PreparedLattice:
             single=self.single,
         )
         dt = _step(lattice, motion.limit_at_rest)
+        if self.problem.rigid_tools:
+            seen = self.problem.observation
+            deep = AtDepth(motion, float(seen.times[seen.frames[0]]), partial(_step, lattice))
+            steps = deep.take_step, motion.u.copy, dt, motion.u.size, deep.advance, deep.restart
+            return Stepper(*steps)
         return Stepper(
             partial(motion.take_step, dt),
             motion.u.copy,

@@ -25,8 +25,8 @@ COARSER = 2.0
 """Spacing of the lattice that tells the error, times that of the one whose error it is."""
 ORDER = 1.0
 """Assumed of two lattices. Estimates so are 0.5 to 2.7 times the error: docs/tools.md."""
-ORDERS = (0.25, 3.0)
-"""Between which a fit seeks one."""
+ORDERS = (0.5, 1.5)
+"""Between which a fit seeks one: beyond, lattices are too coarse to show any."""
 TINY = 1e-300
 
 
@@ -42,7 +42,7 @@ def spacing_errors(
     share = 1.0 / (COARSER**ORDER - 1.0)
     apart = relative_l2_of_curves(coarse.displacement - fine.displacement, fine.displacement)
     tools = [tool.name for tool in problem.rigid_tools]
-    force = share * force_differences(problem, coarse, fine)
+    force = share * force_differences(problem, coarse.tool_force, fine.tool_force)
     return SpacingErrors(
         coarser_m=COARSER * spacing,
         order=ORDER,
@@ -52,11 +52,14 @@ def spacing_errors(
     )
 
 
-def force_differences(problem: Problem, one: Trajectory, other: Trajectory) -> Floats:
-    """Relative differences (2, tools) of forces: in L2 over time, and of the largest by axis."""
+def force_differences(problem: Problem, one: Floats, other: Floats) -> Floats:
+    """Relative differences (2, tools) of forces [N] (samples, tools, 3) from others.
+
+    In L2 over time, and of the largest along each tool's axis.
+    """
     found = np.zeros((2, len(problem.rigid_tools)))
     for i, tool in enumerate(problem.rigid_tools):
-        a, b = one.tool_force[:, i], other.tool_force[:, i]
+        a, b = one[:, i], other[:, i]
         found[0, i] = np.linalg.norm(a - b) / max(float(np.linalg.norm(b)), TINY)
         most = np.abs(b @ tool.axis).max()
         found[1, i] = abs(np.abs(a @ tool.axis).max() - most) / max(float(most), TINY)
