@@ -70,7 +70,8 @@ def _force(one: ToolForce) -> str:
     """With the error of the whole curve, which is relative to all of it."""
     if one.relative_error is None:
         return significant(one.peak_n)
-    return with_error(one.peak_n, abs(one.peak_n) * one.relative_error)
+    error = one.relative_error + (one.spacing_error or 0.0)
+    return with_error(one.peak_n, abs(one.peak_n) * error)
 
 
 def _scores(results: Results, one: ToolForce) -> str:

@@ -43,8 +43,9 @@ class MeasuredCost:
 class MeasuredConfiguration:
     """Accuracy and cost of a configuration of a trade-off study, a line of its table.
 
-    `error`: of the field, None where there is none or it is not resolved; `bar`: the reference's
-    own error; `cost`: None for one that was not timed. `on_front`: whether
+    `error`: of the field, or of the force of tools that are moved (`of_force`), None where there is
+    none or it is not resolved; `bar`: own error of what it is compared with; `cost`: None for one
+    that was not timed. `on_front`: whether
     the study found it on the Pareto front of all, `on_any_load_front` on that of those that follow
     any load.
     """
@@ -59,6 +60,7 @@ class MeasuredConfiguration:
     error: float | None
     bar: float
     cost: MeasuredCost | None
+    of_force: bool = False
 
     @property
     def name(self) -> str:
@@ -86,6 +88,7 @@ def configurations(folder: Traversable | None = None) -> list[MeasuredConfigurat
 
 
 def _configuration(line: Line) -> MeasuredConfiguration:
+    judged = "force" if line.get("force_error_bar") else "field"
     return MeasuredConfiguration(
         contender=line["contender"],
         settings=line["configuration"],
@@ -94,9 +97,10 @@ def _configuration(line: Line) -> MeasuredConfiguration:
         any_load=line["any_load"] == "True",
         on_front=line["pareto"] == "True",
         on_any_load_front=line["pareto_any_load"] == "True",
-        error=float(line["field_error"]) if line["field_error"] else None,
-        bar=float(line["field_error_bar"]),
+        error=float(line[f"{judged}_error"]) if line[f"{judged}_error"] else None,
+        bar=float(line[f"{judged}_error_bar"]),
         cost=_cost(line) if line["wall_per_s"] else None,
+        of_force=judged == "force",
     )
 
 

@@ -87,7 +87,8 @@ def _draw_whole(axes: Axes, shown: Sequence[MeasuredConfiguration], looks: Style
     axes.axvline(1.0, color="black", linewidth=0.8)
     _note(axes, "real time", (1.0, 1.0), ("data", "axes fraction"))
     axes.set(xscale="log", yscale="log", xlabel="wall time per simulated second [s/s]")
-    axes.set_ylabel("error of the displacement field [%]")
+    of = "force of the tools" if any(one.of_force for one in shown) else "displacement field"
+    axes.set_ylabel(f"error of the {of} [%]")
     axes.xaxis.set_major_formatter(_plain)
     _shade_unresolved(axes, shown)
 

@@ -21,7 +21,6 @@ from study.models.model import SILENT, ModelKind, Watch
 from study.models.table import MODELS, kind, model, models_of, references
 from study.problem.history import HISTORIES
 from study.run import study as running
-from study.run.stated import arguments, stated
 from study.run.study import run_study
 from study.scene import Patient, Scene
 from study.scene.file import SceneError, read_scene, resolved, validate
@@ -29,9 +28,8 @@ from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import How
 from study.sweep.store import Store
-from study.tradeoff import recommend, reference
+from study.tradeoff import recommend
 from study.tradeoff import study as study_module
-from study.tradeoff.errors import errors
 from study.tradeoff.lineup import Configuration
 from study.tradeoff.problem import sampled
 from study.tradeoff.table import Cost
@@ -241,10 +239,10 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
     spacing = 0.0125
     settings = {"spacing": spacing, "volume_term": True, "step_fraction": 0.8}
     chosen = Configuration("volume-springs", settings)
-    outcomes = study_module.solved(sampled(scene), [chosen], Store(tmp_path / "runs"), How())
-    given = stated(**arguments(sampled(scene)))
-    known = reference.truth(outcomes[0].value, given)
-    measured = errors(outcomes[1], known, given)
+    judge, (outcome,) = study_module.judged(
+        sampled(scene), [chosen], Store(tmp_path / "runs"), How()
+    )
+    known, measured = judge.reference, judge.errors(chosen, outcome)
     assert measured.status == "resolved"
 
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))

@@ -120,4 +120,4 @@ def test_other_settings_of_a_model_are_in_double_precision_unless_they_say_so():
 
 def test_a_promise_of_single_precision_has_its_rounding_in_its_bar():
     fit = Fit(1.0, 1.0, 0.1, 0.01)
-    assert fit.promise(0.2, 0.05).bar == pytest.approx(fit.promise(0.2).bar + 0.05)
+    assert fit.promise(0.2).rounded(0.05).bar == pytest.approx(fit.promise(0.2).bar + 0.05)

@@ -50,6 +50,15 @@ def test_the_largest_force_has_an_error_by_steps_and_work_that_is_not_negative(r
         assert one.work_j >= 0.0
 
 
+def test_the_error_of_a_force_by_the_spacing_is_the_change_from_a_coarser_lattice(results):
+    for one in results.record.tools:
+        errors = results.model(one.model).spacing_errors
+        assert (errors.coarser_m, errors.order) == (0.04, 1.0)
+        assert one.spacing_error == errors.tool_force["tool"] > 0.1
+        assert errors.peak_force["tool"] > 0.0
+        assert set(errors.displacement) == set(results.record.probes)
+
+
 def test_a_force_is_scored_against_the_reference_by_both_measures(results):
     rows = [(row.model, row.reference, row.curve, row.measure) for row in results.tool_scores]
     assert rows == [

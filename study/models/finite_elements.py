@@ -200,8 +200,11 @@ class PreparedElements:
         system = Oscillator(body.mass, body.stiffness, body.loads, self.model.damping)
         motion = SteppedMotion(system, self.problem.factors, step)  # at rest, and the factors
 
+        sag = fem.start_of(body)
+
         def displacement() -> Floats:
-            return motion.displacement.reshape(-1, 3)
+            u = motion.displacement if sag is None else motion.displacement + sag
+            return u.reshape(-1, 3)
 
         return Stepper(motion.take_step, displacement, step, body.stiffness.size)
 

@@ -21,6 +21,7 @@ from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, S
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.mesh.tetrahedra import volumes
+from study.models.at_depth import AtDepth
 from study.models.errors import (
     place,
     rounding_checks,
@@ -32,13 +33,20 @@ from study.models.errors import (
 from study.models.keeping import OnSample, checkpoint, recorded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.models.region_size import Sized, Wanted, sized
+from study.models.spacing_error import COARSER, spacing_errors
 from study.models.touching import touchable
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
-from study.results.records import Check, CurveErrors, LatticeRecord, ModelRecord
+from study.results.records import (
+    Check,
+    CurveErrors,
+    LatticeRecord,
+    ModelRecord,
+    SpacingErrors,
+)
 from study.scene import Lattice, Scene, graded
 
 Floats = NDArray[np.float64]
@@ -104,6 +112,11 @@ class LatticeModel:
             self.lattice, springs="lattice", precision="double", time_step=None, step_rate=None
         )
         return replace(self, scene=replace(scene, lattice=replace(free, **settings)))
+
+    def with_spacing(self, spacing: float) -> Self:
+        """The same on cells of another edge [m]."""
+        lattice = replace(self.lattice, spacing=spacing)
+        return replace(self, scene=replace(self.scene, lattice=lattice))
 
     def prepare(self, problem: Problem) -> PreparedLattice:
         """The lattice on the organ, and its springs."""
@@ -310,11 +323,14 @@ class PreparedLattice:
             names = tuple(tool.name for tool in self.problem.rigid_tools)
             forces = tool_force_errors(order, names, found.trajectory, sound)
             record = replace(record, tool_force_errors=forces)
+        by_spacing, why = self._by_spacing(found, watch) if finished else (None, ())
+        record = replace(record, spacing_errors=by_spacing)
         checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
         if finished and self.single:
             checks += tuple(rounding_checks(self.model.name, rounding))
         bounds = self._bounds(watch)
-        return ModelRun(found.trajectory, record, checks, self._lost_bounds(bounds), bounds, sound)
+        notes = (*why, *self._lost_bounds(bounds))
+        return ModelRun(found.trajectory, record, checks, notes, bounds, sound)
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
@@ -328,7 +344,10 @@ class PreparedLattice:
         return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
 
     def stepper(self) -> Stepper:
-        """The lattice at rest; between its steps the limit is looked at as often as in a run."""
+        """The lattice at rest; between its steps the limit is looked at as often as in a run.
+
+        Under tools that are moved it restarts where they are deepest.
+        """
         lattice = self.model.lattice
         motion = LatticeStepper(
             self.assembly,
@@ -339,6 +358,11 @@ class PreparedLattice:
             single=self.single,
         )
         dt = _step(lattice, motion.limit_at_rest)
+        if self.problem.rigid_tools:
+            seen = self.problem.observation
+            deep = AtDepth(motion, float(seen.times[seen.frames[0]]), partial(_step, lattice))
+            steps = deep.take_step, motion.u.copy, dt, motion.u.size, deep.advance, deep.restart
+            return Stepper(*steps)
         return Stepper(
             partial(motion.take_step, dt),
             motion.u.copy,
@@ -364,6 +388,26 @@ class PreparedLattice:
         with watch.progress.stage(f"{name}: halved steps") as advance:
             step = Counts(2 * found.substeps)
             return self._march(step, advance, watch, f"{name}-halved").trajectory
+
+    def _by_spacing(self, found: Run, watch: Watch) -> tuple[SpacingErrors | None, tuple[str, ...]]:
+        """Errors by the spacing, from a coarser lattice, or why there are none.
+
+        Of those under more than one load of a given force, which no reference may follow.
+        """
+        model = self.model
+        if not self.problem.is_burdened or model.graded or model.lattice.springs != "lattice":
+            return None, ()
+        try:
+            coarser = model.with_spacing(COARSER * model.spacing).prepare(self.problem)
+            with watch.progress.stage(f"{model.name}: coarser lattice") as advance:
+                step = asked_step(model.lattice)
+                coarse = coarser._march(step, advance, watch, f"{model.name}-coarser").trajectory
+        except ValueError as error:  # so coarse that a support or a load misses it
+            return None, (_unknown_by_spacing(model, str(error)),)
+        errors = spacing_errors(self.problem, model.spacing, coarse, found.trajectory)
+        if errors is None:
+            return None, (_unknown_by_spacing(model, "the coarser lattice diverged"),)
+        return errors, ()
 
     def _rounding(self, found: Run, watch: Watch) -> dict[str, CurveErrors]:
         """What single precision costs, by the same steps in double; empty for steps in double."""
@@ -476,6 +520,10 @@ class PreparedLattice:
         if self.model.lattice.springs == "tetrahedra":
             return float(self.assembly.mass.mean())
         return self.problem.tissue.density * self.model.spacing**3
+
+
+def _unknown_by_spacing(model: LatticeModel, why: str) -> str:
+    return f"The error of {model.name} by its spacing is not estimated: {why}."
 
 
 def _mass_of(problem: Problem) -> float:

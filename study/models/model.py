@@ -69,7 +69,8 @@ class Stepper:
 
     `take_step()` goes one step on, as a run does it, with all that a run does between steps;
     `take_bare_steps(count)` goes on without what is between them, None where there is nothing.
-    `restart()` puts it at rest again, where what a step costs depends on the motion.
+    `restart()` puts it at rest again, where what a step costs depends on the motion, or where tools
+    that are moved are deepest.
     `displacement()` [m] (n, 3) of the nodes is the state that is delivered. `step` [s]; `unknowns`:
     components of displacement, or coordinates of a superposition, which every step turns into
     displacements. `bound()` [m] (probes,): of what the displacement delivered at the control points

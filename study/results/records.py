@@ -175,6 +175,22 @@ class LatticeRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SpacingErrors:
+    """Estimated errors of a lattice by its spacing, from the same motion on a coarser one.
+
+    By Richardson's extrapolation from a lattice of `coarser_m`, with an assumed `order`; relative
+    L2 of the displacement by control point, of the force of each moved tool over time, and of the
+    largest force. Of the discretisation alone: what springs cannot do at any spacing is not in it.
+    """
+
+    coarser_m: float
+    order: float
+    displacement: dict[str, float]
+    tool_force: dict[str, float] = field(default_factory=dict)
+    peak_force: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
 class CorrectionRecord:
     """What only a corrected lattice has: its coarse lattice, and what that leaves uncertain.
 
@@ -209,7 +225,8 @@ class ModelRecord:
     `small_strain_modulus_pa`: Young's modulus it has at small strain; `time_step_errors`: by
     control point, empty where they are not estimated. `tool_force_errors`: relative L2 error of
     the force of each rigid tool, by steps and mesh as far as they are estimated; `tool_overlap_m`:
-    deepest overlap of body and tools, None without tools.
+    deepest overlap of body and tools, None without tools. `spacing_errors`: of a lattice under more
+    than one load of a given force, None where they are not estimated.
     """
 
     name: str
@@ -235,6 +252,7 @@ class ModelRecord:
     correction: CorrectionRecord | None = None
     tool_force_errors: dict[str, float] = field(default_factory=dict)
     tool_overlap_m: float | None = None
+    spacing_errors: SpacingErrors | None = None
 
     @property
     def parts(self) -> int | None:
@@ -415,7 +433,9 @@ class ToolForce:
     """Largest force [N] of a rigid tool on a model's body along its axis, when, and how deep.
 
     `relative_error` of the force over time, L2, None where it is not estimated: by the steps, of
-    finite elements by mesh and subspace too. `work_j`: what the tool did on the body up to the end.
+    finite elements by mesh and subspace too. `work_j`: what the tool did on the body up to the
+    end. `spacing_error` of the force over time by a lattice's spacing, estimated from a coarser
+    one; None of other models and where it is not estimated.
     """
 
     model: str
@@ -425,6 +445,7 @@ class ToolForce:
     peak_travel_m: float
     work_j: float
     relative_error: float | None
+    spacing_error: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -70,6 +70,7 @@ def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator
                 peak_travel_m=float(curve.travel[peak]),
                 work_j=_work(curve),
                 relative_error=_relative_error(run.record, tool.name),
+                spacing_error=_spacing_error(run.record, tool.name),
             )
 
 
@@ -82,6 +83,11 @@ def _relative_error(record: ModelRecord, tool: str) -> float | None:
     if found.by_mesh is None or found.by_steps is None:
         return None
     return found.by_mesh + found.by_steps + (found.by_subspace or 0.0)
+
+
+def _spacing_error(record: ModelRecord, tool: str) -> float | None:
+    errors = record.spacing_errors
+    return None if errors is None else errors.tool_force[tool]
 
 
 def _work(curve: ToolCurve) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from study.problem.features import FEATURES
 from study.scene.schema import Lattice, Scene
 
 
@@ -21,6 +22,9 @@ def contradictions(scene: Scene) -> Iterator[str]:
     if not has_graded(scene):
         return
     yield from unfit(scene.lattice)
+    if scene.features:
+        what = " and ".join(FEATURES[name] for name in scene.features)
+        yield f"models: a graded lattice cannot follow {what}; leave it out, or name tissue instead"
     for name in scene.region.at:
         if name not in (scene.control_points or ("tool",)):
             yield (

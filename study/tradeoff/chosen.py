@@ -7,7 +7,7 @@ from dataclasses import replace
 from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION
 from study.scene import Scene
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.lineup import Configuration, is_moved
 
 DOUBLE = "double"
 
@@ -25,7 +25,8 @@ def in_words(one: Configuration) -> str:
     else:
         found = f"{'corrected ' * (one.contender == 'corrected')}lattice of {edge}"
     precision = given.get("precision", DOUBLE)
-    return f"{found}, explicit, in {precision} precision, {FRACTION:g} of the critical step"
+    fraction = float(given.get("step_fraction", FRACTION))
+    return f"{found}, explicit, in {precision} precision, {fraction:g} of the critical step"
 
 
 def scene_with(scene: Scene, one: Configuration) -> Scene:
@@ -59,4 +60,6 @@ def _corrected(scene: Scene, one: Configuration) -> Scene:
 
 
 def _naming(scene: Scene, name: str) -> Scene:
-    return replace(scene, models=tuple(dict.fromkeys(("fem", *scene.models, name))))
+    """With the model that was measured, and the reference where it was compared with that."""
+    reference = ("fem",) if not is_moved(scene) else ()
+    return replace(scene, models=tuple(dict.fromkeys((*reference, *scene.models, name))))

@@ -1,13 +1,14 @@
-"""How far a configuration is from the reference, where the reference can tell."""
+"""How far a configuration is from what it is compared with, where that can tell."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study.models.spacing_error import force_differences
 from study.run.stated import Stated
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
@@ -23,10 +24,13 @@ Status = Literal[
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative L2 errors of the displacement, None where there is none or it is not resolved.
+    """Relative L2 errors, None where there is none or it is not resolved.
 
-    `field` over the organ at the peak; `tool` of the curve of the control point at the tool and
-    `worst` of any control point. `status` is that of the field; `message` says what went wrong.
+    Of the displacement: `field` over the organ at the peak; `tool` of the curve of the control
+    point at the tool and `worst` of any control point. Of the force on tools that are moved, the
+    largest of any: `force` over time and `peak_force`, and `discretisation` of it over time against
+    the finest lattice of the same springs. `of_force`: whether a configuration is judged by the
+    force. `status` is that of what it is judged by; `message` says what went wrong.
     """
 
     status: Status
@@ -34,6 +38,15 @@ class Errors:
     tool: float | None = None
     worst: float | None = None
     message: str = ""
+    force: float | None = None
+    peak_force: float | None = None
+    discretisation: float | None = None
+    of_force: bool = False
+
+    @property
+    def judged(self) -> float | None:
+        """That which it is judged by."""
+        return self.force if self.of_force else self.field
 
 
 def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
@@ -48,7 +61,25 @@ def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
         return Errors("unstable", message=f"step {1.0 / found.margin:.3g} times the critical one")
     if found.inverted_cells:
         return Errors("inverted", message=f"{found.inverted_cells} cells")
-    return _measured(np.reshape(found.field, (-1, 3)), np.array(found.curves), reference, given)
+    measured = _measured(np.reshape(found.field, (-1, 3)), np.array(found.curves), reference, given)
+    if not given.problem.rigid_tools:
+        return measured
+    return _of_force(
+        measured, np.reshape(found.force or [], reference.force.shape), reference, given
+    )
+
+
+def _of_force(measured: Errors, found: Floats, reference: Truth, given: Stated) -> Errors:
+    """With the errors of the force, by which it is then judged."""
+    over_time, peak = force_differences(given.problem, found, reference.force).max(axis=1)
+    kept = resolved(over_time, float(reference.force_errors.max()))
+    return replace(
+        measured,
+        status="not resolved" if kept is None else "resolved",
+        force=kept,
+        peak_force=resolved(peak, float(reference.peak_errors.max())),
+        of_force=True,
+    )
 
 
 def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> Errors:
@@ -67,5 +98,5 @@ def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> 
 
 
 def resolved(error: float, bar: float) -> float | None:
-    """The error, or None where it does not exceed that of the reference."""
-    return float(error) if error > bar else None
+    """The error, or None where it is below that of the reference."""
+    return float(error) if error >= bar and error > 0.0 else None

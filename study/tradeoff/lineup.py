@@ -12,9 +12,11 @@ import numpy as np
 
 from msm.integrators import INTEGRATORS
 from msm.stability import DEFAULT
+from msm.stepper import STOPPED
 from study.models.model import Model
 from study.models.table import MODELS, kind, model
 from study.models.tissue import FRACTION, lacks_poisson_ratio
+from study.problem.features import FEATURES
 from study.scene import Scene
 
 Settings = Mapping[str, str | float | int | bool]
@@ -29,12 +31,29 @@ FAST = 250.0
 class Contender:
     """A model by the name of its kind, and settings worth a place in the table of a scene.
 
-    `always`: settings that all of them share and none is told apart by.
+    `always`: settings that all of them share and none is told apart by; `unable`: names of
+    `study.problem.features.FEATURES` that its steps do not follow, though a run of its kind may.
     """
 
     model: str
     settings: Callable[[Scene], Iterator[Settings]]
     always: Settings = field(default_factory=dict)
+    unable: frozenset[str] = frozenset()
+
+    def lacks(self, scene: Scene) -> list[str]:
+        """Names of what a scene asks that it cannot follow."""
+        able = kind(self.model).able - self.unable
+        return [feature for feature in scene.features if feature not in able]
+
+
+def is_moved(scene: Scene) -> bool:
+    """Whether a scene has tools that are moved, and configurations are judged by their force."""
+    return "moved-tools" in scene.features
+
+
+def fraction(scene: Scene) -> float:
+    """Of the critical step: the scene's own where tools are moved, whose force is one step's."""
+    return scene.lattice.step_fraction if is_moved(scene) else FRACTION
 
 
 def lattice_settings(scene: Scene, times: float, **more: str | float | bool) -> Settings:
@@ -47,20 +66,29 @@ def _springs(scene: Scene) -> Iterator[Settings]:
     """Springs alone, which have Poisson ratio 1/4 whatever the tissue's."""
     for times in (2.0, 1.5, 1.0, 0.75):
         spacing = times * scene.lattice.spacing
-        yield {"spacing": spacing, "volume_term": False, "step_fraction": FRACTION}
+        yield {"spacing": spacing, "volume_term": False, "step_fraction": fraction(scene)}
 
 
 def _volume_springs(scene: Scene) -> Iterator[Settings]:
     """Springs with the volume term; none for a tissue whose ratio springs have already."""
     spacings = (2.0, 1.75, 1.5, 1.25, 1.0, 0.8, 2.0 / 3.0, 0.5)
     for times in spacings if lacks_poisson_ratio(scene) else ():
-        yield lattice_settings(scene, times, step_fraction=FRACTION)
+        yield lattice_settings(scene, times, step_fraction=fraction(scene))
 
 
 def _single_precision(scene: Scene) -> Iterator[Settings]:
     """Steps in single precision, with the volume term where the tissue's ratio asks for it."""
-    for times in (1.0, 0.8, 2.0 / 3.0, 0.5):
-        yield lattice_settings(scene, times, precision="single", step_fraction=FRACTION)
+    for times in (1.0, 0.8, 2.0 / 3.0, 0.5) if may_be_single(scene) else ():
+        yield lattice_settings(scene, times, precision="single", step_fraction=fraction(scene))
+
+
+def may_be_single(scene: Scene) -> bool:
+    """Whether there are steps in single precision, which are on the grid alone.
+
+    Springs with rest lengths each of their own are stepped over the list.
+    """
+    loaded = "gravity" in scene.features and scene.gravity.given == "loaded"
+    return INTEGRATORS[scene.lattice.integrator].on_grid is not None and not loaded
 
 
 def _step_sizes(scene: Scene) -> Iterator[Settings]:
@@ -74,10 +102,12 @@ def _step_sizes(scene: Scene) -> Iterator[Settings]:
 def _integrators(scene: Scene) -> Iterator[Settings]:
     """Every other integrator by spacing and, where nothing limits the step, by step."""
     for name, method in INTEGRATORS.items():
+        if is_moved(scene) and name not in STOPPED:
+            continue
         for times in (2.0, 1.0) if name != DEFAULT else ():
             same = lattice_settings(scene, times, integrator=name)
             if np.isfinite(method.oscillation):
-                yield {**same, "step_fraction": FRACTION}
+                yield {**same, "step_fraction": fraction(scene)}
             else:
                 yield from ({**same, "step_rate": rate} for rate in (FRAME_RATE, FAST))
 
@@ -85,7 +115,7 @@ def _integrators(scene: Scene) -> Iterator[Settings]:
 def _basafa(scene: Scene) -> Iterator[Settings]:
     """The benchmark, which has the stiffness of Table II and not that of the tissue."""
     for times in (2.0, 1.5, 1.0):
-        yield {"spacing": times * scene.lattice.spacing, "step_fraction": FRACTION}
+        yield {"spacing": times * scene.lattice.spacing, "step_fraction": fraction(scene)}
 
 
 def _finite_elements(_: Scene) -> Iterator[Settings]:
@@ -141,11 +171,15 @@ CONTENDERS: dict[str, Contender] = {
     "step-sizes": Contender("tissue", _step_sizes),
     "integrators": Contender("tissue", _integrators),
     "basafa": Contender("basafa", _basafa),
-    "finite-elements": Contender("fem", _finite_elements, {"method": "tr-bdf2"}),
+    "finite-elements": Contender(
+        "fem", _finite_elements, {"method": "tr-bdf2"}, unable=frozenset({"moved-tools"})
+    ),
     "superposition": Contender("superposition", _superposition),
     "corrected": Contender("corrected", _corrected),
-    "region": Contender("region", _region),
-    "corrected-graded": Contender("corrected", _graded, {"coarse": "graded"}),
+    "region": Contender("region", _region, unable=frozenset(FEATURES)),
+    "corrected-graded": Contender(
+        "corrected", _graded, {"coarse": "graded"}, unable=frozenset(FEATURES)
+    ),
 }
 
 
@@ -193,14 +227,25 @@ def contender(name: str) -> Contender:
 
 
 def contenders_of(scene: Scene) -> list[str]:
-    """All contenders, and the scene's own models that are none of them and need no estimate."""
+    """All contenders that can follow a scene, and its own models that need no estimate."""
     entered = {one.model for one in CONTENDERS.values()}
     own = [name for name in scene.models if name not in entered and not kind(name).of_patient]
-    return [*CONTENDERS, *own]
+    return [name for name in (*CONTENDERS, *own) if not contender(name).lacks(scene)]
 
 
 def configurations(scene: Scene, chosen: Sequence[str] = ()) -> list[Configuration]:
-    """All configurations of the chosen contenders, or of all that a scene has."""
+    """All configurations of the chosen contenders, or of all that a scene has.
+
+    ValueError for a contender that cannot follow the scene.
+    """
+    for name in chosen:
+        lacks = contender(name).lacks(scene)
+        if lacks:
+            raise ValueError(
+                f"contender {name}: its steps do not follow "
+                f"{' and '.join(FEATURES[feature] for feature in lacks)}; choose from "
+                f"{', '.join(contenders_of(scene))}"
+            )
     return [
         Configuration(name, settings)
         for name in chosen or contenders_of(scene)

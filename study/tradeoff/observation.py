@@ -19,8 +19,8 @@ FUNCTION = f"{__name__}:observe"
 class Observed:
     """Field at the peak and curves of displacement, flat, None of a motion that is not whole.
 
-    `step_s`: the shortest it took; `margin`: smallest ratio of the critical step to one it took,
-    None without a critical step.
+    `force` [N]: on the tools that are moved, (samples, tools, 3). `step_s`: the shortest it took;
+    `margin`: smallest ratio of the critical step to one it took, None without a critical step.
     """
 
     diverged_at_s: float | None
@@ -29,6 +29,7 @@ class Observed:
     step_s: float | None
     field: list[float] | None
     curves: list[float] | None
+    force: list[float] | None = None
 
 
 def observe(name: str, settings: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
@@ -48,4 +49,5 @@ def _observed(found: Simulation) -> Observed:
         step_s=found.step if np.isfinite(found.step) else None,
         field=plain(run.volume_field[0]) if whole else None,
         curves=plain(run.displacement) if whole else None,
+        force=plain(run.tool_force) if whole else None,
     )

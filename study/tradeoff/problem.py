@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,11 @@ from study.scene import Scene
 Floats = NDArray[np.float64]
 
 SAMPLING = 0.05
-"""Interval [s] of samples: a whole number of frames at 60 Hz and of steps at 1 kHz."""
+"""Interval [s] of samples: a whole number of frames at 60 Hz and of steps at 1 kHz.
+
+Where tools are moved it is divided until it is no longer than the scene's own, which shows their
+force.
+"""
 FEWEST_SAMPLES = 16
 DIGITS = 8
 TIDY_DIGITS = 12
@@ -31,12 +36,18 @@ def sampled(scene: Scene) -> Scene:
         )
     free = replace(scene.lattice, time_step=None, step_rate=None)  # contenders have their own
     scene = replace(scene, lattice=free)
-    count = int(scene.time.duration / SAMPLING * (1.0 + 1e-9))
+    interval = SAMPLING / (_parts(scene) if "moved-tools" in scene.features else 1)
+    count = int(scene.time.duration / interval * (1.0 + 1e-9))
     if count + 1 < FEWEST_SAMPLES:
         return scene
     return replace(
-        scene, time=replace(scene.time, duration=tidy(count * SAMPLING), samples=count + 1)
+        scene, time=replace(scene.time, duration=tidy(count * interval), samples=count + 1)
     )
+
+
+def _parts(scene: Scene) -> int:
+    own = scene.time.duration / (scene.time.samples - 1)
+    return max(1, ceil(SAMPLING / own * (1.0 - 1e-9)))
 
 
 def tidy(value: float) -> float:

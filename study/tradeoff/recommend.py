@@ -12,6 +12,10 @@ Where the place of the load is known beforehand, what follows it there only is c
 Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
 few, and each promises what a run of it was off by, or the reference's own error if that is more.
 All are then judged by the reference with large displacements, `study.tradeoff.geometry`.
+
+Where tools are moved the error is that of their force over time. Against the finest lattice of the
+same springs every spacing is run, for errors by contact jump with how cells lie; each promises what
+its run was off by, and the finest's own error on top.
 """
 
 from __future__ import annotations
@@ -21,22 +25,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from msm.integrators import INTEGRATORS
+from study.models.spacing_error import force_differences
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
-from study.run.stated import Stated, arguments, stated
+from study.run.stated import Stated
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
-from study.tradeoff import reference, study
+from study.tradeoff import study
 from study.tradeoff.chosen import DOUBLE, in_words, scene_with
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.geometry import with_large_displacements
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.judge import Judge
+from study.tradeoff.lineup import Configuration, fraction, may_be_single
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
@@ -55,7 +60,7 @@ FEWEST = 3
 SINGLE = "single"
 BESIDE = (2.0, 1.5, 1.0)
 """Spacings of corrected lattices, times that of the scene."""
-FINEST, REACHES = 0.5, (1.0, 1.5)
+SMALL_CELLS, REACHES = 0.5, (1.0, 1.5)
 """Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
 reach from the tool, in its radii."""
 VECTORS = 16
@@ -63,7 +68,7 @@ VECTORS = 16
 
 @dataclass(frozen=True)
 class Promise:
-    """A relative error of the field and how far from it the measured one may lie, either way."""
+    """A relative error and how far from it the measured one may lie, either way."""
 
     error: float
     bar: float
@@ -72,6 +77,10 @@ class Promise:
     def most(self) -> float:
         """Its upper end."""
         return self.error + self.bar
+
+    def rounded(self, more: float) -> Promise:
+        """With at most so much more by rounding."""
+        return replace(self, bar=self.bar + more)
 
     def holds(self, measured: float) -> bool:
         """Whether a measured error lies within."""
@@ -102,7 +111,8 @@ class Candidate:
 class Recommended:
     """A candidate, whether it meets the demand, and what it was measured to give.
 
-    `others`: those that it was chosen from.
+    `others`: those that it was chosen from. `against`: what errors are against, where that is not
+    the converged reference.
     """
 
     candidate: Candidate
@@ -111,6 +121,7 @@ class Recommended:
     frame: Frame | None
     wall_per_second: float
     others: tuple[Candidate, ...] = ()
+    against: str = ""
 
 
 def recommend(
@@ -127,23 +138,22 @@ def recommend(
     With `known_place` also among the lattices that follow one place of the load.
     """
     coarser = judged_by(scene)
-    spacings = [tidy(times * scene.lattice.spacing) for times in FITTED]
+    every = [tidy(times * scene.lattice.spacing) for times in (*FITTED, *FINER)]
+    spacings = every[: len(FITTED)] if study.has_reference(scene) else every
     tried = [_configuration(scene, h) for h in spacings]
-    tried += [_configuration(scene, spacings[-1], SINGLE)] if _may_be_single(scene) else []
-    solved, *outcomes = study.solved(coarser, tried, store, how)
-    given = stated(**arguments(coarser))
-    known = reference.truth(solved.value or {}, given)
-    followed = _followed(given, known, store, how) if known_place else None
-    known = known if followed is None else followed.known
-    found = [errors(outcome, known, given) for outcome in outcomes[: len(spacings)]]
+    single = [_configuration(scene, spacings[-1], SINGLE)] if may_be_single(scene) else []
+    judge, outcomes = study.judged(coarser, [*tried, *single], store, how)
+    given, followed = judge.given, None
+    if known_place and judge.reference is not None:
+        followed = _followed(given, judge.reference, store, how)
+        judge = replace(judge, reference=followed.known)
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
-    kept = [(h, e.field) for h, e in zip(spacings, found, strict=True) if e.field is not None]
-    curve = fitted([h for h, _ in kept], [e for _, e in kept], known.field_error)
-    every = [*spacings, *(tidy(times * scene.lattice.spacing) for times in FINER)]
-    candidates = _candidates(given, every, curve, added, wanted, progress)
+    promises = _promises(judge, tried, outcomes, every)
+    candidates = _candidates(given, promises, added, wanted, progress)
     if followed is not None:
         candidates += _bound(given, followed, wanted, progress)
-    return _verified(given, known, candidates, wanted, store, how, progress)
+    found = _verified(judge, candidates, wanted, store, how, progress)
+    return replace(found, against=judge.words if judge.finest else "")
 
 
 def judged_by(scene: Scene) -> Scene:
@@ -162,10 +172,41 @@ class Fit:
     spread: float
     reference_error: float
 
-    def promise(self, spacing: float, rounding: float = 0.0) -> Promise:
-        """The error at a spacing [m], and at most so much more by rounding."""
+    def promise(self, spacing: float) -> Promise:
+        """The error at a spacing [m]."""
         error = self.constant * spacing**self.order
-        return Promise(error, self.reference_error + self.spread * error + rounding)
+        return Promise(error, self.reference_error + self.spread * error)
+
+
+def _promises(
+    judge: Judge,
+    tried: Sequence[Configuration],
+    outcomes: Sequence[Outcome],
+    every: Sequence[float],
+) -> dict[float, Promise]:
+    """What a spacing [m] promises, in double precision."""
+    spacings = [float(one.settings["spacing"]) for one in tried]
+    if judge.reference is None:
+        return dict(_measured_promises(judge, tried, outcomes))
+    known = judge.reference
+    found = [errors(one, known, judge.given) for one in outcomes[: len(tried)]]
+    kept = [(h, e.judged) for h, e in zip(spacings, found, strict=True) if e.judged is not None]
+    own = known.field_error if known.force_bar is None else known.force_bar
+    curve = fitted([h for h, _ in kept], [error for _, error in kept], own)
+    return {h: curve.promise(h) for h in every}
+
+
+def _measured_promises(
+    judge: Judge, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
+) -> Iterator[tuple[float, Promise]]:
+    """What each run was off the finest lattice by, and the own error of that."""
+    for one, outcome in zip(tried, outcomes, strict=False):
+        known = judge.truth(one)
+        alike = replace(known, force_errors=np.zeros_like(known.force_errors))
+        found = errors(outcome, alike, judge.given)
+        if found.status in {"resolved", "not resolved"}:
+            promise = Promise(found.force or 0.0, known.force_bar or 0.0)
+            yield float(one.settings["spacing"]), promise
 
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
@@ -186,42 +227,42 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
 
 def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Configuration:
     lacks = lacks_poisson_ratio(scene)
-    settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": FRACTION}
+    settings = {"spacing": spacing, "volume_term": lacks, "step_fraction": fraction(scene)}
     if precision == SINGLE:
         return Configuration("single-precision", settings | {"precision": SINGLE})
     return Configuration("volume-springs" if lacks else "springs", settings)
 
 
-def _may_be_single(scene: Scene) -> bool:
-    return INTEGRATORS[scene.lattice.integrator].on_grid is not None
-
-
 def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, float]:
-    """What single precision changes of the field, of a run in double and one in single.
+    """What single precision changes of the field or the force, of a run in double and in single.
 
     Relative L2; nothing where there is no such run, or it was not whole.
     """
-    fields = [restored(Observed, one.value).field for one in outcomes[:2] if one.value is not None]
-    whole = [np.reshape(one, (-1, 3)) for one in fields if one is not None]
+    seen = [restored(Observed, one.value) for one in outcomes[:2] if one.value is not None]
+    whole = [one for one in seen if one.field is not None]
     if len(whole) < 2:
         return {}
     double, single = whole
-    return {SINGLE: relative_l2(single, double, given.problem.volume_rule.weights)}
+    if given.problem.rigid_tools:
+        shape = len(given.problem.observation.times), len(given.problem.rigid_tools), 3
+        of = [np.reshape(one.force or [], shape) for one in (single, double)]
+        return {SINGLE: float(force_differences(given.problem, *of)[0].max())}
+    in_single, in_double = (np.reshape(one.field or [], (-1, 3)) for one in (single, double))
+    return {SINGLE: relative_l2(in_single, in_double, given.problem.volume_rule.weights)}
 
 
 def _candidates(
     given: Stated,
-    spacings: Sequence[float],
-    fit: Fit,
+    promises: Mapping[float, Promise],
     added: Mapping[str, float],
     wanted: Demand,
     progress: Progress,
 ) -> list[Candidate]:
     """All spacings in each precision, which adds so much to the error, timed in turns."""
-    pairs = [(h, precision) for h in spacings for precision in added]
+    pairs = [(h, precision) for h in promises for precision in added]
     chosen = [_configuration(given.scene, *pair) for pair in pairs]
     return [
-        Candidate(one, fit.promise(h, added[precision]), cost, _frame(cost, wanted))
+        Candidate(one, promises[h].rounded(added[precision]), cost, _frame(cost, wanted))
         for one, (h, precision), cost in zip(
             chosen, pairs, _costs(given, chosen, progress), strict=True
         )
@@ -243,7 +284,7 @@ def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
     Without runs that tell what geometry changes, those of small displacements are left out.
     """
     chosen = list(bound(given.scene))
-    _, *outcomes = study.solved(given.scene, chosen, store, how)
+    _, outcomes = study.judged(given.scene, chosen, store, how)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
@@ -272,7 +313,7 @@ def bound(scene: Scene) -> Iterator[Configuration]:
     for times in BESIDE:
         h = tidy(times * scene.lattice.spacing)
         yield Configuration("corrected", {"spacing": h, **step})
-    finest, term = tidy(FINEST * scene.lattice.spacing), lacks_poisson_ratio(scene)
+    finest, term = tidy(SMALL_CELLS * scene.lattice.spacing), lacks_poisson_ratio(scene)
     for times in REACHES:
         graded = {"spacing": finest, "radius": tidy(times * scene.tool.radius), **step}
         yield Configuration("corrected-graded", graded)
@@ -308,8 +349,7 @@ def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
 
 
 def _verified(
-    given: Stated,
-    known: Truth,
+    judge: Judge,
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
@@ -317,19 +357,19 @@ def _verified(
     progress: Progress,
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
-    chosen = best(candidates, wanted)
-    (_, outcome) = study.solved(given.scene, [chosen.configuration], store, how)
-    measured = errors(outcome, known, given)
+    given, chosen = judge.given, best(candidates, wanted)
+    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, how)
+    measured = judge.errors(chosen.configuration, outcome)
     (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
     again = _frame(cost, wanted)
     met = chosen.meets(wanted) and measured.status in {"resolved", "not resolved"}
     met = met and (again is None or again.in_time)
-    met = met and (wanted.error is None or (measured.field or 0.0) <= wanted.error)
+    met = met and (wanted.error is None or (measured.judged or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(given, known, others, wanted, store, how, progress)
+        return _verified(judge, others, wanted, store, how, progress)
     wall = cost.timing.step[1] / cost.step
     return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 
@@ -348,20 +388,24 @@ def lines(found: Recommended) -> list[str]:
     one, measured = found.candidate, found.measured
     promise = one.promise
     error = (
-        f"{100 * measured.field:.1f} %"
-        if measured.field is not None
+        f"{100 * measured.judged:.1f} %"
+        if measured.judged is not None
+        else f"{measured.status}, below the own error of what it is compared with"
+        if measured.status == "not resolved" and measured.of_force
         else f"{measured.status}, below the reference's own error"
         if measured.status == "not resolved"
         else f"none: {measured.status} {measured.message}"
     )
     verdict = ""
-    if measured.field is not None:
-        verdict = ", as promised" if promise.holds(measured.field) else ", not as promised"
+    if measured.judged is not None:
+        verdict = ", as promised" if promise.holds(measured.judged) else ", not as promised"
     text = [
         in_words(one.configuration),
-        f"field error promised {100 * promise.error:.1f} +- {100 * promise.bar:.1f} %, measured "
-        f"{error}" + verdict,
+        f"{_quantity(measured)} error promised {100 * promise.error:.1f} +- "
+        f"{100 * promise.bar:.1f} %, measured {error}" + verdict,
     ]
+    if measured.of_force:
+        text += [f"errors are against {found.against}", *_beside_force(measured)]
     if found.frame is not None:
         slow = found.frame.slow
         text.append(
@@ -380,16 +424,33 @@ def lines(found: Recommended) -> list[str]:
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
         "fuzzy estimate have its error on top."
     )
-    return [*text, *table_of(found.others)]
+    return [*text, *table_of(found.others, _quantity(measured))]
 
 
-def table_of(candidates: Sequence[Candidate]) -> Iterator[str]:
+def _quantity(measured: Errors) -> str:
+    return "force" if measured.of_force else "field"
+
+
+def _beside_force(measured: Errors) -> Iterator[str]:
+    """What else was measured of a configuration that is judged by the force over time."""
+    told = {
+        "the largest force": measured.peak_force,
+        "the displacement at the control points": measured.worst,
+        "the displacement over the organ": measured.field,
+        "the force against the finest lattice of the same springs": measured.discretisation,
+    }
+    parts = [f"of {of} {100 * error:.1f} %" for of, error in told.items() if error is not None]
+    if parts:
+        yield f"measured beside it: {', '.join(parts)}"
+
+
+def table_of(candidates: Sequence[Candidate], quantity: str = "field") -> Iterator[str]:
     """Those that none is both cheaper and more accurate than, the cheapest first."""
     places = [(one.promise.error, one.wall_per_second) for one in candidates]
     front = [one for one, at in zip(candidates, places, strict=True) if not is_beaten(at, places)]
     if not front:
         return
-    yield "chosen from (wall per simulated second, expected error of the field, memory):"
+    yield f"chosen from (wall per simulated second, expected error of the {quantity}, memory):"
     for one in sorted(front, key=lambda one: one.wall_per_second):
         memory = "" if one.cost.memory is None else f"{one.cost.memory / 1e6:.0f} MB"
         yield (

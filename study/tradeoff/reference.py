@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.models.finite_elements import reference_of
-from study.models.model import SILENT
+from study.models.model import SILENT, ModelRun
 from study.results.records import ElementsRecord, MeshLevel
 from study.run.stated import Stated, stated
+from study.run.tool_forces import largest_forces
 from study.sweep.canonical import Plain, restored
 from study.tradeoff.problem import plain
 
@@ -24,7 +26,8 @@ class SolvedReference:
     """A reference as plain values: field at the peak and curves of displacement, flat.
 
     An error is the sum of those by the mesh, by the subspace and by the steps of the load; None
-    where the organ has no other mesh to tell it.
+    where the organ has no other mesh to tell it. `force` [N] on the tools that are moved (samples,
+    tools, 3), with the error of each. Without `finished` there is nothing to compare with.
     """
 
     field: list[float]
@@ -34,6 +37,9 @@ class SolvedReference:
     unknowns: int
     element: str
     levels: tuple[MeshLevel, ...]
+    force: list[float] = dataclasses.field(default_factory=list)
+    force_errors: list[float] | None = None
+    finished: bool = True
 
 
 @dataclass(frozen=True)
@@ -41,13 +47,22 @@ class Truth:
     """What contenders are compared with.
 
     `field` [m] (q, 3) at the peak; `curves` [m] (samples, probes, 3); relative errors of both,
-    `field_error` and `curve_errors` (probes,).
+    `field_error` and `curve_errors` (probes,). `force` [N] (samples, tools, 3) on the tools that
+    are moved, and relative errors (tools,) of it over time and of the largest.
     """
 
     field: Floats
     curves: Floats
     field_error: float
     curve_errors: Floats
+    force: Floats = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+    force_errors: Floats = dataclasses.field(default_factory=lambda: np.zeros(0))
+    peak_errors: Floats = dataclasses.field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def force_bar(self) -> float | None:
+        """The largest error of a force over time; None without tools that are moved."""
+        return float(self.force_errors.max()) if len(self.force_errors) else None
 
 
 def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
@@ -59,11 +74,11 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     assert isinstance(elements, ElementsRecord)  # noqa: S101 - finite elements have one
     rest = (elements.truncation_error or 0.0) + max(one.displacement for one in steps.values())
     mesh = elements.mesh_error
-    probes = given.problem.probes
+    probes, finished = given.problem.probes, run.trajectory.status == "finished"
     return asdict(
         SolvedReference(
-            field=plain(run.trajectory.volume_field[0]),
-            curves=plain(run.trajectory.displacement),
+            field=plain(run.trajectory.volume_field[0]) if finished else [],
+            curves=plain(run.trajectory.displacement) if finished else [],
             field_error=None if mesh is None else mesh.field_peak + rest,
             curve_errors=(
                 None if mesh is None else [mesh.by_probe[p].displacement + rest for p in probes]
@@ -71,22 +86,40 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
             unknowns=elements.unknowns,
             element=elements.element,
             levels=elements.levels,
+            force=plain(run.trajectory.tool_force) if finished else [],
+            force_errors=_force_errors(given, run),
+            finished=finished,
         )
     )
 
 
+def _force_errors(given: Stated, run: ModelRun) -> list[float] | None:
+    """Of each tool's force over time by all that is estimated, None where a part is not."""
+    found = [one.relative_error for one in largest_forces(given.problem.response, {"fem": run})]
+    known = [error for error in found if error is not None]
+    return known if len(known) == len(given.problem.rigid_tools) else None
+
+
 def truth(value: Plain, given: Stated) -> Truth:
-    """The reference of a stored value. ValueError if its error is unknown."""
+    """The reference of a stored value. ValueError if it or its error is unknown."""
     found = restored(SolvedReference, value)
+    if not found.finished:
+        raise ValueError("the reference's motion was lost before its end")
     if found.field_error is None or found.curve_errors is None:
         raise ValueError(
             "the organ has one mesh only, so the error of its reference is unknown and none of a "
             "model can be told from it; refine organ.mesh or give a surface"
         )
-    seen = given.problem.observation
+    seen, tools = given.problem.observation, len(given.problem.rigid_tools)
+    if tools and found.force_errors is None:
+        raise ValueError("the error of the reference's force on the tools is unknown")
+    of_force = np.array(found.force_errors or [])
     return Truth(
         np.reshape(found.field, (-1, 3)),
         np.reshape(found.curves, (len(seen.times), len(seen.probes), 3)),
         found.field_error,
         np.array(found.curve_errors),
+        np.reshape(found.force, (len(seen.times), tools, 3)),
+        of_force,
+        of_force,
     )

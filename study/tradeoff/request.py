@@ -11,7 +11,7 @@ import numpy as np
 
 from study.folders import check_file, write_text
 from study.models.table import model
-from study.problem.features import refuse_beside_one_load
+from study.problem.features import BESIDE_ONE_LOAD, FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.ready import set_up
@@ -23,9 +23,11 @@ from study.sweep.runner import How
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
 from study.tradeoff.demand import Demand, as_share, demand, length
-from study.tradeoff.lineup import configurations
+from study.tradeoff.lineup import configurations, is_moved
 from study.tradeoff.problem import sampled
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
+
+YIELDS = "tissue's lattice yields"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,10 +75,10 @@ def _ready(request: TradeoffRequest) -> Scene:
 
 
 def _set_up(scene: Scene) -> Problem:
-    """The problem of a scene on which its reference can be solved. ValueError if it cannot."""
-    refuse_beside_one_load(scene.features, "tradeoff and recommend")
+    """The problem of a scene on which what others are compared with can run. ValueError if not."""
     problem = stated(**arguments(scene)).problem
-    set_up([model(scene, "fem")], problem)
+    compared_with = "fem" if study.has_reference(scene) else "tissue"
+    set_up([model(scene, compared_with)], problem)
     return problem
 
 
@@ -96,11 +98,21 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     with study.place(folder) as partial:  # refused now, not after the work
         found = study.study(scene, chosen, _store(folder), how, repeats, progress)
         study.write(found, scene, repeats, partial)
-    own = 100 * (found.reference.field_error or 0.0)
+    return [*table.lines(found.entries), *_against(found), f"table in {folder / study.TABLE}"]
+
+
+def _against(found: study.Found) -> list[str]:
+    """What the errors are of and against, and how large its own is."""
+    judge = found.judge
+    if judge.reference is not None and not judge.finest:
+        own = 100 * judge.reference.field_error
+        return [f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %"]
+    bars = [one.force_bar for one in found.entries if one.force_bar is not None]
+    why = [f"not against the scene's finite elements: {judge.why}"] if judge.why else []
     return [
-        *table.lines(found.entries),
-        f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %",
-        f"table in {folder / study.TABLE}",
+        f"errors are of the force of the tools over time, against {judge.words}; its own is "
+        f"{100 * min(bars):.2g} to {100 * max(bars):.2g} %",
+        *why,
     ]
 
 
@@ -117,18 +129,22 @@ def advise(
     An `error` that is a length is taken as a share of the largest displacement at rest.
     """
     absolute, told = length(error), list[str]()
-    wanted, given = demand(rate, "1" if absolute else error), request.read()
+    given = request.read()
+    _refuse_demand(given, absolute, known_place=known_place)
+    wanted = demand(rate, "1" if absolute else error)
     path = request.out or Path(f"{request.name}-{_suffix(wanted, absolute)}.toml")
     check_file(path)
     problem = _set_up(recommend.judged_by(sampled(given)))
     lattice = model(given, "tissue").varied().prepare(problem)  # one of its spacing
     if absolute is not None:
-        reach = float(np.linalg.norm(lattice.rest(), axis=1).max())
+        at_rest = model(given, "fem").prepare(problem) if problem.is_burdened else lattice
+        reach = float(np.linalg.norm(at_rest.rest(), axis=1).max())
         share = as_share(absolute, reach)
         wanted = demand(rate, share)
         told = [
             f"an error of {1e3 * absolute:.3g} mm is taken as {share} of the {1e3 * reach:.3g} mm "
-            "by which the tissue's lattice yields at most at rest; errors are of the whole field"
+            f"by which the {'elements yield' if problem.is_burdened else YIELDS} at most at rest; "
+            "errors are of the whole field"
         ]
     store = _store(Path("results") / f"{request.name}-tradeoff")
     if known_place:
@@ -143,6 +159,20 @@ def advise(
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
     write_text(path, recommend.recommended_scene(given, found))
     return True, [*lines, f"scene in {path}"]
+
+
+def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -> None:
+    """ValueError for demands that scenes of more than one load of a given force do not have."""
+    beside = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in scene.features]
+    if known_place and beside:
+        raise ValueError(
+            f"--known-place: what follows one place of a load only cannot follow "
+            f"{' and '.join(beside)}; leave it out"
+        )
+    if absolute is not None and is_moved(scene):
+        raise ValueError(
+            "--error: where tools are moved it is that of their force; give a share such as 5 %"
+        )
 
 
 def _busy() -> list[str]:

@@ -25,8 +25,8 @@ from study.sweep.store import Store
 from study.sweep.tally import on_stderr
 from study.sweep.task import Task
 from study.tradeoff import observation, reference, table
-from study.tradeoff.errors import errors
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.judge import Judge, lattices, refuse_unlike, truth_of
+from study.tradeoff.lineup import Configuration, is_moved
 from study.tradeoff.reference import SolvedReference, Truth
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns
@@ -38,30 +38,70 @@ PICTURES = ("tradeoff.svg", "tradeoff.pdf")
 
 @dataclass(frozen=True)
 class Found:
-    """Entries of the table, and the reference with the errors of its curves by control point."""
+    """Entries of the table, what they are compared with, its curves' errors by control point."""
 
     entries: list[Entry]
-    reference: SolvedReference
+    judge: Judge
     curve_errors: dict[str, float]
 
 
+def has_reference(scene: Scene) -> bool:
+    """Whether finite elements are compared with: of moved tools where the scene names them."""
+    return not is_moved(scene) or "fem" in scene.models
+
+
 def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
-    """The reference's run and one for each configuration."""
+    """The reference's run, those of the finest lattices, and one for each configuration."""
     same = arguments(scene)
-    runs: list[Plain] = [{"name": one.contender, "settings": dict(one.settings)} for one in chosen]
-    return [
-        Task(reference.FUNCTION, same),
-        *(Task(observation.FUNCTION, same | one) for one in runs),
+    compared_with = [Task(reference.FUNCTION, same)] if has_reference(scene) else []
+    runs: list[Plain] = [
+        {"name": one.contender, "settings": dict(one.settings)}
+        for one in (*_finest(scene, chosen), *chosen)
     ]
+    return [*compared_with, *(Task(observation.FUNCTION, same | one) for one in runs)]
 
 
-def solved(scene: Scene, chosen: Sequence[Configuration], store: Store, how: How) -> list[Outcome]:
-    """The outcome of the reference and of each configuration. ValueError if the first failed."""
+def _finest(scene: Scene, chosen: Sequence[Configuration]) -> list[Configuration]:
+    """Lattices that others are compared with: only where tools are moved."""
+    if not is_moved(scene):
+        return []
+    return [one for family in lattices(scene, chosen).values() for one in family]
+
+
+def judged(
+    scene: Scene, chosen: Sequence[Configuration], store: Store, how: How
+) -> tuple[Judge, list[Outcome]]:
+    """What configurations are compared with, and the outcome of each.
+
+    ValueError where the reference, or of moved tools the finest lattices, could not be solved.
+    """
+    if not has_reference(scene):
+        refuse_unlike(scene, chosen)
     with on_stderr("errors") as tell:
         outcomes = run(tasks(scene, chosen), store, how, tell)
-    if outcomes[0].value is None:
-        raise ValueError(f"the reference could not be solved: {outcomes[0].message}")
-    return outcomes
+    given, known, value, why = stated(**arguments(scene)), None, None, ""
+    if has_reference(scene):
+        first, *outcomes = outcomes
+        value = first.value
+        try:
+            known = _reference(first, given)
+        except ValueError as error:
+            if not is_moved(scene):
+                raise
+            refuse_unlike(scene, chosen)
+            why = str(error)
+    finest = {}
+    for springs, members in lattices(scene, chosen).items() if is_moved(scene) else ():
+        finest[springs] = truth_of(outcomes[: len(members)], given)
+        outcomes = outcomes[len(members) :]
+    solved = None if value is None else restored(SolvedReference, value)
+    return Judge(given, known, solved, finest, why), outcomes
+
+
+def _reference(outcome: Outcome, given: Stated) -> Truth:
+    if outcome.value is None:
+        raise ValueError(f"the reference could not be solved: {outcome.message}")
+    return reference.truth(outcome.value, given)
 
 
 def study(
@@ -74,33 +114,32 @@ def study(
     clock: Clock = time.perf_counter,
 ) -> Found:
     """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
-    outcomes = solved(scene, chosen, store, how)
-    given = stated(**arguments(scene))
-    value = outcomes[0].value or {}
-    known = reference.truth(value, given)
-    entries = compared(given, chosen, outcomes[1:], known, repeats, progress, clock)
-    by_probe = zip(given.problem.probes, map(float, known.curve_errors), strict=True)
-    return Found(entries, restored(SolvedReference, value), dict(by_probe))
+    judge, outcomes = judged(scene, chosen, store, how)
+    entries = compared(judge, chosen, outcomes, repeats, progress, clock)
+    known = judge.reference
+    own = [] if known is None else map(float, known.curve_errors)
+    return Found(entries, judge, dict(zip(judge.given.problem.probes, own, strict=False)))
 
 
 def compared(
-    given: Stated,
+    judge: Judge,
     chosen: Sequence[Configuration],
     outcomes: Sequence[Outcome],
-    known: Truth,
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> list[Entry]:
     """An entry per configuration, all that ran timed in turns."""
-    found = [errors(outcome, known, given) for outcome in outcomes]
+    given = judge.given
+    found = [judge.errors(one, outcome) for one, outcome in zip(chosen, outcomes, strict=True)]
     sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
     steps = [step_of(outcomes[k]) for k in sound]
     costed = costs(given, [chosen[k] for k in sound], steps, repeats, progress, clock)
     by_place = dict(zip(sound, costed, strict=True))
+    bars = [judge.truth(one) for one in chosen]
     return [
-        Entry(one, error, known.field_error, by_place.get(k))
-        for k, (one, error) in enumerate(zip(chosen, found, strict=True))
+        Entry(one, error, bar.field_error, by_place.get(k), bar.force_bar)
+        for k, (one, error, bar) in enumerate(zip(chosen, found, bars, strict=True))
     ]
 
 
@@ -162,15 +201,10 @@ def step_of(outcome: Outcome) -> float:
 
 def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
     """Write table, record and scene into an empty folder; see `place`."""
-    text, solved = write_scene(scene), found.reference
+    text, judge = write_scene(scene), found.judge
     record = {
-        "reference": {
-            "element": solved.element,
-            "unknowns": solved.unknowns,
-            "field_error": solved.field_error,
-            "levels": [asdict(level) for level in solved.levels],
-            "curve_errors": found.curve_errors,
-        },
+        "against": judge.words,
+        "reference": None if judge.reference is None else _solved(found),
         "repeats": repeats,
         "modulus_pa": scene.tissue.youngs_modulus,
         "load_average": os.getloadavg(),
@@ -180,6 +214,19 @@ def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
     content = json.dumps(record, indent=1, allow_nan=False)
     (folder / RECORD).write_text(content + "\n", encoding="utf-8")
     (folder / "scene.toml").write_text(text, encoding="utf-8")
+
+
+def _solved(found: Found) -> Plain:
+    solved = found.judge.solved
+    assert solved is not None  # noqa: S101 - where it is compared with
+    return {
+        "element": solved.element,
+        "unknowns": solved.unknowns,
+        "field_error": solved.field_error,
+        "levels": [asdict(level) for level in solved.levels],
+        "curve_errors": found.curve_errors,
+        **({"force_errors": solved.force_errors} if solved.force_errors else {}),
+    }
 
 
 def place(folder: Path) -> AbstractContextManager[Path]:

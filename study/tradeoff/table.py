@@ -8,9 +8,16 @@ status                    resolved; not resolved (its error is below the referen
 message                   what went wrong, and where
 any_load                  whether it follows a load whose place was not known beforehand
 field_error               relative L2 error of the displacement over the organ at the peak
-field_error_bar           the reference's own error of it
+field_error_bar           own error of it of what is compared with
 tool_error, worst_error   relative L2 error of the displacement curve of the control point at the
                           tool and, among those that are resolved, the largest of a control point
+force_error               of scenes with tools that are moved, which are judged by it and have the
+                          status of it: relative L2 error of the force over time, the largest of a
+                          tool; empty without such, as are the next three
+force_error_bar           own error of it of what is compared with
+peak_force_error          relative error of the largest force along the axis
+discretisation_error      relative L2 difference of the force over time from the finest lattice of
+                          the same springs, if it exceeds the finest's own error
 unknowns                  components of displacement, or coordinates of a superposition
 step_s                    the shortest step that the run took, for which all costs are meant
 setup_s                   assembly, factors, vectors: what is done once, without the organ's mesh
@@ -45,6 +52,7 @@ SAME = 0.01
 COLUMNS = (
     *("contender", "configuration", "status", "message", "any_load"),
     *("field_error", "field_error_bar", "tool_error", "worst_error"),
+    *("force_error", "force_error_bar", "peak_force_error", "discretisation_error"),
     *("unknowns", "step_s", "setup_s", "step_us", "bare_step_us"),
     *("wall_per_s", "wall_per_s_q1", "wall_per_s_q3"),
     *(
@@ -80,20 +88,22 @@ class Cost:
 class Entry:
     """A configuration with its errors and, where it was timed, its cost.
 
-    `bar`: the reference's own error of the field.
+    `bar`: own error of the field of what it is compared with, and `force_bar` of the force on tools
+    that are moved.
     """
 
     configuration: Configuration
     errors: Errors
     bar: float
     cost: Cost | None
+    force_bar: float | None = None
 
     @property
     def place(self) -> tuple[float, float] | None:
-        """Error of the field and median wall per simulated second, None where one is missing."""
-        if self.cost is None or not self.errors.field:
+        """Error that it is judged by, and median wall per simulated second; None without one."""
+        if self.cost is None or not self.errors.judged:
             return None
-        return self.errors.field, self.cost.per_second[1]
+        return self.errors.judged, self.cost.per_second[1]
 
 
 def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]]) -> bool:
@@ -142,6 +152,10 @@ def _cells(one: Entry) -> Iterator[tuple[str, Cell]]:
     yield "field_error_bar", one.bar
     yield "tool_error", errors.tool
     yield "worst_error", errors.worst
+    yield "force_error", errors.force
+    yield "force_error_bar", one.force_bar
+    yield "peak_force_error", errors.peak_force
+    yield "discretisation_error", errors.discretisation
     if one.cost is not None:
         yield from _costs(one.cost)
 

@@ -1,7 +1,8 @@
 """What a step costs, all configurations in turns in one process.
 
 Every turn starts from rest, under the scene's load, so that it takes the same steps again: those of
-an implicit integrator cost more while the body moves.
+an implicit integrator cost more while the body moves. Where tools are moved it starts where they
+are deepest, for what they touch is stopped in each step.
 
 A machine is never quite still. Turns spread what disturbs it over all configurations alike, and
 each has gone some steps before the first turn that counts, so that nothing is compiled or touched

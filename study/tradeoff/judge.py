@@ -1,0 +1,156 @@
+"""What configurations are compared with: the scene's reference, or the finest lattice they have.
+
+Under tools that are moved the scene's finite elements are the reference where the scene names them
+and they follow to the end with a known error. Else each lattice is compared with a finer one of the
+same springs, which tells its discretisation alone; that is told beside the reference too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from study.models.lattice import LatticeModel
+from study.models.spacing_error import COARSER, ORDER, force_differences
+from study.run.stated import Stated
+from study.scene import Scene
+from study.similarity.fields import relative_l2, relative_l2_of_curves
+from study.sweep.canonical import restored
+from study.sweep.runner import Outcome
+from study.tradeoff.errors import Errors, errors
+from study.tradeoff.lineup import Configuration, contender, fraction
+from study.tradeoff.observation import Observed
+from study.tradeoff.reference import SolvedReference, Truth
+
+FINEST = 0.5
+"""Spacing of the lattice that others are compared with, times that of the scene's own lattice."""
+Family = tuple[str, bool]
+"""Lattices of the same springs: the kind of their model, and whether they have a volume term."""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """The reference, None where there is none to compare with, and the finest lattices.
+
+    `solved`: the record of the reference; `why` there is none, if it was asked for.
+    """
+
+    given: Stated
+    reference: Truth | None
+    solved: SolvedReference | None
+    finest: Mapping[Family, Truth]
+    why: str = ""
+
+    def truth(self, one: Configuration) -> Truth:
+        """What a configuration is compared with."""
+        return self.finest[family(one)] if self.reference is None else self.reference
+
+    def errors(self, one: Configuration, outcome: Outcome) -> Errors:
+        """Errors of the run of a configuration."""
+        found = errors(outcome, self.truth(one), self.given)
+        if family(one) not in self.finest or is_finest(self.given.scene, one):
+            return found
+        apart = errors(outcome, self.finest[family(one)], self.given)
+        return replace(found, discretisation=apart.force)
+
+    @property
+    def words(self) -> str:
+        """What errors are against, for a person."""
+        if self.reference is not None:
+            return "the scene's finite elements" if self.finest else "the converged reference"
+        finest = 1e3 * FINEST * self.given.scene.lattice.spacing
+        return f"the finest lattice of the same springs, {finest:.3g} mm: discretisation alone"
+
+
+def family(one: Configuration) -> Family:
+    """The springs of a lattice."""
+    return contender(one.contender).model, bool(one.settings.get("volume_term", False))
+
+
+def is_lattice(scene: Scene, one: Configuration) -> bool:
+    """Whether it has a spacing that another could be finer than."""
+    return isinstance(one.model(scene), LatticeModel)
+
+
+def refuse_unlike(scene: Scene, chosen: Iterable[Configuration]) -> None:
+    """ValueError for what is no lattice, of which there is no finer one to compare it with."""
+    for one in chosen:
+        if not is_lattice(scene, one):
+            raise ValueError(
+                f"contender {one.contender}: under tools that are moved it is compared with finite "
+                'elements only; add "fem" to models'
+            )
+
+
+def is_finest(scene: Scene, one: Configuration) -> bool:
+    """Whether it is what others are compared with."""
+    return one == _lattice(scene, family(one), FINEST)
+
+
+def lattices(scene: Scene, chosen: Iterable[Configuration]) -> dict[Family, list[Configuration]]:
+    """The finest lattice of each family among those chosen, and the one that tells its error."""
+    like = (one for one in chosen if is_lattice(scene, one))
+    families = dict.fromkeys(family(one) for one in like)
+    return {
+        one: [_lattice(scene, one, times) for times in (FINEST, COARSER * FINEST)]
+        for one in families
+    }
+
+
+def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
+    """As the contenders enter, so that a run is one of them."""
+    model, volume_term = springs
+    spacing, step = times * scene.lattice.spacing, {"step_fraction": fraction(scene)}
+    if model != "tissue":
+        return Configuration(model, {"spacing": spacing, **step})
+    name = "volume-springs" if volume_term else "springs"
+    return Configuration(name, {"spacing": spacing, "volume_term": volume_term, **step})
+
+
+def truth_of(outcomes: Sequence[Outcome], given: Stated) -> Truth:
+    """The finest lattice of a family as what is compared with, from both runs of `lattices`.
+
+    Its own errors are what halving the spacing changed, at an assumed order of one. ValueError
+    where one of the two was lost.
+    """
+    finest, coarser = (_whole(one, given) for one in outcomes)
+    if finest is None or coarser is None:
+        raise ValueError(
+            "a lattice that others are to be compared with did not reach the end "
+            f"({_said(outcomes)}); reduce the displacement of the tools or lattice.step_fraction"
+        )
+    share, volumes = 1.0 / (COARSER**ORDER - 1.0), given.problem.volume_rule.weights
+    curves = relative_l2_of_curves(coarser.curves - finest.curves, finest.curves)
+    over_time, peak = share * force_differences(given.problem, coarser.force, finest.force)
+    return replace(
+        finest,
+        field_error=share * relative_l2(coarser.field, finest.field, volumes),
+        curve_errors=share * curves,
+        force_errors=over_time,
+        peak_errors=peak,
+    )
+
+
+def _said(outcomes: Sequence[Outcome]) -> str:
+    lost = [one for one in outcomes if one.value is None or one.value["field"] is None]
+    return ", ".join(one.message or "diverged" for one in lost)
+
+
+def _whole(outcome: Outcome, given: Stated) -> Truth | None:
+    """What a run gave, as if it were exact; None of one that was lost."""
+    found = None if outcome.value is None else restored(Observed, outcome.value)
+    if found is None or found.field is None or found.curves is None or found.inverted_cells:
+        return None
+    samples, probes = len(given.problem.observation.times), len(given.problem.probes)
+    tools = len(given.problem.rigid_tools)
+    return Truth(
+        np.reshape(found.field, (-1, 3)),
+        np.reshape(found.curves, (samples, probes, 3)),
+        0.0,
+        np.zeros(probes),
+        np.reshape(found.force or [], (samples, tools, 3)),
+        np.zeros(tools),
+        np.zeros(tools),
+    )

@@ -1,0 +1,87 @@
+"""The error of a lattice by its spacing, from coarser ones: exact curves, and a body pressed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.models.lattice import asked_step
+from study.models.spacing_error import fitted_to_finest, force_differences, spacing_errors
+from study.models.table import model
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
+
+PRESSED = (
+    'organ.size=["60 mm", "60 mm", "40 mm"]',
+    'models=["tissue"]',
+    "reference.element_size=20 mm",
+    "tool.shape=punch",
+    "tool.radius=20 mm",
+    "tool.displacement=4 mm",
+    "tool.history.ramp=0.2 s",
+    "tool.history.hold=0.1 s",
+    "tool.history.release=0.1 s",
+    "time.duration=0.4 s",
+    "time.samples=41",
+)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return problem_of(read_scene("block", PRESSED))
+
+
+@pytest.fixture(scope="module")
+def moved(problem):
+    """Trajectories by spacing [mm]."""
+
+    def at(spacing):
+        scene = read_scene("block", (*PRESSED, f"lattice.spacing={spacing} mm"))
+        prepared = model(scene, "tissue").prepare(problem)
+        return prepared._march(asked_step(scene.lattice)).trajectory
+
+    return {spacing: at(spacing) for spacing in (20, 10, 5)}
+
+
+def test_an_error_of_first_order_is_given_back(problem, moved):
+    """Of forces and displacements that are planted: 1 + 3 h of those of the limit."""
+    limit = moved[10]
+
+    def at(h):
+        times = 1.0 + 3.0 * h
+        return replace(
+            limit, tool_force=times * limit.tool_force, displacement=times * limit.displacement
+        )
+
+    found = spacing_errors(problem, 0.01, at(0.02), at(0.01))
+    exact = pytest.approx(0.03 / 1.03)
+    assert (found.tool_force["tool"], found.peak_force["tool"]) == (exact, exact)
+    assert found.displacement == dict.fromkeys(problem.probes, exact)
+
+
+def test_a_lattice_that_diverged_tells_no_error(problem, moved):
+    lost = replace(moved[20], status="diverged")
+    assert spacing_errors(problem, 0.01, lost, moved[10]) is None
+
+
+def test_the_estimate_is_of_the_size_of_the_error(problem, moved):
+    """Against a lattice of half the spacing, whose own error is about half of it: docs/tools.md."""
+    found = spacing_errors(problem, 0.01, moved[20], moved[10])
+    over_time, peak = force_differences(problem, moved[10].tool_force, moved[5].tool_force)[:, 0]
+    assert 0.5 < found.tool_force["tool"] / (2.0 * over_time) < 2.7
+    assert 0.5 < found.peak_force["tool"] / (2.0 * peak) < 2.7
+
+
+def test_a_fit_to_the_finest_gives_back_constant_and_order():
+    h = np.array([0.02, 0.015, 0.012, 0.01])
+    found = fitted_to_finest(h, 7.0 * (h**1.3 - 0.005**1.3), 0.005)
+    assert (found.constant, found.order) == (
+        pytest.approx(7.0, rel=1e-3),
+        pytest.approx(1.3, rel=1e-3),
+    )
+    assert found.spread < 1e-3
+    assert found.error(0.005) == pytest.approx(7.0 * 0.005**1.3, rel=1e-2)
+    with pytest.raises(ValueError, match=r"only 2 lattices.*lattice\.spacing"):
+        fitted_to_finest(h[:2], [1.0, 0.5], 0.005)
