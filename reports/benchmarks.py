@@ -13,7 +13,6 @@ from importlib.resources.abc import Traversable
 
 from reports.differences import resolved
 from reports.digits import DASH, Table, count, fixed, percent, significant
-from study.results.folder import Results
 
 FOLDER = resources.files("reports").joinpath("data")
 VOLUME_TERM = {"False": "springs", "True": "springs and volume term"}
@@ -22,13 +21,11 @@ MILLI = 1e3
 Line = dict[str, str]
 
 
-def benchmarks(results: Results) -> dict[str, object] | None:
+def benchmarks() -> dict[str, object] | None:
     """Benchmarks of the lattice as tables by name.
 
-    None for a scene without one or where no table was delivered; one that is missing is left out.
+    None where no table was delivered; one that is missing is left out.
     """
-    if not has_lattice(results):
-        return None
     shapes: dict[str, Callable[[list[Line]], object]] = {
         "field_error": field_error,
         "real_time": real_time,
@@ -37,11 +34,6 @@ def benchmarks(results: Results) -> dict[str, object] | None:
     }
     found = {name: shape(lines) for name, shape in shapes.items() if (lines := read(name))}
     return found or None
-
-
-def has_lattice(results: Results) -> bool:
-    """Whether a model of the run is a lattice and not a single mass point."""
-    return any(model.lattice is not None for model in results.record.models)
 
 
 def read(name: str, folder: Traversable | None = None) -> list[Line]:

@@ -29,14 +29,14 @@ def budget_figure(results: Results) -> bytes | None:
         figure = canvas.sheet(HEIGHT)
         panels = figure.subplots(1, len(found), sharey=True, sharex=True, squeeze=False)[0]
         for axes, budget in zip(panels, found, strict=True):
-            _waterfall(axes, budget)
+            waterfall(axes, budget)
             axes.set_title(seen[budget.model].label)
             axes.set_xlabel("relative L2 difference [%]")
         return canvas.svg(figure)
 
 
-def _waterfall(axes: Axes, budget: ErrorBudget) -> None:
-    """Each contribution where those before it ended; a grey mark is what is left of the field."""
+def waterfall(axes: Axes, budget: ErrorBudget) -> None:
+    """Draw each contribution where those before it ended; a black mark is what is left."""
     names = ["whole", *(cause_name(part.cause, budget.reference) for part in budget.parts)]
     axes.barh(0, 100 * budget.total, height=0.7, color=WHOLE)
     _label(axes, 0, 100 * budget.total, percent(budget.total))
@@ -56,4 +56,4 @@ def _waterfall(axes: Axes, budget: ErrorBudget) -> None:
 
 
 def _label(axes: Axes, y: int, end: float, text: str) -> None:
-    axes.annotate(text, (end, y), (3, 0), textcoords="offset points", va="center", fontsize=6.5)
+    axes.annotate(text, (end, y), (3, 0), textcoords="offset points", va="center")

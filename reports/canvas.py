@@ -18,15 +18,18 @@ if TYPE_CHECKING:
 TEXT_WIDTH = 6.69
 """Width of the report's text [inch]."""
 RASTER_DPI = 200
+TEXT_SIZE = 8.0
+"""Size of all text [point]: figures are printed as large as they are drawn."""
 STYLE: dict[str, object] = {
     "svg.hashsalt": "liver-study",
     "text.parse_math": False,  # names come from users
-    "font.size": 7.5,
-    "axes.titlesize": 7.5,
-    "axes.labelsize": 7.5,
-    "xtick.labelsize": 6.5,
-    "ytick.labelsize": 6.5,
-    "legend.fontsize": 7.5,
+    "font.family": ["STIXGeneral", "DejaVu Sans"],  # like the text, and every glyph of the second
+    "font.size": TEXT_SIZE,
+    "axes.titlesize": TEXT_SIZE,
+    "axes.labelsize": TEXT_SIZE,
+    "xtick.labelsize": TEXT_SIZE,
+    "ytick.labelsize": TEXT_SIZE,
+    "legend.fontsize": TEXT_SIZE,
     "axes.linewidth": 0.5,
     "axes.spines.top": False,
     "axes.spines.right": False,

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from reports import budget, fuzzy_tables, score_tables, summary, tables
-from reports.benchmarks import benchmarks
+from reports import budget, first_figure, fuzzy_tables, score_tables, summary, tables
+from reports.alternatives import alternatives
 from reports.certified import certified_rows
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
-from reports.organ_ranking import organ_ranking
-from reports.page.answer import answer
-from reports.paper import TABLE_III_SPREAD
+from reports.page.answer import answer, question
+from reports.paper import TABLE_I, TABLE_III_SPREAD, sources
 from reports.ranking import columns, tool_probe
-from reports.ranking_study import is_ranked, ranking_study
 from reports.reference import is_built_in_liver, reference
 from reports.reference_spacing import reference_spacing
-from reports.robustness import robustness
 from reports.rule_view import view_names
 from reports.tool_force import force_rows, overlap
-from reports.validation import validation
-from reports.verification import verification
 from study.results.folder import Results
 
 SCENE_COLUMNS = 4
@@ -33,7 +28,10 @@ def document(results: Results) -> dict[str, object]:
         "title": words(title),
         "running_title": short(title, 80),
         "warnings": [words(text) for text in record.warnings],
+        "question": words(question(results)),
         "answer": _answer(results),
+        "first_caption": words(first_figure.caption(results)),
+        "alternatives": alternatives(results),
         "glance": summary.glance(results),
         "summary": summary.sentences(results),
         "reference_spacing": reference_spacing(results),
@@ -46,7 +44,7 @@ def document(results: Results) -> dict[str, object]:
         "unsourced_sets": [str(count) for count in fuzzy_tables.unsourced_count(results)],
         "rule_views": view_names(results),
         "surface_inputs": [name.upper() for name in results.scene.fuzzy.surface],
-        "sensitivity": fuzzy_tables.sensitivity_table(results),
+        "system_changes": fuzzy_tables.system_changes(results),
         "estimate_notes": tables.estimate_notes(results),
         "rule_count": str(record.fuzzy.rule_count or ""),
         "probes_left_out": len(record.probes) - len(shown_probes(results)),
@@ -75,12 +73,8 @@ def document(results: Results) -> dict[str, object]:
         "assumptions": [words(text) for text in record.assumptions],
         "notes": [words(text) for text in record.notes],
         "provenance": tables.provenance_rows(results),
-        "benchmarks": benchmarks(results),
-        "verification": verification(results),
-        "validation": validation(results),
-        "robustness": robustness(results),
-        "ranking_study": ranking_study() if is_ranked(results) else None,
-        "organ_ranking": organ_ranking() if is_ranked(results) else None,
+        "table_i": {"header": TABLE_I[0], "rows": TABLE_I[1:]},
+        "sources": [words(text) for text in sources(results)],
     }
 
 

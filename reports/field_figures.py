@@ -1,4 +1,4 @@
-"""The deformed organ in each model at peak load, and how far each is from the reference."""
+"""The scene: the deformed organ with what holds and pushes it; and where models part from it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,20 @@ Floats = NDArray[np.float64]
 PEAK = 0
 MILLI = 1e3
 COLUMNS = 3
-TALLEST_PANEL = 2.0
+TALLEST_PANEL = 1.9
 """Height of a panel [inch], however tall the organ."""
 SHOWN_DEFORMATION = 0.15
 """Largest drawn displacement as a share of the organ's extent, before rounding."""
 SCALE_LIMIT = 3.0
 """The colour scale ends at most at this multiple of the first model's largest value."""
+SCENE_WIDTH = 2.44
+"""Width of the picture of the scene [inch]."""
+KEY_HEIGHT = 0.9
+RED, BLUE = "#D00000", "#0072B2"
+HELD, LOADED = 0.5, 0.02
+"""Share of a triangle's area that is held, or loaded, from which on it is marked."""
+ROUND = 48
+"""Points of the outline of a tool."""
 ARROW_SHARE = 0.22
 TRIAD = {"L": (1.0, 0.0, 0.0), "P": (0.0, 1.0, 0.0), "S": (0.0, 0.0, 1.0)}
 """Left, posterior, superior: the positive directions of x, y, z."""
@@ -46,12 +54,16 @@ class Panel:
 
 @dataclass(frozen=True)
 class Sheet:
-    """Panels on one colour scale that ends at `limit` [m]; `label` of the scale."""
+    """Panels on one colour scale that ends at `limit` [m]; `label` of the scale.
+
+    `is_scene`: one picture with all that acts on the organ, else panels side by side.
+    """
 
     panels: list[Panel]
     limit: float
     label: str
     colours: str
+    is_scene: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,9 @@ class Views:
     """What is drawn of the organ: its surfaces, on sheets, as a camera sees them.
 
     `anchors` (probes + 1,): vertices at the tool and at the control points; `hidden`: whether they
-    lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest.
+    lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest; `held`
+    and `loaded` (m,): share of the area of each triangle; `radius` [m] of the tool; `shown`: label
+    of the model that is deformed.
     """
 
     camera: Camera
@@ -71,6 +85,10 @@ class Views:
     probes: tuple[str, ...]
     sheets: list[Sheet]
     inclusions: Floats
+    held: Floats
+    loaded: Floats
+    radius: float
+    shown: str
 
 
 def drawable(results: Results) -> list[str]:
@@ -88,13 +106,15 @@ def views(results: Results) -> Views | None:
     rest, triangles = fields["points"], fields["triangles"]
     peak = {name: fields[name][PEAK] for name in names}
     lengths = [_length(u) for u in peak.values()]
-    limit, factor = _limit(lengths), exaggeration(rest, lengths)
-    panels = [Panel(named[n], rest + factor * u, _length(u)) for n, u in peak.items()]
-    sheets = [Sheet(panels, limit, "displacement [mm]", "YlGnBu")]
+    factor = exaggeration(rest, lengths)
+    first = names[0]
+    panel = Panel(named[first], rest + factor * peak[first], lengths[0])
+    sheets = [Sheet([panel], float(lengths[0].max()) or 1.0, "displacement [mm]", "YlGnBu", True)]
     if "fem" in peak and len(peak) > 1:
         sheets.append(_differences(rest, peak, named))
     centre, push = fields["tool"]
-    everything = np.concatenate([rest, *(panel.points for panel in panels)])
+    everything = np.concatenate([rest, panel.points])
+    none = np.zeros(len(triangles))
     anchors = _nearest(rest, np.vstack([centre, fields["probes"]]))
     camera = facing_tool(everything, centre, push)
     return Views(
@@ -107,6 +127,10 @@ def views(results: Results) -> Views | None:
         probes=results.record.probes,
         sheets=sheets,
         inclusions=fields.get("inclusions", np.zeros((0, 0, 3))),
+        held=fields.get("held", none),
+        loaded=fields.get("loaded", none),
+        radius=results.scene.tool.radius,
+        shown=named[first],
     )
 
 
@@ -165,6 +189,52 @@ def field_figures(views: Views, pictures: Pictures) -> list[bytes]:
 
 
 def _figure(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
+    return _scene(views, sheet, pictures) if sheet.is_scene else _panels(views, sheet, pictures)
+
+
+def _scene(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
+    """One picture over its key."""
+    camera, (panel,) = views.camera, sheet.panels
+    height = SCENE_WIDTH * camera.half_height / camera.half_width
+    figure = canvas.sheet(height + KEY_HEIGHT, SCENE_WIDTH)
+    axes, key = figure.subplots(2, 1, height_ratios=(height, KEY_HEIGHT))
+    _frame(axes, camera)
+    _draw_panel(axes, views, panel, sheet, pictures, 0)
+    _mark_triangles(axes, views, panel)
+    _mark(axes, views, panel.points[views.anchors])
+    width = camera.half_width
+    key.set(xlim=(-width, width), ylim=(-2.0 * width * KEY_HEIGHT / SCENE_WIDTH, 0.0))
+    canvas.blank(key)
+    _draw_scene_key(key, views, sheet)
+    return figure
+
+
+def _mark_triangles(axes: Axes, views: Views, panel: Panel) -> None:
+    """Supports as triangles and loaded places as dots, amid facets; hollow if hidden."""
+    corners = panel.points[views.triangles]
+    seen = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    is_near = seen @ views.camera.toward > 0.0
+    places = views.camera.project(corners.mean(axis=1))
+    for chosen, marker, colour in (
+        (views.held > HELD, "^", BLUE),
+        (views.loaded > LOADED, "o", RED),
+    ):
+        for near, face in ((False, "none"), (True, colour)):
+            at = places[chosen & (is_near == near)]
+            axes.plot(at[:, 0], at[:, 1], marker, ms=2.2, mfc=face, mec=colour, mew=0.35, alpha=0.8)
+
+
+def _draw_scene_key(axes: Axes, views: Views, sheet: Sheet) -> None:
+    _draw_colour_bar(axes, (0.04, 0.8, 0.42, 0.13), sheet)
+    named = [f"{i}  {short(name, 16)}" for i, name in enumerate(views.probes[:5], 1)]
+    named += ["…"] if len(views.probes) > len(named) else []
+    axes.text(0.56, 1.0, "\n".join(named), transform=axes.transAxes, va="top", linespacing=1.1)
+    width = views.camera.half_width
+    _draw_triad(axes, views.camera, (-0.72 * width, -0.66 * width), 0.13 * width)
+    _draw_scale_bar(axes, views.camera, (-0.4 * width, -0.7 * width))
+
+
+def _panels(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
     count = len(sheet.panels) + 1  # the last one is the key
     rows = -(-count // COLUMNS)
     camera = views.camera
@@ -175,15 +245,21 @@ def _figure(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
     for i, (axes, panel) in enumerate(zip(grid, sheet.panels, strict=False)):
         _frame(axes, camera)
         axes.set_title(panel.title, pad=2)
-        if pictures.pixels is None:
-            _draw_flat(axes, views, panel, sheet)
-        else:
-            axes.imshow(pictures.pixels[i], extent=camera.extent, interpolation="none")
+        _draw_panel(axes, views, panel, sheet, pictures, i)
         _mark(axes, views, panel.points[views.anchors])
     for axes in grid[count - 1 :]:
         _frame(axes, camera)
     _draw_key(grid[count - 1], views, sheet)
     return figure
+
+
+def _draw_panel(
+    axes: Axes, views: Views, panel: Panel, sheet: Sheet, pictures: Pictures, i: int
+) -> None:
+    if pictures.pixels is None:
+        _draw_flat(axes, views, panel, sheet)
+    else:
+        axes.imshow(pictures.pixels[i], extent=views.camera.extent, interpolation="none")
 
 
 def _frame(axes: Axes, camera: Camera) -> None:
@@ -217,10 +293,19 @@ def _mark(axes: Axes, views: Views, places: Floats) -> None:
         _mark_inclusion(axes, camera.project(outline))
     length = ARROW_SHARE * 2.0 * camera.half_width
     shaft = camera.project(np.stack([places[0] - length * views.push, places[0]]))
-    arrow = {"arrowstyle": "-|>", "color": "#D00000", "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
+    arrow = {"arrowstyle": "-|>", "color": RED, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tuple(shaft[1]), tuple(shaft[0]), arrowprops=arrow)
+    ring = camera.project(_ring(places[0], views.push, views.radius))
+    axes.plot(ring[:, 0], ring[:, 1], color=RED, lw=1.0)
     for i, place in enumerate(camera.project(places[1:])):
         _mark_point(axes, place, str(i + 1), bool(views.hidden[i + 1]))
+
+
+def _ring(centre: Floats, axis: Floats, radius: float) -> Floats:
+    """Outline [m] (ROUND, 3) of a round tool."""
+    across = np.linalg.svd(axis[np.newaxis])[2][1:]
+    turn = np.linspace(0.0, 2.0 * np.pi, ROUND)
+    return np.asarray(centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across)
 
 
 def _mark_inclusion(axes: Axes, seen: Floats) -> None:
@@ -236,53 +321,55 @@ def _mark_point(axes: Axes, place: Floats, text: str, hidden: bool) -> None:
     face = "none" if hidden else "white"
     axes.plot(*place, "o", ms=3.0, mfc=face, mec="black", mew=0.6, clip_on=False)
     halo = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
-    axes.annotate(
-        text, tuple(place), (3, 3), textcoords="offset points", fontsize=6, bbox=halo, va="bottom"
-    )
+    axes.annotate(text, tuple(place), (3, 3), textcoords="offset points", bbox=halo, va="bottom")
 
 
 def _draw_key(axes: Axes, views: Views, sheet: Sheet) -> None:
     """Colour scale, triad, scale bar, arrow and control points."""
+    _draw_colour_bar(axes, (0.08, 0.86, 0.84, 0.09), sheet)
+    width, height = views.camera.half_width, views.camera.half_height
+    origin = (-0.55 * width, -0.45 * height)
+    _draw_triad(axes, views.camera, origin, 0.3 * min(width, height))
+    _draw_scale_bar(axes, views.camera, (-0.9 * width, -0.86 * height))
+    names = [f"{i}  {short(name, 20)}" for i, name in enumerate(views.probes[:6], 1)]
+    names += ["…"] if len(views.probes) > len(names) else []
+    names += ["⋯  inclusion, at rest"] if len(views.inclusions) else []
+    text = "\n".join(["→  tool", *names])
+    axes.text(0.5, 0.52, text, transform=axes.transAxes, va="top", linespacing=1.25)
+
+
+def _draw_colour_bar(axes: Axes, place: tuple[float, float, float, float], sheet: Sheet) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     scale = ScalarMappable(Normalize(0.0, MILLI * sheet.limit), sheet.colours)
-    bar = axes.inset_axes((0.08, 0.86, 0.84, 0.09))
+    bar = axes.inset_axes(place)
     is_clipped = any(panel.values.max() > sheet.limit * (1 + 1e-9) for panel in sheet.panels)
     axes.figure.colorbar(
         scale, cax=bar, orientation="horizontal", extend="max" if is_clipped else "neither"
     )
     bar.set_xlabel(sheet.label, labelpad=1)
     bar.grid(visible=False)
-    _draw_triad(axes, views.camera)
-    _draw_scale_bar(axes, views.camera)
-    names = [f"{i}  {short(name, 20)}" for i, name in enumerate(views.probes[:6], 1)]
-    names += ["…"] if len(views.probes) > len(names) else []
-    names += ["⋯  inclusion, at rest"] if len(views.inclusions) else []
-    text = "\n".join(["→  tool", *names])
-    axes.text(0.5, 0.52, text, transform=axes.transAxes, va="top", fontsize=6.5, linespacing=1.25)
 
 
-def _draw_triad(axes: Axes, camera: Camera) -> None:
+Place = tuple[float, float]
+
+
+def _draw_triad(axes: Axes, camera: Camera, origin: Place, length: float) -> None:
     """Left, posterior and superior as they lie in the pictures."""
-    origin = np.array([-0.55 * camera.half_width, -0.45 * camera.half_height])
-    length = 0.3 * min(camera.half_width, camera.half_height)
     arrow: Style = {"arrowstyle": "->", "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
     for name, direction in TRIAD.items():
         step = length * (np.array(direction) @ np.stack([camera.right, camera.up], axis=1))
-        axes.annotate("", tuple(origin + step), tuple(origin), arrowprops=arrow)
-        x, y = origin + 1.35 * step
-        axes.text(x, y, name, ha="center", va="center", fontsize=6.5)
+        axes.annotate("", tuple(np.add(origin, step)), origin, arrowprops=arrow)
+        x, y = np.add(origin, 1.5 * step)
+        axes.text(x, y, name, ha="center", va="center")
 
 
-def _draw_scale_bar(axes: Axes, camera: Camera) -> None:
-    length = _scale_length(camera.half_width)
-    left, level = -0.9 * camera.half_width, -0.86 * camera.half_height
+def _draw_scale_bar(axes: Axes, camera: Camera, at: Place) -> None:
+    length, (left, level) = _scale_length(camera.half_width), at
     axes.plot([left, left + length], [level, level], color="black", lw=1.5, solid_capstyle="butt")
     label = f"{significant(MILLI * length, 1)} mm"
-    axes.annotate(
-        label, (left + length, level), (3, 0), textcoords="offset points", va="center", fontsize=6.5
-    )
+    axes.annotate(label, (left + length, level), (3, 0), textcoords="offset points", va="center")
 
 
 def _scale_length(half_width: float) -> float:
@@ -321,7 +408,11 @@ def _normals(points: Floats, triangles: NDArray[np.int64]) -> Floats:
 
 def explain(views: Views) -> dict[str, str]:
     """Exaggeration and direction of the push, as the caption of the pictures says them."""
-    return {"factor": fixed(views.factor, 0), "push": _direction(views.push)}
+    return {
+        "factor": fixed(views.factor, 0),
+        "push": _direction(views.push),
+        "of": views.shown,
+    }
 
 
 def _direction(push: Floats) -> str:

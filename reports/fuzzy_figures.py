@@ -185,7 +185,7 @@ def _draw_solid(axes: Any, x: Floats, y: Floats, z: Floats, scale: Style) -> Non
     )
     axes.set_zlim(scale["vmin"], scale["vmax"])
     axes.locator_params(nbins=TICKS)
-    axes.tick_params(pad=-3, labelsize=5.5)
+    axes.tick_params(pad=-3)
     axes.view_init(elev=28, azim=-128)
     axes.set_box_aspect(None, zoom=0.88)
 

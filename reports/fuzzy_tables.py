@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
-from operator import attrgetter
 
 from reports.appearance import system_name
-from reports.digits import DASH, PA_PER_KPA, Group, Table, fixed, percent, words
+from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, words
 from study.results.folder import Results
 from study.results.records import StiffnessSet
 from study.results.tables import SensitivityEntry
@@ -52,41 +50,9 @@ def within_systems(found: Iterable[SensitivityEntry]) -> list[SensitivityEntry]:
     return [entry for entry in found if entry.choice != SYSTEM]
 
 
-def sensitivity_table(results: Results) -> dict[str, object] | None:
-    """Sensitivity of the estimates [kPa] to each choice as grouped rows, or None without any.
-
-    `systems`: names of the columns' groups; `groups`: name of the choice and its rows, each the
-    alternative, per system the change at the readings, rms and largest, and the count of readings.
-    """
-    found = within_systems(results.sensitivity)
-    if not found:
-        return None
-    systems = list(dict.fromkeys(entry.system for entry in found))
-    groups: list[Group] = [
-        {"name": name, "rows": list(_alternative_rows(members, systems))}
-        for name, members in groupby(found, heading)
-    ]
-    return {
-        "systems": [system_name(system) for system in systems],
-        "groups": groups,
-        "between": [_system_row(e) for e in results.sensitivity if e.choice == SYSTEM],
-    }
-
-
-def _alternative_rows(
-    members: Iterable[SensitivityEntry], systems: list[str]
-) -> Iterator[list[str]]:
-    for alternative, group in groupby(members, attrgetter("alternative")):
-        found = {entry.system: entry for entry in group}
-        cells = [cell for system in systems for cell in _cells(found.get(system))]
-        yield [words(alternative), *cells, fixed(next(iter(found.values())).readings, 0)]
-
-
-def _cells(entry: SensitivityEntry | None) -> list[str]:
-    if entry is None:
-        return [DASH] * 3
-    changes = (entry.change_at_readings_pa, entry.rms_change_pa, entry.largest_change_pa)
-    return [_kilo(change) for change in changes]
+def system_changes(results: Results) -> Table:
+    """How far the estimates [kPa] of two systems are apart: here, rms and largest over readings."""
+    return [_system_row(one) for one in results.sensitivity if one.choice == SYSTEM]
 
 
 def _kilo(value: float) -> str:
@@ -95,7 +61,8 @@ def _kilo(value: float) -> str:
 
 def _system_row(entry: SensitivityEntry) -> list[str]:
     pair = f"{system_name(entry.base)} → {system_name(entry.alternative)}"
-    return [pair, *_cells(entry), fixed(entry.readings, 0)]
+    changes = (entry.change_at_readings_pa, entry.rms_change_pa, entry.largest_change_pa)
+    return [pair, *map(_kilo, changes)]
 
 
 def sensitivity_sentences(results: Results) -> list[str]:

@@ -79,11 +79,16 @@ def shown_probes(results: Results) -> tuple[str, ...]:
     return results.record.probes[:MOST_PROBES]
 
 
+def probe_groups(results: Results) -> list[tuple[str, ...]]:
+    """The control points that are drawn, by figure."""
+    probes = shown_probes(results)
+    starts = range(0, len(probes), PROBES_PER_FIGURE)
+    return [probes[start : start + PROBES_PER_FIGURE] for start in starts]
+
+
 def motion_figures(results: Results) -> Iterator[bytes]:
     """Figures of the motion as SVG, of a few probes each, one row per probe."""
-    probes = shown_probes(results)
-    for start in range(0, len(probes), PROBES_PER_FIGURE):
-        group = probes[start : start + PROBES_PER_FIGURE]
+    for group in probe_groups(results):
         drawn = {probe: motions(results, probe) for probe in group}
         if any(drawn.values()):
             with canvas.style():
@@ -110,10 +115,17 @@ def _draw_row(row: Sequence[Axes], found: list[ProbeMotion]) -> None:
         (row[2], 1, 2, "displacement [mm]", "velocity [mm/s]"),
     )
     for axes, x, y, x_label, y_label in panels:
-        for one in found:
-            _draw(axes, one, x, y)
-        axes.set(xlabel=x_label, ylabel=y_label)
-        _limit(axes, found, x, y)
+        draw_motion(axes, found, x, y, x_label, y_label)
+
+
+def draw_motion(
+    axes: Axes, found: list[ProbeMotion], x: int, y: int, x_label: str, y_label: str
+) -> None:
+    """Row `y` of each motion over row `x`: time, displacement, velocity are 0, 1, 2."""
+    for one in found:
+        _draw(axes, one, x, y)
+    axes.set(xlabel=x_label, ylabel=y_label)
+    _limit(axes, found, x, y)
 
 
 def _draw(axes: Axes, one: ProbeMotion, x: int, y: int) -> None:

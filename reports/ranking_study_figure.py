@@ -105,9 +105,9 @@ def draw_indices(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> Non
     for (y, x), value in np.ndenumerate(shown):
         if value >= 0.05:
             ink = "white" if value > 0.5 else "black"
-            axes.text(x, y, f"{value:.1f}", ha="center", va="center", fontsize=6.0, color=ink)
+            axes.text(x, y, f"{value:.1f}", ha="center", va="center", color=ink)
         if np.isnan(value):
-            axes.text(x, y, "?", ha="center", va="center", fontsize=6.0, color="grey")
+            axes.text(x, y, "?", ha="center", va="center", color="grey")
     axes.set_xticks(range(len(unknowns)), [name.replace("_", " ") for name in unknowns])
     axes.tick_params(axis="x", rotation=60, length=0)
     for label in axes.get_xticklabels():

@@ -10,24 +10,14 @@ from collections import Counter
 from collections.abc import Sequence
 from importlib.resources.abc import Traversable
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING
 
-from reports import canvas
 from reports.appearance import system_name
 from reports.benchmarks import Line, read
 from reports.digits import fixed
 from reports.paper import TABLE_III
-from reports.ranking_study import SPACING, column, is_ranked, winners_over_spacing
-from reports.ranking_study_figure import draw_curves, draw_winners
+from reports.ranking_study import SPACING, is_ranked, winners_over_spacing
 from study.results.folder import Results
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME = "reference_spacing"
-DRAWN = ("displacement", "iso-18571")
-"""Curve and measure that are drawn: one whose scores come as high as the paper's."""
-HEIGHT, WIDTH = 1.35, 3.9
 MILLI = 1e3
 
 
@@ -72,30 +62,3 @@ def _margins() -> str:
     ordered = sorted(TABLE_III.values(), reverse=True)
     gaps = [fixed(a - b, 4) for a, b in pairwise(ordered)]
     return " and ".join(gaps)
-
-
-def reference_spacing_figure(results: Results) -> bytes | None:
-    """The small figure of the first page as SVG; None where there is no sentence."""
-    if reference_spacing(results) is None:
-        return None
-    own = results.scene.damping.reference_spacing
-    return canvas.picture(lambda: _figure(read(SPACING), own))
-
-
-def _figure(lines: Sequence[Line], own: float) -> Figure:
-    figure = canvas.sheet(HEIGHT, WIDTH)
-    strips, scores = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
-    draw_winners(strips, lines)
-    chosen = [line for line in lines if (line["curve"], line["measure"]) == DRAWN]
-    draw_curves(scores, chosen)
-    for axes in (strips, scores):
-        axes.axvline(MILLI * own, color="black", linewidth=0.6, linestyle=":")
-        axes.set_xlabel("h₀ [mm]")
-    strips.set_yticklabels([name.replace("phase plane", "loop") for name in _names(lines)])
-    strips.tick_params(axis="y", labelsize=5.0)
-    figure.legend(*scores.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return figure
-
-
-def _names(lines: Sequence[Line]) -> list[str]:
-    return list(dict.fromkeys(map(column, lines)))

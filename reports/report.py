@@ -12,26 +12,20 @@ from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from threading import Event
+from typing import Literal, TypedDict
 
 import numpy as np
 
 from reports.budget_figure import budget_figure
 from reports.content import document
-from reports.difference_figure import difference_figure
-from reports.differences import finite_elements
 from reports.field_figures import Views, explain, field_figures, job, views
+from reports.first_figure import first_figure
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.motion_figures import motion_figures
-from reports.organ_ranking_figure import organ_figures
-from reports.ranking_study import is_ranked
-from reports.ranking_study_figure import ranking_figures
-from reports.reference_spacing import reference_spacing_figure
 from reports.renders import Pictures, render_once
-from reports.robustness import robustness_figures
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
-from reports.validation_figure import validation_figure
 from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
@@ -41,6 +35,12 @@ from study.sweep.program import everything
 
 NAME = "report.pdf"
 TEMPLATE = "template.typ"
+PARTS = ("style.typ", "paper.typ")
+"""What a template includes."""
+STANDARD: Literal["ua-1"] = "ua-1"
+"""PDF/UA-1: tagged, with alternative texts, a language and a title."""
+NO_GLYPH = "could not be displayed with font"
+"""In what typst says of a text that no font of its own has letters for."""
 Figures = dict[str, list[bytes]]
 Drawing = dict[str, str] | None
 NOWHERE = Provenance(
@@ -148,16 +148,10 @@ def _plots(results: Results) -> Figures:
         figures["rules"] = rule_figures(results)
     single = {
         "sensitivity": sensitivity_figure(results.sensitivity),
-        "differences": difference_figure(results),
         "budget": budget_figure(results),
         "tool_force": force_figure(results),
-        "reference_spacing": reference_spacing_figure(results),
-        **robustness_figures(results),
+        "first": first_figure(results),
     }
-    if finite_elements(results) is not None:
-        single["validation"] = validation_figure()
-    if is_ranked(results):
-        single |= ranking_figures() | organ_figures()
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 
@@ -165,12 +159,20 @@ def _with_pictures(
     figures: Figures, seen: Views, pictures: Future[Pictures]
 ) -> tuple[Figures, Drawing]:
     found = pictures.result()
-    drawn = figures | {"fields": field_figures(seen, found)}
+    scene, *others = field_figures(seen, found)
+    drawn = figures | {"scene": [scene], "fields": others}
     return drawn, explain(seen) | {"renderer": found.renderer}
 
 
-def compile_pdf(content: dict[str, object], figures: Figures) -> bytes:
-    """PDF of the template filled with text and figures.
+class _How(TypedDict):
+    """What typst is given besides the document."""
+
+    root: str
+    ignore_system_fonts: bool
+
+
+def compile_pdf(content: dict[str, object], figures: Figures, name: str = TEMPLATE) -> bytes:
+    """Tagged PDF of a template filled with text and figures.
 
     Raises ValueError for a number that is not finite, RuntimeError for a template that does not
     compile, for example because it refers to a label that is missing.
@@ -179,19 +181,28 @@ def compile_pdf(content: dict[str, object], figures: Figures) -> bytes:
 
     names = {place: [f"{place}-{i}.svg" for i in range(len(svg))] for place, svg in figures.items()}
     text = json.dumps(content | {"figures": names}, allow_nan=False)
-    with tempfile.TemporaryDirectory(prefix="liver-study-") as name:
-        root = Path(name)
+    with tempfile.TemporaryDirectory(prefix="liver-study-") as folder:
+        root = Path(folder)
         (root / "content.json").write_text(text, encoding="utf-8")
-        (root / TEMPLATE).write_bytes(template())
+        for part in (name, *PARTS):
+            (root / part).write_bytes(template(part))
         for place, drawn in figures.items():
             for file, svg in zip(names[place], drawn, strict=True):
                 (root / file).write_bytes(svg)
-        return bytes(typst.compile(str(root / TEMPLATE), root=name, ignore_system_fonts=True))
+        path = str(root / name)
+        how: _How = {"root": folder, "ignore_system_fonts": True}
+        try:
+            return bytes(typst.compile(path, pdf_standards=STANDARD, **how))
+        except typst.TypstError as error:
+            if NO_GLYPH not in str(error):
+                raise
+            # A name in a script that the fonts lack: tagged all the same, but for those letters.
+            return bytes(typst.compile(path, **how))
 
 
-def template() -> bytes:
-    """The document's typst source."""
-    return resources.files("reports").joinpath(TEMPLATE).read_bytes()
+def template(name: str = TEMPLATE) -> bytes:
+    """Typst source of a document, or of a part of one."""
+    return resources.files("reports").joinpath(name).read_bytes()
 
 
 def _check(path: Path) -> None:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from reports import stability, tradeoff, tradeoff_answers
-from reports.benchmarks import has_lattice
 from reports.digits import count, percent, words
 from reports.stability_map import critical_step_figure, stability_map
 from reports.tradeoff_figure import tradeoff_figure
-from study.results.folder import Results
 
 
-def robustness(results: Results) -> dict[str, object] | None:
+def robustness() -> dict[str, object] | None:
     """Trade-off and stability study as text; one whose table is missing is left out.
 
-    None for a scene without a lattice or where neither table was delivered.
+    None where neither table was delivered.
     """
-    if not has_lattice(results):
-        return None
     found: dict[str, object] = {}
     if configurations := tradeoff.configurations():
         found["tradeoff"] = {
@@ -29,10 +25,8 @@ def robustness(results: Results) -> dict[str, object] | None:
     return found or None
 
 
-def robustness_figures(results: Results) -> dict[str, bytes | None]:
+def robustness_figures() -> dict[str, bytes | None]:
     """Figures of both studies as SVG by place in the document; None where a table is missing."""
-    if not has_lattice(results):
-        return {}
     cases = stability.cases()
     return {
         "tradeoff": tradeoff_figure(tradeoff.configurations()),

@@ -18,15 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PREFIX = "view."
-ROW_HEIGHT = 0.27
-OUTPUT_HEIGHT = 0.78
-FRAME_HEIGHT = 0.72
+ROW_HEIGHT = 0.28
+OUTPUT_HEIGHT = 0.74
+FRAME_HEIGHT = 0.78
 FRAME = {"left": 0.075, "right": 0.985, "wspace": 0.12}
 OUTPUT_COLUMN = 1.3
 LEAST_SHARE = 0.01
 """Of the weight, below which a constant is drawn and not named."""
-CELL_TEXT = 6.0
-TOP = 1.5
+TOP = 2.1
 """Upper end of a small panel's axis; above 1 there is room for the name of the set."""
 ANTECEDENT, CONSEQUENT, READING = "#0072B2", "#E69F00", "#D55E00"
 ROOM = 1.15
@@ -75,7 +74,7 @@ def _draw_table(figure: Figure, view: Arrays, inputs: list[int], height: float) 
         len(inputs) + 1,
         width_ratios=[1.0] * len(inputs) + [OUTPUT_COLUMN],
         top=1.0 - 0.2 / height,
-        bottom=(OUTPUT_HEIGHT + 0.58) / height,
+        bottom=(OUTPUT_HEIGHT + 0.64) / height,
         hspace=0.14,
         **FRAME,
     )
@@ -102,14 +101,14 @@ def _label_row(axes: Axes, view: Arrays, row: int) -> None:
     if shares.size:
         text += f"\n{_percent(shares[row])}"
     place: Style = {"transform": axes.transAxes, "ha": "right", "va": "center"}
-    axes.text(-0.08, 0.4, text, fontsize=CELL_TEXT, **place)
+    axes.text(-0.08, 0.4, text, linespacing=0.95, **place)
 
 
 def _plain(axes: Axes) -> None:
     """A small panel: membership from 0 to 1, no numbers on its axis."""
     axes.set(ylim=(0.0, TOP), yticks=[])
     axes.grid(visible=False)
-    axes.tick_params(labelsize=CELL_TEXT, length=1.5, pad=1)
+    axes.tick_params(length=1.5, pad=1)
     axes.locator_params(axis="x", nbins=4)
 
 
@@ -152,7 +151,7 @@ def _draw_set(
 
 def _label(axes: Axes, text: str) -> None:
     place: Style = {"transform": axes.transAxes, "ha": "right", "va": "top"}
-    axes.text(0.99, 1.0, text, fontsize=CELL_TEXT, **place)
+    axes.text(0.99, 1.0, text, **place)
 
 
 def _span(low: float, high: float) -> str:
@@ -203,7 +202,7 @@ def _output_end(view: Arrays) -> float:
 
 def _output_axes(figure: Figure, height: float) -> Axes:
     width = FRAME["right"] - FRAME["left"]
-    return figure.add_axes((FRAME["left"], 0.32 / height, width, OUTPUT_HEIGHT / height))
+    return figure.add_axes((FRAME["left"], 0.36 / height, width, OUTPUT_HEIGHT / height))
 
 
 def _draw_output(axes: Axes, view: Arrays, kind: str) -> None:
@@ -250,7 +249,6 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
         place: Style = {
             "textcoords": "offset points",
             "va": "center",
-            "fontsize": CELL_TEXT,
         }
         axes.annotate(str(name), (constant, share), (4, 0), **place)
         text = f"{name}: {fixed(constant, 2)} {unit}, weight {_percent(share)}"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-LINE_HEIGHT = 0.132
+LINE_HEIGHT = 0.14
 FRAME_HEIGHT = 0.75
 GROUP_GAP = 0.55
 """Between two choices, in lines."""
@@ -111,10 +111,10 @@ def _mark(system: str) -> Style:
 
 def _label(axes: Axes, lines: list[Line], heads: list[tuple[float, str]]) -> None:
     axes.set_yticks([y for y, _, _ in lines], [label for _, label, _ in lines])
-    axes.tick_params(axis="y", length=0, labelsize=6.5)
+    axes.tick_params(axis="y", length=0)
     for y, name in heads:
         place: Style = {"transform": axes.get_yaxis_transform(), "va": "center"}
-        axes.text(-0.01, y, name, ha="right", fontweight="bold", fontsize=7, **place)
+        axes.text(-0.01, y, name, ha="right", fontweight="bold", **place)
     ticks = [LEAST, 0.01, 0.1, 1.0, 10.0]
     axes.set_xticks(ticks, [f"≤ {LEAST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.set_xlabel("change of the estimate [kPa]: mark rms, whisker to the largest")

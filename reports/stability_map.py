@@ -66,7 +66,7 @@ def _draw_counts(axes: Axes, found: Sequence[StabilityCase]) -> None:
             if counts[head]:
                 axes.barh(y, 0.92, left=x - 0.46, height=0.84, color=shade, linewidth=0)
             ink = "white" if wrong else "black" if counts[head] else "#aaaaaa"
-            axes.text(x, y, str(counts[head]), ha="center", va="center", color=ink, fontsize=7)
+            axes.text(x, y, str(counts[head]), ha="center", va="center", color=ink)
     axes.xaxis.tick_top()
     axes.set_xticks(range(len(HEADS)), [head.replace(" ", "\n", 1) for head in HEADS])
     axes.tick_params(length=0)

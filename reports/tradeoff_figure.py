@@ -155,7 +155,7 @@ def _draw_list(axes: Axes, without: Table) -> None:
     """Those without an error, and why."""
     axes.set_axis_off()
     texts = [fill(f"{name}: {status} {message}", COLUMN) for name, status, message in without]
-    place: Style = {"va": "top", "fontsize": 5.6, "linespacing": 1.25}
+    place: Style = {"va": "top", "linespacing": 1.25}
     axes.text(0.0, 1.0, "\n".join(["Without an error:", *texts]), in_layout=False, **place)
 
 
@@ -179,4 +179,4 @@ def _note(axes: Axes, text: str, at: tuple[float, float], coords: tuple[str, str
 
 
 def _small(**more: str) -> Style:
-    return {"textcoords": "offset points", "fontsize": 5.8, "color": "#444444"} | more
+    return {"textcoords": "offset points", "color": "#444444"} | more

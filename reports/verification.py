@@ -7,22 +7,18 @@ from collections import Counter
 from itertools import groupby
 
 from reports.benchmarks import Line, read
-from reports.differences import finite_elements
 from reports.digits import DASH, Group, Table, count, fixed, significant, words
-from study.results.folder import Results
 
 GROWTH = "growth: "
 PARTS = ("mesh", "assembly", "solution")
 JUDGED = {"True": "passed", "False": "FAILED"}
 
 
-def verification(results: Results) -> dict[str, object] | None:
+def verification() -> dict[str, object] | None:
     """Verification and cost of the finite elements as tables by name.
 
-    None for a scene without them or where no table was delivered; one that is missing is left out.
+    None where no table was delivered; one that is missing is left out.
     """
-    if finite_elements(results) is None:
-        return None
     found: dict[str, object] = {}
     if lines := read("verification"):
         found |= {"problems": problems(lines), "outcomes": outcomes(lines)}

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import typst
 
-from reports import report
+from reports import measured, report
 from reports.content import document
 from study.results.folder import Results
 from study.results.records import (
@@ -135,21 +135,36 @@ def bare(results: Results | None = None) -> dict[str, Any]:
     """Content of a report without figures."""
     results = without_arrays(results)
     results = with_record(results, lattice_limits=None)  # the text on them refers to a figure
-    left_out = dict.fromkeys(("drawing", "ranking_study", "organ_ranking"))
-    return document(results) | left_out
+    return document(results) | {"drawing": None}
 
 
-def printed(content: dict[str, Any]) -> list[str]:
-    """Every text in the figures and strong words of the document that typst lays out."""
+def beforehand() -> dict[str, Any]:
+    """Content of the document of what was measured beforehand, without the rankings' figures."""
+    return measured.measured() | dict.fromkeys(("ranking_study", "organ_ranking"))
 
-    def query(path: str, *, root: str, ignore_system_fonts: bool) -> bytes:
+
+def beforehand_pdf(figures: report.Figures | None = None) -> bytes:
+    """That document without figures, or with some."""
+    return report.compile_pdf(beforehand(), figures or {}, measured.TEMPLATE)
+
+
+def printed(content: dict[str, Any], name: str = report.TEMPLATE) -> list[str]:
+    """Every text in the figures and strong words of a document that typst lays out."""
+
+    def query(path: str, *, root: str, ignore_system_fonts: bool, pdf_standards: Any) -> bytes:
+        del pdf_standards
         given: Any = {"root": root, "ignore_system_fonts": ignore_system_fonts}
         return "".join(typst.query(path, kind, **given) for kind in ("figure", "strong")).encode()
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(typst, "compile", query)
-        text = report.compile_pdf(content, {"motion": []}).decode()
+        text = report.compile_pdf(content, {"motion": []}, name).decode()
     return [json.loads(piece) for piece in TEXT.findall(text)]
+
+
+def printed_beforehand() -> list[str]:
+    """Every text in the figures and strong words of what was measured beforehand."""
+    return printed(beforehand(), measured.TEMPLATE)
 
 
 def _scene(models: list[str], probes: list[str], title: str) -> Scene:

@@ -1,4 +1,4 @@
-"""The appendix prints what the benchmarks measured, says that it is not of the run, and no more."""
+"""The reference document prints what the benchmarks measured, of no run, and no more."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reports import benchmarks, report
+from reports import benchmarks
 from reports.digits import percent, significant
-from study.results.records import PointRecord
-from tests.report_samples import FUZZY, bare, printed, results_of, with_model
+from tests.report_samples import beforehand_pdf, printed_beforehand
 
 DATA = Path(benchmarks.__file__).parent / "data"
 NAMES = ["field_error", "real_time", "large_strain", "peers"]
@@ -26,8 +25,8 @@ def _folder(tmp_path, monkeypatch):
     return copy
 
 
-def found(results=None):
-    return benchmarks.benchmarks(results or results_of())
+def found():
+    return benchmarks.benchmarks()
 
 
 def plant(path, column, value, row=0):
@@ -48,8 +47,8 @@ def numbers(name, column):
 
 
 def test_the_document_prints_the_figures_of_the_tables():
-    texts = set(printed(bare()))
-    assert "None of these figures are of this run." in texts
+    texts = set(printed_beforehand())
+    assert "None of these figures are of a run." in texts
     assert list(found()) == NAMES
     for name, column in (
         ("field_error", "error"),
@@ -82,9 +81,9 @@ def test_the_document_prints_the_figures_of_the_tables():
     ],
 )
 def test_another_number_in_a_table_is_printed(name, column, value, shown, folder):
-    assert shown not in printed(bare())
+    assert shown not in printed_beforehand()
     plant(folder / f"{name}.csv", column, value)
-    assert shown in printed(bare())
+    assert shown in printed_beforehand()
 
 
 def test_one_row_stands_for_two_lattices_only_where_they_are_the_same(folder):
@@ -107,21 +106,11 @@ def test_an_error_within_that_of_its_reference_is_not_resolved(folder):
 def test_a_table_that_is_missing_is_left_out(missing, folder):
     (folder / f"{missing}.csv").unlink()
     assert list(found()) == [name for name in NAMES if name != missing]
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+    assert beforehand_pdf().startswith(b"%PDF")
 
 
-def test_without_tables_there_is_no_appendix(folder):
+def test_without_tables_there_is_no_section(folder):
     for name in NAMES:
         (folder / f"{name}.csv").unlink()
     assert found() is None
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
-
-
-def test_without_a_lattice_there_is_no_appendix():
-    assert found(results_of(["fem"])) is None
-    point = results_of(["basafa", *FUZZY])
-    own = PointRecord(stiffness_n_per_m=9.0, mass_kg=0.1, damping_ratio=0.9)
-    for name in ("basafa", *FUZZY):
-        point = with_model(point, name, nodes=1, lattice=None, point=own)
-    assert found(point) is None
-    assert found(results_of(["basafa"])) is not None
+    assert beforehand_pdf().startswith(b"%PDF")

@@ -15,7 +15,7 @@ import pytest
 
 from reports import benchmarks, stability, tradeoff
 from reports.content import document
-from reports.fuzzy_tables import sensitivity_table, set_rows
+from reports.fuzzy_tables import set_rows, system_changes
 from reports.motion_figures import motions, peak
 from reports.ranking import leads
 from reports.reference import reference
@@ -500,21 +500,14 @@ def test_curves_and_bands_draw_each_column_in_its_place(results):
 # --- of the fuzzy systems -----------------------------------------------------------------------
 
 
-def test_the_table_of_sensitivity(results):
+def test_the_changes_between_systems(results):
     rows = (
         SensitivityEntry("reading", "R1", "R2", "mamdani", 1110.0, 2220.0, 3330.0, 256.0),
         SensitivityEntry("reading", "R1", "R2", "sugeno", 4440.0, 5550.0, 6660.0, 256.0),
         SensitivityEntry("system", "mamdani", "sugeno", "mamdani", 70.0, 8880.0, 9990.0, 128.0),
     )
-    table = sensitivity_table(replace(results, sensitivity=rows))
-    assert table["systems"] == ["Mamdani", "Sugeno"]
-    assert table["groups"] == [
-        {
-            "name": "reading of Table I: R1 →",
-            "rows": [["R2", "1.11", "2.22", "3.33", "4.44", "5.55", "6.66", "256"]],
-        }
-    ]
-    assert table["between"] == [["Mamdani → Sugeno", "0.07", "8.88", "9.99", "128"]]
+    found = system_changes(replace(results, sensitivity=rows))
+    assert found == [["Mamdani → Sugeno", "0.07", "8.88", "9.99"]]
 
 
 def test_the_table_of_stiffness_sets(results):

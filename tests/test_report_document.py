@@ -14,9 +14,7 @@ import typst
 
 from reports import motion_figures, renders, report
 from reports.appearance import LOOKS, looks, other_look
-from reports.benchmarks import has_lattice
 from reports.content import document
-from reports.difference_figure import bars
 from reports.field_figures import views
 from reports.ranking import leads
 from reports.tables import lead_rows
@@ -41,19 +39,10 @@ from tests.report_samples import (
 ROOT = Path(__file__).resolve().parent.parent
 
 
-@pytest.fixture(scope="module")
-def of_no_run():
-    """Figures of the appendices, which are the same in every report."""
-    return report.robustness_figures(results_of())
-
-
 @pytest.fixture(autouse=True)
-def _quick(monkeypatch, of_no_run):
-    """Pictures by matplotlib, as VTK has its own tests; figures of the appendices drawn once."""
+def _quick(monkeypatch):
+    """Pictures by matplotlib, as VTK has its own tests."""
     monkeypatch.setattr(renders, "WINDOWS", ())
-    monkeypatch.setattr(
-        report, "robustness_figures", lambda results: of_no_run if has_lattice(results) else {}
-    )
 
 
 def kept(folder: Path) -> bytes:
@@ -108,8 +97,8 @@ def test_a_report_that_fails_leaves_the_earlier_one(tmp_path, monkeypatch):
     folder = tmp_path / "a"
     first = kept(folder)
     names = sorted(path.name for path in folder.iterdir())
-    broken = report.template() + b"\nSee @nowhere.\n"
-    monkeypatch.setattr(report, "template", lambda: broken)
+    sound = report.template
+    monkeypatch.setattr(report, "template", lambda name: sound(name) + b"\nSee @nowhere.\n")
     with pytest.raises(typst.TypstError, match="nowhere"):
         report.make_report(folder)
     assert (folder / "report.pdf").read_bytes() == first
@@ -265,8 +254,7 @@ def test_a_model_that_the_report_does_not_know_is_legible_everywhere():
     others = [look for name, look in seen.items() if name != TOY]
     assert seen[TOY].colour not in {look.colour for look in others}
     assert "Toy model" in [one.look.label for one in motion_figures.motions(results, "tool")]
-    assert "Toy model" in [panel.title for panel in views(results).sheets[0].panels]
-    assert "Toy model, at the peak" in [bar.name for bar in bars(results)]
+    assert "Toy model − finite elements" in [one.title for one in views(results).sheets[1].panels]
     assert report.pdf(results)
 
 

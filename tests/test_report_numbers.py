@@ -10,7 +10,6 @@ import pytest
 
 from reports.appearance import LOOKS, looks
 from reports.content import document
-from reports.difference_figure import bars, label
 from reports.digits import (
     count,
     fixed,
@@ -246,8 +245,6 @@ def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own
     assert f"MSM Sugeno {whole}" in " ".join(sentences(results))
     row = next(row for row in error_rows(results) if row[:2] == ["Finite elements", "MSM Sugeno"])
     assert row[2:] == [whole, "50.0 %", "10.0 %", at_best, "1.300"]
-    bar = next(bar for bar in bars(results) if bar.name == "MSM Sugeno, at the peak")
-    assert label(bar, own) == f"{whole}   (at best factor {at_best})"
 
 
 def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from reports import benchmarks, canvas, report, stability_map, tradeoff_figure
+from reports import benchmarks, canvas, stability_map, tradeoff_figure
 from reports.appearance import series
 from reports.robustness import robustness, robustness_figures
 from reports.stability import FAILED, boundaries, cases, matrix
@@ -16,7 +16,7 @@ from reports.stability import sentences as told
 from reports.tradeoff import conditions, configurations, left_out
 from reports.tradeoff_answers import answers, sentences
 from study.tradeoff import table
-from tests.report_samples import bare, printed, results_of
+from tests.report_samples import beforehand_pdf, printed_beforehand
 
 DATA = Path(benchmarks.__file__).parent / "data"
 RATES = {"60hz": 60.0, "1khz": 1000.0}
@@ -278,16 +278,16 @@ def test_a_series_that_breaks_elsewhere_is_told_apart(folder):
 
 @pytest.mark.usefixtures("folder")
 def test_the_document_prints_them_and_says_that_they_are_of_no_run():
-    texts = printed(bare())
-    assert "None of these figures are of this run." in texts
+    texts = printed_beforehand()
+    assert "None of these figures are of a run." in texts
     assert {"springs and volume term, 10 mm", "4.0 ± 0.3 %", "60.0 %"} <= set(texts)
-    measured = robustness(results_of())["tradeoff"]["measured"]
+    measured = robustness()["tradeoff"]["measured"]
     assert measured == (
         "Measured on Some processor, in 5 turns, against finite elements of 12\u202f345 unknowns, "
         "whose own error is 0.3 %."
     )
-    figures = {"motion": []} | {k: [svg] for k, svg in robustness_figures(results_of()).items()}
-    assert report.compile_pdf(bare(), figures).startswith(b"%PDF")
+    figures = {k: [svg] for k, svg in robustness_figures().items()}
+    assert beforehand_pdf(figures).startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
@@ -295,17 +295,15 @@ def test_the_document_prints_them_and_says_that_they_are_of_no_run():
 )
 def test_a_table_that_is_missing_is_left_out(missing, left, folder):
     (folder / f"{missing}.csv").unlink()
-    assert list(robustness(results_of())) == left
-    drawn = {place for place, svg in robustness_figures(results_of()).items() if svg}
+    assert list(robustness()) == left
+    drawn = {place for place, svg in robustness_figures().items() if svg}
     assert drawn == ({"tradeoff"} if missing == "stability" else {"stability", "critical_step"})
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+    assert beforehand_pdf().startswith(b"%PDF")
 
 
-def test_without_tables_or_without_a_lattice_there_is_no_appendix(folder):
-    assert robustness(results_of(["fem"])) is None
-    assert robustness_figures(results_of(["fem"])) == {}
+def test_without_tables_there_is_no_section(folder):
     for path in folder.iterdir():
         path.unlink()
-    assert robustness(results_of()) is None
+    assert robustness() is None
     assert conditions() is None
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+    assert beforehand_pdf().startswith(b"%PDF")

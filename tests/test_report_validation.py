@@ -9,7 +9,7 @@ import pytest
 from reports import benchmarks
 from reports.validation import of_cylinders, summed, validation
 from reports.validation_figure import validation_figure
-from tests.report_samples import bare, printed, results_of
+from tests.report_samples import printed_beforehand
 
 HEAD = (
     "problem,case,faces,model,quantity,unit,measured,uncertainty,found,numerical,modulus_pa,"
@@ -43,14 +43,14 @@ def test_medians_and_ranges_are_of_the_cases_with_an_answer():
     assert found.uncertainty == pytest.approx(0.0375)
     assert (found.within, found.answered, found.cases) == (1, 2, 2)
     assert summed(groups["springs alone", "force at 10 %"]) is None
-    (group,) = validation(results_of())["cylinders"]
+    (group,) = validation()["cylinders"]
     assert group["rows"][0][:4] == ["linear FE", "force at 10 %", "+0.0 %", "-10.0 % to +10.0 %"]
     assert group["rows"][1][2] == "gives way"
 
 
 @pytest.mark.usefixtures("folder")
 def test_bodies_stand_with_difference_uncertainty_and_verdict():
-    found = validation(results_of())
+    found = validation()
     names = [group["name"] for group in found["bodies"]]
     assert names == ["cantilever, clamped", "cube, bonded", "cube, sliding"]
     row = found["bodies"][0]["rows"][0]
@@ -67,17 +67,16 @@ def test_the_figure_is_drawn_of_what_there_is():
     assert b"model - measured" in svg or b"<svg" in svg
 
 
-def test_without_a_table_or_finite_elements_there_is_nothing(tmp_path, monkeypatch):
-    assert validation(results_of(["basafa"])) is None
+def test_without_a_table_there_is_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(benchmarks, "FOLDER", tmp_path)
-    assert validation(results_of()) is None
+    assert validation() is None
     assert validation_figure() is None
 
 
 @pytest.mark.usefixtures("folder")
-def test_the_appendix_is_printed():
-    text = printed(bare(results_of()))
+def test_the_section_is_printed():
+    text = printed_beforehand()
     assert "gives way" in text
     assert "beyond" in text
     assert "faces bonded" in text
-    assert json.dumps(validation(results_of()))
+    assert json.dumps(validation())

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from reports import benchmarks, report
+from reports import benchmarks
 from reports.digits import significant
 from reports.verification import verification
-from tests.report_samples import bare, printed, results_of, with_record
+from tests.report_samples import beforehand_pdf, printed_beforehand
 
 DATA = Path(benchmarks.__file__).parent / "data"
 VERIFICATION = """\
@@ -43,7 +43,7 @@ def _folder(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("folder")
 def test_findings_stand_under_their_problem():
-    assert verification(results_of())["problems"] == [
+    assert verification()["problems"] == [
         {
             "name": "Sphere",
             "rows": [
@@ -62,12 +62,12 @@ def test_findings_stand_under_their_problem():
 
 @pytest.mark.usefixtures("folder")
 def test_outcomes_are_counted():
-    assert verification(results_of())["outcomes"] == "2 passed, 1 noted"
+    assert verification()["outcomes"] == "2 passed, 1 noted"
 
 
 @pytest.mark.usefixtures("folder")
 def test_each_task_is_compared_with_ours():
-    rows = verification(results_of())["contest"]
+    rows = verification()["contest"]
     assert [(row[0], row[1], row[-1]) for row in rows] == [
         ("assembly", "scikit-fem, as the reference", "1.0"),
         ("assembly", "dolfinx", "1.5"),
@@ -79,30 +79,29 @@ def test_each_task_is_compared_with_ours():
 
 @pytest.mark.usefixtures("folder")
 def test_growth_has_one_row_per_mesh():
-    rows = verification(results_of())["growth"]
+    rows = verification()["growth"]
     assert rows == [["6\u202f000", "0.51", "0.62", "0.73", "320"]]
 
 
 @pytest.mark.usefixtures("folder")
 def test_the_document_prints_them_and_says_that_they_are_of_no_run():
-    texts = printed(bare())
-    assert texts.count("None of these figures are of this run.") == 1  # no table of the lattice
+    texts = printed_beforehand()
+    assert texts.count("None of these figures are of a run.") == 1
     assert {"Sphere", "frequency, p2", "2.5012", "noted", "calculix", "4.5", "320"} <= set(texts)
     assert "Some processor, 2 cores" in " ".join(texts)
 
 
 def test_a_problem_that_was_not_solved_has_no_error_to_print(folder):
     (folder / "verification.csv").write_text(VERIFICATION.replace("0.42,,,True", "inf,,0,False"))
-    row = verification(results_of())["problems"][0]["rows"][1]
+    row = verification()["problems"][0]["rows"][1]
     assert row == ["displacement, p1", "–", "–", "–", "–", "0", "FAILED"]
 
 
 def test_a_finding_that_failed_is_printed_so(folder):
-    results = with_record(results_of(), checks=())  # one of them fails
-    assert "FAILED" not in printed(bare(results))
+    assert "FAILED" not in printed_beforehand()
     failed = VERIFICATION.replace("0.001,True\nSphere", "1e-6,False\nSphere")
     (folder / "verification.csv").write_text(failed)
-    assert "FAILED" in printed(bare(results))
+    assert "FAILED" in printed_beforehand()
 
 
 @pytest.mark.parametrize(
@@ -111,22 +110,15 @@ def test_a_finding_that_failed_is_printed_so(folder):
 )
 def test_a_table_that_is_missing_is_left_out(missing, left, folder):
     (folder / f"{missing}.csv").unlink()
-    assert set(verification(results_of())) == left
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
+    assert set(verification()) == left
+    assert beforehand_pdf().startswith(b"%PDF")
 
 
-def test_without_tables_or_without_a_reference_there_is_no_appendix(folder):
-    assert verification(results_of(["basafa"])) is None
+def test_without_tables_there_is_no_section(folder):
     for path in folder.iterdir():
         path.unlink()
-    assert verification(results_of()) is None
-    assert report.compile_pdf(bare(), {"motion": []}).startswith(b"%PDF")
-
-
-@pytest.mark.parametrize("models", [["fem"], ["basafa"]])
-def test_either_appendix_stands_without_the_other(models):
-    """With the tables that come with the program."""
-    assert report.compile_pdf(bare(results_of(models)), {"motion": []}).startswith(b"%PDF")
+    assert verification() is None
+    assert beforehand_pdf().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
@@ -148,4 +140,4 @@ def test_every_number_of_the_tables_that_come_with_the_program_is_printed(name, 
         for column, digits in columns.items()
         if line[column] and math.isfinite(float(line[column]))
     }
-    assert wanted <= set(printed(bare()))
+    assert wanted <= set(printed_beforehand())

@@ -1,4 +1,4 @@
-"""`report`: the PDF and the page of a results folder or a bundle, made again."""
+"""`report`: the PDF and the page of a results folder or a bundle, made again; or the reference."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
-from study.commands.flags import EXIT_FAILED_CHECK
+from study.commands.flags import EXIT_FAILED_CHECK, Switch
 
 
-def report(target: Path, *, html: bool = True, out: Path | None = None) -> None:
+def report(
+    target: Path | None = None,
+    *,
+    html: bool = True,
+    out: Path | None = None,
+    reference: Switch = False,
+) -> None:
     """Make report.pdf and report.html of a results folder or a bundle again, without simulating.
 
     Of a bundle, exit code 1 if they have other bytes than those in it.
@@ -22,8 +28,17 @@ def report(target: Path, *, html: bool = True, out: Path | None = None) -> None:
     html
         Whether to make report.html.
     out
-        Folder to unpack a bundle into; its name without the ending, here, by default.
+        Folder to unpack a bundle into; its name without the ending, here, by default. Of
+        --reference the file to write, liver-study-reference.pdf by default.
+    reference
+        Make a document of what was measured beforehand instead, of no run: benchmarks,
+        verification, validation, trade-off, stability and ranking.
     """
+    if reference:
+        _reference(target, out)
+        return
+    if target is None:
+        raise ValueError("report: give a results folder or a bundle, or --reference")
     from study.bundle import is_archive
 
     if is_archive(target):
@@ -32,6 +47,18 @@ def report(target: Path, *, html: bool = True, out: Path | None = None) -> None:
     if out is not None:
         raise ValueError("--out: is for a bundle; the reports of a folder are made in it")
     print("\n".join(str(path) for path in _of_folder(target, html=html)))
+
+
+def _reference(target: Path | None, out: Path | None) -> None:
+    from reports.measured import NAME, make_measured
+    from study.folders import check_file
+
+    if target is not None:
+        raise ValueError(f"--reference: is of no run; leave {target} out")
+    path = out or Path(NAME)
+    check_file(path)
+    make_measured(path)
+    print(path)
 
 
 def _of_folder(folder: Path, *, html: bool) -> list[Path]:

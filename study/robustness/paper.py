@@ -1,4 +1,17 @@
-"""What the paper prints of its ranking."""
+"""What the paper prints of its rules and its ranking, and the sources of what it leaves out."""
+
+from fuzzy.liver.knowledge import rows
 
 TABLE_III = {"interval-type-2": 0.8598, "mamdani": 0.8580, "sugeno": 0.8549}
 """Similarity of each fuzzy model to the benchmark, by a measure that the paper does not define."""
+
+
+def table_i() -> list[list[str]]:
+    """Its Table I as rows of cells, the header first."""
+    found = rows("table1.csv")
+    return [list(found[0]), *(list(row.values()) for row in found)]
+
+
+def elastography_sources() -> list[tuple[str, str]]:
+    """Citation and identifier of each source of the elastography data."""
+    return [(row["citation"], row["identifier"]) for row in rows("sources.csv")]

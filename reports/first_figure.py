@@ -1,0 +1,70 @@
+"""The figure of the first page: curves at the tool, and what the nearest model's error is of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reports import canvas
+from reports.appearance import looks
+from reports.budget_figure import waterfall
+from reports.digits import short
+from reports.motion_figures import draw_motion, motions
+from reports.page.answer import nearest
+from reports.ranking import tool_probe
+from study.results.folder import Results
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from study.results.records import ErrorBudget
+
+BESIDE, WHOLE = 4.1, canvas.TEXT_WIDTH
+"""Width beside a picture of the organ, and without one [inch]."""
+HEIGHT = 2.5
+
+
+def first_figure(results: Results) -> bytes | None:
+    """SVG of the displacement at the tool, and the waterfall of the nearest model if it has one."""
+    found = motions(results, tool_probe(results))
+    if not found:
+        return None
+    budget = budget_of_nearest(results)
+
+    def draw() -> Figure:
+        figure = canvas.sheet(HEIGHT, BESIDE if results.fields else WHOLE)
+        panels = figure.subplots(1, 1 if budget is None else 2, squeeze=False)[0]
+        draw_motion(panels[0], found, 0, 1, "time [s]", "displacement [mm]")
+        panels[0].set_title(short(tool_probe(results)), fontweight="bold")
+        if budget is not None:
+            waterfall(panels[1], budget)
+            panels[1].set_title(looks(results)[budget.model].label, fontweight="bold")
+            panels[1].set_xlabel("relative L2 difference [%]")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, handlelength=2.6)
+        return figure
+
+    return canvas.picture(draw)
+
+
+def budget_of_nearest(results: Results) -> ErrorBudget | None:
+    """The error budget of the model that the answer names, None where there is none."""
+    found = nearest(results)
+    if found is None:
+        return None
+    budgets = results.record.budgets
+    wanted = found.model.name, found.reference
+    return next((one for one in budgets if (one.model, one.reference) == wanted), None)
+
+
+def caption(results: Results) -> str:
+    """What the figure shows, as its caption says it."""
+    said = (
+        f"Displacement at the control point {tool_probe(results)} along the push, over time; the "
+        "band is the type-2 interval. "
+    )
+    if budget_of_nearest(results) is not None:
+        said += (
+            "Waterfall: what the difference of the nearest model's field from the reference at the "
+            "peak is made of; blue shrinks it, orange makes it grow."
+        )
+    return said

@@ -1,0 +1,71 @@
+"""What was measured beforehand, of no run, as a document of its own: `report --reference`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from reports.benchmarks import benchmarks
+from reports.organ_ranking import organ_ranking
+from reports.organ_ranking_figure import organ_figures
+from reports.ranking_study import ranking_study
+from reports.ranking_study_figure import ranking_figures
+from reports.report import Figures, compile_pdf
+from reports.robustness import robustness, robustness_figures
+from reports.validation import validation
+from reports.validation_figure import validation_figure
+from reports.verification import verification
+from study.folders import write_bytes
+
+NAME = "liver-study-reference.pdf"
+TEMPLATE = "measured.typ"
+ALTERNATIVES = {
+    "validation": "Models beside measurements on silicone: force on cylinders, tip of a beam, "
+    "beads in a cube; the numbers are in the two tables that follow",
+    "tradeoff": "Error of the displacement field over the cost of a simulated second, and over the "
+    "time of a frame; the answers are in the table that follows",
+    "stability": "Counts of how the cases ended, by family, and the share of its tolerance that "
+    "each used up; the sentences above sum it up",
+    "critical_step": "Longest stable step measured over the one predicted: points on the diagonal "
+    "within the tolerance",
+    "ranking": "Share of draws in which each fuzzy system is nearest to the benchmark, and total "
+    "Sobol' indices of the unknowns; shares are in the table that follows",
+    "ranking_spacing": "The nearest system by measure over the reference spacing, and two scores "
+    "over it",
+    "organ_ranking": "Share of draws on an organ in which each is nearest to the benchmark, and "
+    "total Sobol' indices; shares are in the table that follows",
+}
+"""For whoever does not see a figure, by its place."""
+
+
+def make_measured(path: Path) -> None:
+    """Write the document. FolderError or OSError where it cannot be written."""
+    write_bytes(path, measured_pdf())
+
+
+def measured_pdf() -> bytes:
+    """The document; the same tables give the same bytes."""
+    return compile_pdf(measured(), measured_figures(), TEMPLATE)
+
+
+def measured() -> dict[str, object]:
+    """The document's text by place; None where a table does not come with the program."""
+    return {
+        "benchmarks": benchmarks(),
+        "verification": verification(),
+        "validation": validation(),
+        "robustness": robustness(),
+        "ranking_study": ranking_study(),
+        "organ_ranking": organ_ranking(),
+        "alternatives": {place: [text] for place, text in ALTERNATIVES.items()},
+    }
+
+
+def measured_figures() -> Figures:
+    """Its figures as SVG by place; without those whose table is missing."""
+    drawn = {
+        **robustness_figures(),
+        "validation": validation_figure(),
+        **ranking_figures(),
+        **organ_figures(),
+    }
+    return {place: [svg] for place, svg in drawn.items() if svg is not None}
