@@ -240,7 +240,7 @@ def _direction(
 
 def _unbalanced(body: MixedSolid, lacking: Floats, free: Booleans) -> float:
     """Size [N] of unbalanced forces and, by modulus and size of the body, of volumes missed."""
-    unit = np.where(np.arange(len(lacking)) < body.size, 1.0, body.shear / body.length)
+    unit = np.where(np.arange(len(lacking)) < body.size, 1.0, body.typical_shear / body.length)
     return float(np.linalg.norm((unit * lacking)[free]))
 
 

@@ -12,23 +12,39 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
-from skfem.models.elasticity import lame_parameters
 
-from fem_reference.elasticity import MASS_ORDER, rows
+from fem_reference.elasticity import MASS_ORDER, cell_moduli, rows
 from fem_reference.forms import pattern, products
 from fem_reference.grid import mapping
-from fem_reference.hyperelasticity import element_stiffness, flat
+from fem_reference.hyperelasticity import flat
 from fem_reference.laws import IDENTITY
 from study.problem.tissue import Tissue
+from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+class Kinematics(NamedTuple):
+    """What a deformation does at the integration points: F (t, q, 3, 3), its determinant, F^-T."""
+
+    gradient: Floats
+    volume: Floats
+    inverse_transpose: Floats
+
+
+class Sparsity(NamedTuple):
+    """Columns `indptr` and rows `indices` of a matrix, and where in it each pair of a cell goes."""
+
+    indptr: Ints
+    indices: Ints
+    place: Ints
 
 
 @dataclass(frozen=True)
@@ -38,12 +54,13 @@ class MixedSolid:
     `nodes`: scikit-fem's basis of one component; `slopes` (t, q, 3, a): derivatives [1/m] of the
     a shape functions of tetrahedron t at its integration points q, whose `weights` [m^3] are
     (t, q); `unknowns` (t, a, 3) and `corners` (t, 4): places of displacements and pressures in w;
-    `shares` (q, 4): shape functions of the pressure. `lame`, `shear` [Pa]; `support` [N/m] (n, n).
+    `shares` (q, 4): shape functions of the pressure. `lame`, `shear` [Pa], or those of each cell
+    (t, 1); `support` [N/m] (n, n).
     """
 
     nodes: Any
-    lame: float
-    shear: float
+    lame: Any
+    shear: Any
     slopes: Floats
     weights: Floats
     unknowns: Ints
@@ -71,10 +88,19 @@ class MixedSolid:
         """Cube root of the volume [m], which makes a force of a pressure's equation."""
         return float(np.cbrt(self.weights.sum()))
 
+    @cached_property
+    def typical_shear(self) -> float:
+        """Shear modulus [Pa] in the mean, by which volumes that are missed count as forces."""
+        return float((self.shear * self.weights).sum() / self.weights.sum())
+
     def deformation(self, w: Floats) -> Floats:
         """Deformation gradient F at the integration points, shape (t, q, 3, 3)."""
         gradient = self.slopes @ w[self.unknowns][:, None]
         return np.asarray(IDENTITY + np.swapaxes(gradient, -2, -1))
+
+    def volume_ratio(self, w: Floats) -> Floats:
+        """J = det F at the integration points, (t, q)."""
+        return kinematics(self.deformation(w)).volume
 
     def energy(self, w: Floats) -> float:
         """Energy [J] stored in the tissue and the support; p^2 / (2 lambda) is that of volume."""
@@ -85,36 +111,39 @@ class MixedSolid:
 
     def gradient(self, w: Floats) -> Floats:
         """Derivative of L, shape of w: forces [N], then what volumes [m^3] miss."""
-        F, p = self.deformation(w), self._pressure(w)
-        stress = self.shear * F + (p - self.shear)[..., None, None] * _inverse_transpose(F)
-        stress *= self.weights[..., None, None]
-        nodal = flat(self.slopes).mT @ flat(stress.mT)
-        found = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(w))
-        missed = (np.log(np.linalg.det(F)) - p / self.lame) * self.weights
-        found += np.bincount(self.corners.ravel(), (missed @ self.shares).ravel(), minlength=len(w))
-        found[: self.size] += self.support @ w[: self.size]
-        return np.asarray(found, dtype=np.float64)
+        found = kinematics(self.deformation(w))
+        p, slopes = self._pressure(w), self._spatial(found)
+        nodal = self._stretching @ w[self.unknowns] + self._unstretched
+        push = ((p - self.shear) * self.weights)[:, None, :]
+        nodal += (push @ slopes).reshape(len(nodal), 3, -1).mT
+        force = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(w))
+        missed = ((np.log(found.volume) - p / self.lame) * self.weights) @ self.shares
+        force += np.bincount(self.corners.ravel(), missed.ravel(), minlength=len(w))
+        force[: self.size] += self.support @ w[: self.size]
+        return np.asarray(force, dtype=np.float64)
 
     def tangent(self, w: Floats) -> csc_array:
-        """Second derivative of L, symmetric and indefinite, in the order of w."""
-        F, p, mass = self.deformation(w), self._pressure(w), self._pressure_mass
-        G = _inverse_transpose(F)
-        moduli = self.shear * np.einsum("ik,JL->iJkL", IDENTITY, IDENTITY) - np.einsum(
-            "...,...iL,...kJ->...iJkL", p - self.shear, G, G
-        )
-        blocks = element_stiffness(moduli * self.weights[..., None, None, None, None], self.slopes)
-        weighted = np.swapaxes(G * self.weights[..., None, None], -2, -1)  # (t, q, J, i)
-        slopes = np.swapaxes(self.slopes, -2, -1) @ weighted  # (t, q, a, i): d ln J / du
-        coupling = self.shares.T @ slopes.reshape(*slopes.shape[:2], -1)
-        cells = len(blocks)
-        places = np.concatenate([self.unknowns.reshape(cells, -1), self.corners], axis=1)
-        whole = np.zeros((cells, places.shape[1], places.shape[1]))
-        count = blocks.shape[-1]
-        whole[:, :count, :count] = blocks
+        """Second derivative of L, symmetric and indefinite, in the order of w.
+
+        With h_a = F^-T dN_a/dX, of displacements mu dN_a . dN_b delta_ik + (mu - p) h_ak h_bi, and
+        of a displacement and a pressure h_ai N.
+        """
+        slopes, p = self._spatial(kinematics(self.deformation(w))), self._pressure(w)
+        cells, nodes = self.unknowns.shape[:2]
+        count = 3 * nodes
+        pairs = slopes.mT @ (slopes * ((self.shear - p) * self.weights)[..., None])
+        pairs = pairs.reshape(cells, 3, nodes, 3, nodes)  # (k, a, i, b)
+        own = pairs.transpose(0, 2, 3, 4, 1).copy()  # (a, i, b, k)
+        for i in range(3):
+            own[:, :, i, :, i] += self._stretching
+        coupling = (self.shares * self.weights[..., None]).mT @ slopes
+        coupling = coupling.reshape(cells, 4, 3, nodes).swapaxes(-2, -1).reshape(cells, 4, count)
+        whole = np.empty((cells, count + 4, count + 4))
+        whole[:, :count, :count] = own.reshape(cells, count, count)
         whole[:, count:, :count] = coupling
         whole[:, :count, count:] = coupling.mT
-        whole[:, count:, count:] = -mass
-        return self._assembled(whole, places) + self._padded_support
+        whole[:, count:, count:] = -self._pressure_mass
+        return self._assembled(whole) + self._padded_support
 
     def linear(self) -> csc_array:
         """The tangent without deformation: that of linear elasticity."""
@@ -124,17 +153,43 @@ class MixedSolid:
         """Pressure [Pa] at the integration points, (t, q)."""
         return np.asarray(w[self.corners] @ self.shares.T)
 
-    @property
+    def _spatial(self, found: Kinematics) -> Floats:
+        """F^-T dN/dX of each direction and shape function, (t, q, 3 a)."""
+        slopes = found.inverse_transpose @ self.slopes
+        return slopes.reshape(*slopes.shape[:2], -1)
+
+    @cached_property
+    def _stretching(self) -> Floats:
+        """Integrals, times mu, of dN_a/dX . dN_b/dX, (t, a, a)."""
+        weighted = self.slopes * (self.shear * self.weights)[..., None, None]
+        return np.asarray(flat(self.slopes).mT @ flat(weighted))
+
+    @cached_property
+    def _unstretched(self) -> Floats:
+        """Integrals, times mu, of dN_a/dX, (t, a, 3)."""
+        return np.asarray(np.einsum("tq,tqja->taj", self.shear * self.weights, self.slopes))
+
+    @cached_property
     def _pressure_mass(self) -> Floats:
         """What each tetrahedron adds to the pressures' mass over lambda, (t, 4, 4)."""
         pairs = self.shares[:, :, None] * self.shares[:, None, :]
         return np.asarray(np.einsum("tq,qab->tab", self.weights / self.lame, pairs))
 
-    def _assembled(self, blocks: Floats, places: Ints) -> csc_array:
-        count = places.shape[1]
-        entries = (np.repeat(places, count, axis=1).ravel(), np.tile(places, count).ravel())
+    @cached_property
+    def _sparsity(self) -> Sparsity:
+        cells, total = len(self.corners), self.size + self.pressures
+        places = np.concatenate([self.unknowns.reshape(cells, -1), self.corners], axis=1)
+        keys = places[:, None, :] * np.int64(total) + places[:, :, None]
+        known, place = np.unique(keys.ravel(), return_inverse=True)
+        counts = np.bincount(known // total, minlength=total)
+        return Sparsity(np.concatenate([[0], np.cumsum(counts)]), known % total, place)
+
+    def _assembled(self, blocks: Floats) -> csc_array:
+        """Of symmetric blocks, whose rows are as good as their columns."""
+        indptr, indices, place = self._sparsity
+        entries = np.bincount(place, blocks.ravel(), minlength=len(indices))
         total = self.size + self.pressures
-        return csc_array(coo_array((blocks.ravel(), entries), shape=(total, total)))
+        return csc_array((entries, indices, indptr), shape=(total, total))
 
     @cached_property
     def _padded_support(self) -> csc_array:
@@ -161,14 +216,24 @@ def mixed_solid(grid: Any, tissue: Tissue, support: csc_array | None = None) -> 
     return on_nodes(nodes, tissue, support)
 
 
-def on_nodes(nodes: Any, tissue: Tissue, support: csc_array | None = None) -> MixedSolid:
-    """The same on a basis of one component, quadratic."""
-    if not 0.0 < tissue.poisson_ratio < 0.5:
+def on_nodes(
+    nodes: Any,
+    tissue: Tissue,
+    support: csc_array | None = None,
+    made: Composition | None = None,
+) -> MixedSolid:
+    """The same on a basis of one component, quadratic; with the moduli of each cell if given.
+
+    Where tissue changes, the pressure jumps and its continuous shape functions smear it over the
+    cells there.
+    """
+    regular = tissue.highest_poisson_ratio < 0.5
+    lame, shear = cell_moduli(made, tissue) if regular else (0.0, 0.0)
+    if not np.all(lame > np.zeros(1)):
         raise ValueError(
             f"tissue.poisson_ratio: {tissue.poisson_ratio:g} is not between 0 and 0.5, where "
             "elements with a pressure of their own are defined at large strain"
         )
-    lame, shear = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     local = np.asarray(nodes.X)
@@ -177,10 +242,14 @@ def on_nodes(nodes: Any, tissue: Tissue, support: csc_array | None = None) -> Mi
     _, corners = np.unique(nodes.mesh.t.T[:, :4], return_inverse=True)
     corners = size + corners.reshape(-1, 4)
     held = csc_array((size, size)) if support is None else support
-    return MixedSolid(
-        nodes, float(lame), float(shear), slopes, nodes.dx, unknowns, corners, shares, held
+    return MixedSolid(nodes, lame, shear, slopes, nodes.dx, unknowns, corners, shares, held)
+
+
+def kinematics(F: Floats) -> Kinematics:
+    """Of deformation gradients (t, q, 3, 3), by cofactors: a batch of inverses takes far longer."""
+    rows_of = [F[..., i, :] for i in range(3)]
+    cofactors = np.stack(
+        [np.cross(rows_of[(i + 1) % 3], rows_of[(i + 2) % 3]) for i in range(3)], axis=-2
     )
-
-
-def _inverse_transpose(F: Floats) -> Floats:
-    return np.swapaxes(np.linalg.inv(F), -2, -1)
+    volume = (F[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1)
+    return Kinematics(F, volume, cofactors / volume[..., None, None])

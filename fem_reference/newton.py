@@ -126,13 +126,7 @@ def _with_pressure(
             f"law: of elements with a pressure of their own, {law!r} is not worked out; give "
             "neo-hookean, or discretise with element 'p2', good to a Poisson ratio of 0.48"
         )
-    if body.composition is not None:
-        raise ValueError(
-            "tissue.inclusion: of elements with a pressure of their own, bodies of several tissues "
-            "are not worked out at large strain; discretise with element 'p2', good to a Poisson "
-            "ratio of 0.48"
-        )
-    mixed = on_nodes(body.nodes, tissue, body.support)
+    mixed = on_nodes(body.nodes, tissue, body.support, body.composition)
     held = np.full((body.node_count, 3), np.nan)
     if body.fixed is not None:
         held[body.fixed.reshape(-1, 3)] = 0.0
