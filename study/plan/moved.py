@@ -22,7 +22,7 @@ from study.models.tissue import lacks_poisson_ratio
 from study.plan.candidates import SPACINGS, Candidate
 from study.plan.prediction import SPACING, Measure, Part, Prediction
 from study.problem.problem import Problem
-from study.scene import Require, Scene
+from study.scene import Lattice, Require, Scene
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 
 LOOK = 1.25
@@ -61,7 +61,8 @@ def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook
     tissue = model(scene, "tissue")
     assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
     started = time.perf_counter()
-    prepared = tissue.varied(**_settings(scene, spacing)).prepare(problem)
+    chosen = replace(tissue, scene=replace(tissue.scene, lattice=_settings(scene, spacing)))
+    prepared = chosen.prepare(problem)
     run, springs = prepared.moved(), len(prepared.assembly.springs.weight)
     setup = time.perf_counter() - started - run.wall
     if run.trajectory.status != "finished" or run.inverted_cells:
@@ -76,12 +77,16 @@ def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook
     return run, MovedLook(spacing, 0.0, *found)
 
 
-def _settings(scene: Scene, spacing: float) -> dict[str, float | bool]:
-    return {
-        "spacing": spacing,
-        "volume_term": lacks_poisson_ratio(scene),
-        "step_fraction": scene.lattice.step_fraction,
-    }
+def _settings(scene: Scene, spacing: float) -> Lattice:
+    """The scene's table of a lattice of a spacing [m], with steps that follow the limit."""
+    return replace(
+        scene.lattice,
+        spacing=spacing,
+        springs="lattice",
+        volume_term=lacks_poisson_ratio(scene),
+        time_step=None,
+        step_rate=None,
+    )
 
 
 def _apart(problem: Problem, required: Require, measure: Measure, coarse: Run, fine: Run) -> float:
@@ -103,8 +108,7 @@ def lattices(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
         spacing = times * scene.lattice.spacing
         finer = seen.spacing / spacing
         error = seen.apart / (COARSER**ORDER - 1.0) / finer**ORDER
-        free = {"springs": "lattice", "time_step": None, "step_rate": None}
-        chosen = replace(scene.lattice, **_settings(scene, spacing), **free)
+        chosen = _settings(scene, spacing)
         yield Candidate(
             name=f"lattice of {1e3 * spacing:.3g} mm",
             scene=replace(scene, models=("tissue",), lattice=chosen),
