@@ -98,7 +98,8 @@ def _apart(problem: Problem, required: Require, measure: Measure, coarse: Run, f
     if measure.volumes is not None:
         found.append(relative_l2(one.volume_field[0], other.volume_field[0], measure.volumes))
     if PEAK_FORCE in required.quantities:
-        found += force_differences(problem, one.tool_force, other.tool_force)[1].tolist()
+        # Over time too, for two lattices may meet in a single number by chance.
+        found += force_differences(problem, one.tool_force, other.tool_force).ravel().tolist()
     return max(found)
 
 
