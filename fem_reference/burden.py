@@ -57,14 +57,27 @@ def laden(body: Body, burden: Burden) -> Body:
         for n, patch in enumerate(burden.loads, 2)
     )
     mass, nodal = body.mass, body.nodal_mass
-    for n, weight in enumerate(burden.weights, 1):
-        attached = _attached(surface, weight, f"weight.{n}")
+    for attached in _all_attached(surface, burden.weights):
         mass = csc_array(mass + decoupled(attached, body.fixed))
         nodal = nodal + attached.sum(axis=1)
     dead: Floats | None = None
     if burden.gravity.any() and not burden.given_loaded:
         dead = without_fixed(nodal * np.tile(burden.gravity, body.node_count), body.fixed)
     return replace(body, mass=mass, nodal_mass=nodal, others=others, dead=dead)
+
+
+def hanging(body: Body, burden: Burden) -> Floats:
+    """Nodal forces [N] (n,) of attached weights alone under gravity."""
+    nodes = body.nodes
+    surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
+    nodal = np.zeros_like(body.load)
+    for attached in _all_attached(surface, burden.weights):
+        nodal += attached.sum(axis=1)
+    return without_fixed(nodal * np.tile(burden.gravity, body.node_count), body.fixed)
+
+
+def _all_attached(surface: Any, weights: tuple[Weight, ...]) -> list[csc_array]:
+    return [_attached(surface, one, f"weight.{n}") for n, one in enumerate(weights, 1)]
 
 
 def _placed(surface: Any, patch: ToolPatch, name: str) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.burden import burden_of
 from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
 from fem_reference.elements import chosen_element
@@ -44,17 +46,20 @@ MESHES = {
 """File of the mesh alone by the program that reads it, and meshio's name of its format."""
 LATTICE = "lattice"
 FORMATS = ("calculix", "vtu", LATTICE, *MESHES)
+HELD = frozenset({"several-loads", "gravity", "weights"})
+"""What nodal forces and a field of gravity say of a scene beside its first load."""
 MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
 """Of HHT: CalculiX's own default."""
 # Also what CalculiX leaves beside its decks.
-FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
+FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", calculix.WEIGHTS, "spooles.out"} | {
     f"{deck}.{end}"
     for deck in ("static", "dynamic")
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
 FILES |= {file for file, _ in MESHES.values()} | handover.FILES
+FURTHER_LOAD = re.compile(r"load\.\d+\.inp")
 FRAMES = 4
 """Times, equally spaced, at which the motion of all nodes is compared."""
 
@@ -99,10 +104,15 @@ def export(request: ExportRequest, progress: Progress) -> Path:
 
 
 def _refuse_unheld(to: str, scene: Scene) -> None:
-    """ValueError for what a format of one tissue, foundation and load has no place for."""
-    if scene.features and to not in (*MESHES, LATTICE):
-        what = " and ".join(FEATURES[name] for name in scene.features)
-        raise ValueError(f"--to {to}: holds no {what}; use one of {', '.join(MESHES)}")
+    """ValueError for what a format of one tissue, foundation and nodal forces has no place for."""
+    unheld = [name for name in scene.features if name not in HELD]
+    if unheld and to not in (*MESHES, LATTICE):
+        what = " and ".join(FEATURES[name] for name in unheld)
+        why = " (their force follows from contact, and is none of nodes)"
+        raise ValueError(
+            f"--to {to}: holds no {what}{why if 'moved-tools' in unheld else ''}; use one of "
+            f"{', '.join(MESHES)}"
+        )
 
 
 def _target(request: ExportRequest) -> _Target:
@@ -138,39 +148,39 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
     from fem_reference.exchange import vtu
 
     scene, (body, problem) = target.scene, _discretised(target, progress)
-    given = nodal_problem(body, scene.tissue, problem.foundation)
+    given = nodal_problem(body, scene.tissue, problem.foundation, burden_of(problem))
     with progress.stage("at rest under full load"):
         displacement = solve_static(body).reshape(-1, 3)
     _write(
         folder,
         {
             VTU: vtu.text(given, displacement),
-            MARK: _about_vtu(scene, given) + _noted(scene, problem),
+            MARK: _about_vtu(scene, given) + _burdened(problem, given) + _noted(scene, problem),
         },
     )
 
 
 def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
     scene, (body, problem) = target.scene, _discretised(target, progress, steps=True)
-    given = nodal_problem(body, scene.tissue, problem.foundation)
-    motion = motion_of(scene, problem)
-    theirs = integrated(body, scene.tissue)
+    given = nodal_problem(body, scene.tissue, problem.foundation, burden_of(problem))
+    motion = None if problem.weights else motion_of(scene, problem)
+    files = calculix.files(given, motion)
+    theirs = integrated(body, scene.tissue, given)
     with progress.stage("at rest under full load"):
         rest, own_rest = solve_static(theirs), solve_static(body)
-    with progress.stage("motion"):
-        moved, own_moved = frames(theirs, motion), _own_frames(body, motion)
-    files = calculix.files(given, motion) | {
-        "static.csv": _table([(0.0, rest)], timed=False),
-        "dynamic.csv": _table(moved),
-    }
-    differences = (
-        _difference(rest, own_rest),
-        max(_difference(u, v) for (_, u), (_, v) in zip(moved, own_moved, strict=True)),
-    )
-    _write(
-        folder,
-        files | {MARK: _about_calculix(scene, given, motion, differences) + _noted(scene, problem)},
-    )
+    files["static.csv"] = _table([(0.0, rest)], timed=False)
+    at_rest = _difference(rest, own_rest)
+    if motion is None:
+        about = _about_rest(scene, given, at_rest)
+    else:
+        with progress.stage("motion"):
+            moved, own_moved = frames(theirs, motion), _own_frames(body, motion)
+        files["dynamic.csv"] = _table(moved)
+        pairs = zip(moved, own_moved, strict=True)
+        differences = (at_rest, max(_difference(u, v) for (_, u), (_, v) in pairs))
+        about = _about_calculix(scene, given, motion, differences)
+    about += _burdened(problem, given) + _noted(scene, problem)
+    _write(folder, files | {MARK: about})
 
 
 def _write_lattice(target: _Target, folder: Path, progress: Progress) -> None:
@@ -230,8 +240,8 @@ def motion_of(scene: Scene, problem: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     times = problem.observation.times
     stepping = Method("hht-alpha", scene.reference.steps_per_sample)
-    count = stepping.pace(problem.factor, times).steps(len(times) - 1)
-    factors = problem.factor(np.linspace(0.0, times[-1], count + 1))
+    count = stepping.pace(problem.factors, times).steps(len(times) - 1)
+    factors = problem.factors(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping
     return Transient(float(times[-1]) / count, factors, damping, ALPHA, -(-count // FRAMES))
@@ -239,14 +249,14 @@ def motion_of(scene: Scene, problem: Problem) -> Transient:
 
 def frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """Times [s] that CalculiX prints of a motion, and the unknowns then."""
-    system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
+    system = Oscillator(body.mass, body.stiffness, body.loads, motion.damping)
     steps = hht(system, motion.factor, motion.step, motion.count, motion.alpha)
     return _kept(steps, motion)
 
 
 def _own_frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
     """The same times in the reference's own steps, mass and quadrature."""
-    system = Oscillator(body.mass, body.stiffness, body.load, motion.damping)
+    system = Oscillator(body.mass, body.stiffness, body.loads, motion.damping)
     return _kept(march(system, motion.factor, motion.step, motion.count), motion)
 
 
@@ -316,6 +326,52 @@ differs by {at_rest:.1e} at rest and up to {in_motion:.1e} in motion, relative L
 """
 
 
+def _about_rest(scene: Scene, given: NodalProblem, at_rest: float) -> str:
+    return f"""\
+{scene.title or "A scene"}
+Its finite-element problem at rest for CalculiX, SI units throughout.
+
+mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
+foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
+                are negative, which is meant: their sum is the matrix
+load.inp        nodal forces [N] of the tool at full load
+static.inp      at rest under full load
+static.csv      what we get for it: displacement [m] of each node
+
+There is no motion: how another code damps the masses of attached weights was not checked.
+
+Run `ccx static`, then compare in bash:
+
+{COMPARE}
+same static
+
+CalculiX prints seven digits: expect about 1.5e-7. The .csv file is solved by our own matrices with
+the quadrature of {INTEGRATED[given.elements.shape[1]]}. With that of the study the
+displacement differs by {at_rest:.1e}, relative L2 over the nodes.
+"""
+
+
+def _burdened(problem: Problem, given: NodalProblem) -> str:
+    """What acts beside the first load, and in which parts of the files; nothing where nothing."""
+    said = [
+        f"load {n} (load.{n}.inp, load_{n}): of a further tool, with a history of its own"
+        for n in range(2, len(given.loads) + 1)
+    ]
+    if given.gravity is not None:
+        told = ", ".join(f"{part:g}" for part in given.gravity)
+        said.append(f"gravity ({told}) m/s^2 acts on the tissue at rest (*DLOAD, GRAV)")
+        said.append("a motion starts from rest under it, counts from there, and has it left out")
+    elif problem.gravity.any():
+        said.append("the given shape is that under gravity: displacements count from it")
+    if given.hanging is not None:
+        said.append("weights hang as nodal forces (weights.inp, weights)")
+    elif problem.weights:
+        said.append("weights have mass alone, which rest does not show")
+    return (
+        "".join(["\nBeside the first load:\n", *(f"- {line}\n" for line in said)]) if said else ""
+    )
+
+
 def _about_vtu(scene: Scene, given: NodalProblem) -> str:
     tissue = scene.tissue
     kind = "quadratic tetrahedra" if given.elements.shape[1] == 10 else "tetrahedra"
@@ -358,5 +414,6 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _foreign(present: set[str]) -> str | None:
-    others = (name for name in present - FILES if not handover.OF_A_MODEL.fullmatch(name))
+    own = (handover.OF_A_MODEL, FURTHER_LOAD)
+    others = (name for name in present - FILES if not any(one.fullmatch(name) for one in own))
     return min(others, default=None)

@@ -13,9 +13,11 @@ from scipy.sparse import coo_array
 from fem_reference.elasticity import discretise
 from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from fem_reference.solvers import solve_static
 from study import export as exporting
 from study.commands import app
 from study.export import MESHES, ExportRequest, export
+from study.models.finite_elements import reference_of
 from study.progress import Silent
 from study.results.folder import write
 from study.results.records import ElementsRecord
@@ -283,3 +285,123 @@ def test_an_exported_mesh_holds_the_tetrahedra_of_the_reference(to, tmp_path):
         again = problem_of(scene).geometry.mesh
         assert len(again.tetrahedra) == len(mesh.tetrahedra)
         assert (folder / "README.txt").read_text().count(f"{len(cells)} tetrahedra") == 1
+
+
+# --- gravity, weights and several loads ----------------------------------------------------------
+
+SECOND = (
+    'tool=[{place={side="superior", at=[0.2, 0.5]}, force="0.05 N", radius="8 mm"}, '
+    '{place={side="superior", at=[0.8, 0.5]}, force="0.03 N", radius="8 mm", '
+    'history={kind="step"}}]'
+)
+HUNG = (
+    'organ.size=["60 mm", "40 mm", "30 mm"]',
+    "reference.element_size=10 mm",
+    "reference.element=p2",
+    "time.samples=17",
+    "time.duration=1 s",
+    'models=["fem"]',
+    SECOND,
+    "gravity.acceleration=9.81 m/s^2",
+    "gravity.towards=right",
+)
+WEIGHT = 'weight=[{place={side="superior", at=[0.5, 0.5]}, mass="20 g", radius="15 mm"}]'
+
+
+def forces_of(path):
+    """Sum [N] (3,) of the nodal forces of a file."""
+    found = np.zeros(3)
+    for _, direction, value in numbers(path.read_text().splitlines()):
+        found[int(direction) - 1] += value
+    return found
+
+
+@pytest.fixture(scope="module")
+def hung(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hung") / "out"
+    return export(
+        ExportRequest(target="block", to="calculix", out=folder, overrides=HUNG), Silent()
+    )
+
+
+def test_each_load_is_a_file_of_its_own_with_its_own_history(hung):
+    assert forces_of(hung / "load.inp") == pytest.approx([0.0, 0.0, -0.05], abs=1e-12)
+    assert forces_of(hung / "load.2.inp") == pytest.approx([0.0, 0.0, -0.03], abs=1e-12)
+    deck = cards((hung / "dynamic.inp").read_text())
+    first, second = (numbers(lines)[:, 1] for card, lines in deck if card.startswith("AMPLITUDE"))
+    assert (first[-1], second[-1]) == (1.0, 1.0)
+    assert second[1] == 1.0 > first[1] > 0.0
+    included = [card for card, _ in deck if card.startswith(("CLOAD", "INCLUDE, INPUT=load"))]
+    assert included == [
+        "CLOAD, AMPLITUDE=HISTORY",
+        "INCLUDE, INPUT=load.inp",
+        "CLOAD, AMPLITUDE=HISTORY2",
+        "INCLUDE, INPUT=load.2.inp",
+    ]
+
+
+def test_gravity_acts_on_the_tissue_at_rest_and_not_in_the_motion(hung):
+    (line,) = dict(cards((hung / "static.inp").read_text()))["DLOAD"]
+    assert line.startswith("BODY, GRAV, ")
+    size, *direction = (float(part) for part in line.split(",")[2:])
+    toward = problem_of(read_scene("block", HUNG)).gravity
+    assert size * np.array(direction) == pytest.approx(toward)
+    assert "GRAV" not in (hung / "dynamic.inp").read_text()
+    assert "starts from rest under it" in (hung / "README.txt").read_text()
+
+
+def test_what_we_get_at_rest_has_gravity_and_all_loads_in_it(hung):
+    """The deck's rest by hand: our stiffness, forces of the files, weight of its elements."""
+    found = np.loadtxt(hung / "static.csv", delimiter=",", skiprows=1)[:, 1:]
+    scene = read_scene("block", HUNG)
+    body = reference_of(scene).prepare(problem_of(scene)).body()
+    whole = solve_static(body).reshape(-1, 3)
+    assert np.abs(found - whole).max() < 1e-6 * np.abs(whole).max()  # straight elements: exact
+    light = solve_static(replace(body, dead=None)).reshape(-1, 3)
+    assert np.abs(found - light).max() > 0.1 * np.abs(whole).max()
+
+
+def test_weights_hang_as_nodal_forces_and_leave_the_motion_out(tmp_path):
+    request = ExportRequest(
+        target="block", to="calculix", out=tmp_path / "out", overrides=(*HUNG, WEIGHT)
+    )
+    folder = export(request, Silent())
+    toward = problem_of(read_scene("block", HUNG)).gravity
+    assert forces_of(folder / "weights.inp") == pytest.approx(0.02 * toward, abs=1e-9)
+    assert not (folder / "dynamic.inp").exists()
+    assert "There is no motion" in (folder / "README.txt").read_text()
+    assert "weights.inp" in (folder / "static.inp").read_text()
+    (folder / "load.2.inp").write_text("of an earlier export")
+    export(replace(request, to="vtu"), Silent())
+    assert {path.name for path in folder.iterdir()} == {"README.txt", "problem.vtu"}
+
+
+def test_a_vtu_file_has_every_load_and_the_weights(tmp_path):
+    import pyvista as pv
+
+    request = ExportRequest(
+        target="block", to="vtu", out=tmp_path / "out", overrides=(*HUNG, WEIGHT)
+    )
+    grid = pv.read(export(request, Silent()) / "problem.vtu")
+    assert grid.point_data["load"].sum(axis=0) == pytest.approx([0.0, 0.0, -0.05], abs=1e-12)
+    assert grid.point_data["load_2"].sum(axis=0) == pytest.approx([0.0, 0.0, -0.03], abs=1e-12)
+    assert np.linalg.norm(grid.point_data["weights"].sum(axis=0)) == pytest.approx(0.02 * 9.81)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (("tool.shape=sphere", "tool.displacement=2 mm"), "their force follows from contact"),
+        (
+            (*HUNG, SECOND.replace("at=[0.8", "at=[0.3")),
+            "tool.2: meets another load at a node",
+        ),
+    ],
+)
+def test_what_a_deck_cannot_hold_is_refused_with_the_reason(overrides, message, tmp_path):
+    request = ExportRequest(
+        target="block", to="calculix", out=tmp_path / "out", overrides=overrides
+    )
+    with pytest.raises(ValueError, match=message):
+        export(request, Silent())
+    assert not list(tmp_path.iterdir())

@@ -16,6 +16,7 @@ from study.commands.plan import plan as plan_command
 from study.commands.run import run
 from study.models.finite_elements import PreparedElements, reference_of
 from study.models.model import ModelRun
+from study.plan import moved as moved_plan
 from study.plan import plan as planning
 from study.plan.candidates import candidates
 from study.plan.look import lattice_at_rest, look, on_lattice
@@ -24,7 +25,7 @@ from study.plan.prediction import Foresight, Part, Prediction
 from study.problem.trajectory import Trajectory
 from study.progress import Silent
 from study.results.folder import read
-from study.results.records import CorrectionRecord, CurveErrors
+from study.results.records import CorrectionRecord, CurveErrors, SpacingErrors
 from study.run.requirement import requirement_checks
 from study.run.rest import rest_of
 from study.scene import Require
@@ -234,11 +235,21 @@ WANTS = {
 }
 
 
-@pytest.mark.parametrize("name", WANTS)
-def test_plan_of_the_block_is_as_kept(name, request):
+PRESSED = ('require.quantities=["peak-force", "history"]', "require.error=99 %")
+
+
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        *(("block", name) for name in WANTS),
+        pytest.param("press", "force", marks=pytest.mark.slow),
+    ],
+)
+def test_plan_is_as_kept(scene, name, request):
     """Costs, which a machine's speed decides, are left out."""
-    said = "\n".join(lines(plan(read_scene("block", WANTS[name])), costs=False)) + "\n"
-    kept = request.path.parent / "data" / "plans" / f"block-{name}.txt"
+    wanted = PRESSED if scene == "press" else WANTS[name]
+    said = "\n".join(lines(plan(read_scene(scene, wanted)), costs=False)) + "\n"
+    kept = request.path.parent / "data" / "plans" / f"{scene}-{name}.txt"
     if request.config.getoption("--update-scores"):
         kept.parent.mkdir(exist_ok=True)
         kept.write_text(said, encoding="utf-8")
@@ -261,6 +272,7 @@ def test_planned_scene_is_written_and_runs_as_it_is(tmp_path, capsys):
         ("require.rate=60 s", "'s' is not a unit like Hz"),
         ("require.memory=2 mm", "'mm' is not a unit like byte"),
         ("require.eror=5 %", "did you mean 'error'?"),
+        ('require.quantities=["peak-force"]', "peak-force is that of tools that are moved"),
     ],
 )
 def test_wrong_wants_are_refused_by_their_key(override, said):
@@ -329,3 +341,89 @@ def test_nothing_is_checked_where_no_error_is_required(small_scene, small_result
     runs = {"fem": moved(small_results.model("fem"), 1.0)}
     assert not checked(small_scene, small_results, runs)
     assert not list(requirement_checks(small_scene, ("tool",), runs))
+
+
+# --- under moved tools, gravity and more than one load --------------------------------------------
+
+SPHERE = (
+    'organ.size=["60 mm", "60 mm", "40 mm"]',
+    'models=["basafa"]',
+    "lattice.spacing=20 mm",
+    "lattice.step_fraction=0.5",
+    "reference.element_size=20 mm",
+    "tool.shape=sphere",
+    "tool.radius=20 mm",
+    "tool.displacement=4 mm",
+    "tool.history.ramp=0.2 s",
+    "tool.history.hold=0.1 s",
+    "time.duration=0.3 s",
+    "time.samples=31",
+)
+
+
+@cache
+def moved_look(*quantities):
+    wanted = f"require.quantities={list(quantities)}".replace("'", '"')
+    scene = read_scene("block", (*SPHERE, "require.error=90 %", wanted))
+    problem = problem_of(scene)
+    return scene, moved_plan.look(scene, problem, measure(scene.require, problem))
+
+
+def test_a_moved_tool_is_planned_by_two_lattices_at_order_one():
+    scene, seen = moved_look("peak-force")
+    found = list(moved_plan.lattices(scene, seen))
+    assert seen.spacing == pytest.approx(0.025)
+    assert [one.scene.models for one in found] == [("tissue",)] * len(found)
+    by_spacing = {one.scene.lattice.spacing: one for one in found}
+    assert by_spacing[0.01].prediction.error == pytest.approx(seen.apart * 10 / 25)
+    assert by_spacing[0.02].step == pytest.approx(2.0 * by_spacing[0.01].step)
+    assert by_spacing[0.02].scene.lattice.step_fraction == 0.5
+    assert by_spacing[0.01].wall_per_s == pytest.approx(16.0 * by_spacing[0.02].wall_per_s)
+    chosen = choose(found, Require(error=1.01 * by_spacing[0.02].prediction.error))
+    assert chosen.scene.lattice.spacing == 0.02
+
+
+def test_only_what_is_wanted_of_a_moved_tool_counts():
+    force, history = moved_look("peak-force")[1].apart, moved_look("history")[1].apart
+    assert force != history
+    assert moved_look("peak-force", "history")[1].apart == max(force, history)
+
+
+def test_gravity_and_further_loads_are_planned_likewise():
+    scene = scene_of("gravity.acceleration=9.81 m/s^2", "gravity.towards=inferior", *AT_TOOL)
+    scene = replace(scene, require=Require(error=0.9))
+    found = plan(scene)
+    assert found.scene.models == ("tissue",)
+    assert found.moves
+    assert any("twice the spacing" in one.reason for one in found.decisions)
+    with pytest.raises(SceneError, match="rest: is of a single load"):
+        scene_of("gravity.acceleration=9.81 m/s^2", 'require.quantities=["rest"]')
+
+
+def test_the_largest_force_is_checked_by_spacing_and_steps(small_scene, small_results):
+    errors = SpacingErrors(
+        coarser_m=0.02,
+        order=1.0,
+        displacement={"tool": 0.2, "left-lobe": 0.1},
+        tool_force={"tool": 0.4},
+        peak_force={"tool": 0.3},
+    )
+    springs = replace(
+        small_results.model("msm-mamdani"),
+        spacing_errors=errors,
+        tool_force_errors={"tool": 0.01},
+        time_step_errors={"tool": CurveErrors(displacement=0.02, velocity=1.0)},
+    )
+    runs = {"tissue": moved(springs, 1.0)}
+    both = ("history", "peak-force")
+    at_tool, force = checked(
+        small_scene, small_results, runs, error=0.25, quantities=both, at=("tool",)
+    )
+    assert (at_tool.value, at_tool.passed) == (pytest.approx(0.22), True)
+    assert (force.value, force.passed) == (pytest.approx(0.31), False)
+    (alone,) = checked(small_scene, small_results, runs, error=0.5, quantities=("peak-force",))
+    assert alone.passed
+    lost = {"tissue": moved(springs, 1.0, "diverged")}
+    assert not any(
+        one.passed for one in checked(small_scene, small_results, lost, error=0.5, quantities=both)
+    )

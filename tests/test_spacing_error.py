@@ -1,14 +1,13 @@
-"""The error of a lattice by its spacing, from coarser ones: exact curves, and a body pressed."""
+"""The error of a lattice by its spacing, from a coarser one: exact curves, and a body pressed."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from study.models.lattice import asked_step
-from study.models.spacing_error import fitted_to_finest, force_differences, spacing_errors
+from study.models.spacing_error import force_differences, spacing_errors
 from study.models.table import model
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -72,16 +71,3 @@ def test_the_estimate_is_of_the_size_of_the_error(problem, moved):
     over_time, peak = force_differences(problem, moved[10].tool_force, moved[5].tool_force)[:, 0]
     assert 0.5 < found.tool_force["tool"] / (2.0 * over_time) < 2.7
     assert 0.5 < found.peak_force["tool"] / (2.0 * peak) < 2.7
-
-
-def test_a_fit_to_the_finest_gives_back_constant_and_order():
-    h = np.array([0.02, 0.015, 0.012, 0.01])
-    found = fitted_to_finest(h, 7.0 * (h**1.3 - 0.005**1.3), 0.005)
-    assert (found.constant, found.order) == (
-        pytest.approx(7.0, rel=1e-3),
-        pytest.approx(1.3, rel=1e-3),
-    )
-    assert found.spread < 1e-3
-    assert found.error(0.005) == pytest.approx(7.0 * 0.005**1.3, rel=1e-2)
-    with pytest.raises(ValueError, match=r"only 2 lattices.*lattice\.spacing"):
-        fitted_to_finest(h[:2], [1.0, 0.5], 0.005)

@@ -7,7 +7,7 @@ negative. Its Rayleigh damping has them in it, as the reference's has.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 ELEMENT_NAME = {4: "C3D4", 10: "C3D10"}
 FIELD = 20
 SET_NAME = "SPRINGS"
+WEIGHTS = "weights.inp"
 MODEL = ("*INCLUDE, INPUT=mesh.inp", "*INCLUDE, INPUT=foundation.inp")
 
 
@@ -28,9 +29,9 @@ MODEL = ("*INCLUDE, INPUT=mesh.inp", "*INCLUDE, INPUT=foundation.inp")
 class Transient:
     """Steps of a motion from rest by HHT with `alpha`, and its Rayleigh damping.
 
-    `factors` of the load at 0, `step` [s], 2 `step`, ...; the first is zero, for CalculiX takes the
-    first acceleration under load otherwise than HHT. All nodes are printed after every `kept` steps
-    and after the last.
+    `factors` (count + 1,) or (count + 1, loads) at 0, `step` [s], 2 `step`, ...; the first is zero,
+    for CalculiX takes the first acceleration under load otherwise than HHT. All nodes are printed
+    after every `kept` steps and after the last.
     """
 
     step: float
@@ -45,8 +46,15 @@ class Transient:
         return len(self.factors) - 1
 
     def factor(self, times: Floats) -> Floats:
-        """Factor of the load at times [s], as CalculiX interpolates it."""
-        return np.interp(times, self.step * np.arange(len(self.factors)), self.factors)
+        """Factor of each load at times [s], as CalculiX interpolates it; of one load (t,)."""
+        known = self.step * np.arange(len(self.factors))
+        each = [np.interp(times, known, column) for column in self.columns]
+        return each[0] if len(each) == 1 else np.column_stack(each)
+
+    @property
+    def columns(self) -> list[Floats]:
+        """Factors of each load."""
+        return list(self.factors.reshape(len(self.factors), -1).T)
 
     def prints(self, step: int) -> bool:
         """Whether all nodes are printed after a step."""
@@ -54,16 +62,39 @@ class Transient:
 
 
 def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, str]:
-    """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion."""
+    """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion.
+
+    ValueError for loads of a motion that meet at a node: CalculiX adds them under one history.
+    """
+    parts = dict(zip(load_files(problem), problem.loads, strict=True))
+    if problem.hanging is not None:
+        parts[WEIGHTS] = problem.hanging
+    if motion is not None:
+        _refuse_meeting(problem.loads)
     named = {
         "mesh.inp": _lines(_mesh(problem, motion)),
         "foundation.inp": _lines(_foundation(problem)),
-        "load.inp": _lines(_load(problem)),
-        "static.inp": _lines(_static()),
-    }
+        "static.inp": _lines(_static(problem, parts)),
+    } | {name: _lines(_load(forces)) for name, forces in parts.items()}
     if motion is not None:
-        named["dynamic.inp"] = _lines(_dynamic(motion))
+        named["dynamic.inp"] = _lines(_dynamic(problem, motion))
     return named
+
+
+def load_files(problem: NodalProblem) -> list[str]:
+    """Name of the file of each load that has a history."""
+    return ["load.inp", *(f"load.{n}.inp" for n in range(2, len(problem.loads) + 1))]
+
+
+def _refuse_meeting(loads: Sequence[Floats]) -> None:
+    taken = np.zeros(loads[0].shape, dtype=bool)
+    for number, forces in enumerate(loads, 1):
+        if (taken & (forces != 0.0)).any():
+            raise ValueError(
+                f"tool.{number}: meets another load at a node, and CalculiX adds forces there "
+                "under one history; move it, or export to vtu"
+            )
+        taken |= forces != 0.0
 
 
 def _lines(lines: Iterable[str]) -> str:
@@ -125,25 +156,36 @@ def springs(problem: NodalProblem) -> Iterator[tuple[tuple[int, ...], float]]:
             yield (i + 1,), float(total)
 
 
-def _load(problem: NodalProblem) -> Iterator[str]:
-    for node, direction in np.argwhere(problem.load != 0.0):
-        yield f"{node + 1}, {direction + 1}, {_number(problem.load[node, direction])}"
+def _load(forces: Floats) -> Iterator[str]:
+    for node, direction in np.argwhere(forces != 0.0):
+        yield f"{node + 1}, {direction + 1}, {_number(forces[node, direction])}"
 
 
-def _static() -> Iterator[str]:
+def _static(problem: NodalProblem, parts: Iterable[str]) -> Iterator[str]:
+    """All in one step, in which forces on a node add up."""
     yield from MODEL
-    yield from ("*STEP", "*STATIC", "*CLOAD", "*INCLUDE, INPUT=load.inp")
+    yield from ("*STEP", "*STATIC")
+    for part in parts:
+        yield from ("*CLOAD", f"*INCLUDE, INPUT={part}")
+    if problem.gravity is not None:
+        size = float(np.linalg.norm(problem.gravity))
+        direction = ", ".join(_number(part) for part in problem.gravity / size)
+        yield from ("*DLOAD", f"BODY, GRAV, {_number(size)}, {direction}")
     yield from ("*NODE PRINT, NSET=ALL", "U", "*END STEP")
 
 
-def _dynamic(motion: Transient) -> Iterator[str]:
+def _dynamic(problem: NodalProblem, motion: Transient) -> Iterator[str]:
+    """From rest under gravity, which leaves a linear motion as it is and is not in it."""
     yield from MODEL
     times = motion.step * np.arange(len(motion.factors))
-    yield "*AMPLITUDE, NAME=HISTORY"
-    for time, factor in zip(times, motion.factors, strict=True):
-        yield f"{_number(time)}, {_number(factor)}"
+    histories = ["HISTORY", *(f"HISTORY{n}" for n in range(2, len(problem.loads) + 1))]
+    for name, factors in zip(histories, motion.columns, strict=True):
+        yield f"*AMPLITUDE, NAME={name}"
+        for time, factor in zip(times, factors, strict=True):
+            yield f"{_number(time)}, {_number(factor)}"
     yield f"*STEP, INC={len(motion.factors)}"
     yield f"*DYNAMIC, DIRECT, ALPHA={motion.alpha:g}"
     yield f"{_number(motion.step)}, {_number(times[-1])}"
-    yield from ("*CLOAD, AMPLITUDE=HISTORY", "*INCLUDE, INPUT=load.inp")
+    for name, part in zip(histories, load_files(problem), strict=True):
+        yield from (f"*CLOAD, AMPLITUDE={name}", f"*INCLUDE, INPUT={part}")
     yield from (f"*NODE PRINT, NSET=ALL, FREQUENCY={motion.kept}", "U", "*END STEP")

@@ -15,6 +15,7 @@ from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from fem_reference.elasticity import Body
+from fem_reference.exchange.nodal import NodalProblem
 from fem_reference.stiffness import Stiffness
 from study.problem.tissue import Tissue
 
@@ -28,14 +29,19 @@ RULES = {12: ONE_POINT, 30: FOUR_POINTS}
 """By the number of unknowns of an element."""
 
 
-def integrated(body: Body, tissue: Tissue) -> Body:
-    """The body with stiffness and mass as CalculiX integrates them; foundation and load as before.
+def integrated(body: Body, tissue: Tissue, given: NodalProblem | None = None) -> Body:
+    """The body with stiffness, mass and weight as CalculiX integrates them, all else as before.
 
-    For displacement elements alone.
+    For displacement elements alone. Attached weights have no mass in it, but act as `given` has it.
     """
     grid, element = body.basis.mesh, body.basis.elem
     basis = skfem.Basis(grid, element, quadrature=RULES[body.basis.Nbfun])
     elastic = linear_elasticity(*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
     inertia = skfem.BilinearForm(lambda u, v, _: tissue.density * dot(u, v))
     stiffness = Stiffness(csc_array(csc_array(elastic.assemble(basis)) + body.support))
-    return replace(body, stiffness=stiffness, mass=csc_array(inertia.assemble(basis)))
+    mass = csc_array(inertia.assemble(basis))
+    dead = None
+    if given is not None and given.gravity is not None:
+        dead = mass.sum(axis=1) * np.tile(given.gravity, body.node_count)
+        dead += 0.0 if given.hanging is None else given.hanging.ravel()
+    return replace(body, stiffness=stiffness, mass=mass, dead=dead)

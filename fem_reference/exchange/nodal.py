@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fem_reference.burden import Burden, hanging
 from fem_reference.elasticity import Body
 from study.mesh.tetrahedra import FACES
 from study.problem.supports import Support
@@ -17,6 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 DIRECTIONS = 3
+WEIGHTLESS = Burden()
 # Corners of an edge, and mid-side nodes of each face of FACES, by their place in an element.
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACE_EDGES = np.array([[5, 8, 9], [6, 7, 9], [4, 7, 8], [4, 5, 6]])
@@ -30,7 +32,9 @@ class NodalProblem:
     corners, then the middles of edges 01, 12, 02, 03, 13, 23, the order of C3D10 and of VTK;
     `load` [N] (n, 3), nodal forces at full load; `support` [N/m] (n, n), the foundation, which
     couples the nodes in each direction alike; `support_density` [Pa/m] (n,), its stiffness per
-    area, mean of the facets at a node.
+    area, mean of the facets at a node. `others` [N] (n, 3) each: of further loads. `gravity`
+    [m/s^2] (3,) on the tissue and `hanging` [N] (n, 3), its forces on attached weights; None and
+    zero where the given shape is the one under gravity, from which displacements count.
     """
 
     nodes: Floats
@@ -39,6 +43,14 @@ class NodalProblem:
     load: Floats
     support: csr_array
     support_density: Floats
+    others: tuple[Floats, ...] = ()
+    gravity: Floats | None = None
+    hanging: Floats | None = None
+
+    @property
+    def loads(self) -> tuple[Floats, ...]:
+        """Nodal forces [N] (n, 3) of each load that has a history."""
+        return (self.load, *self.others)
 
     @property
     def curved(self) -> bool:
@@ -52,7 +64,9 @@ class NodalProblem:
         return bool((offset > 1e-9 * edge).any())
 
 
-def nodal_problem(body: Body, tissue: Tissue, foundation: Support) -> NodalProblem:
+def nodal_problem(
+    body: Body, tissue: Tissue, foundation: Support, burden: Burden = WEIGHTLESS
+) -> NodalProblem:
     """The problem that a body is, as plain arrays.
 
     ValueError for Taylor-Hood elements: only the displacement elements have counterparts.
@@ -70,7 +84,16 @@ def nodal_problem(body: Body, tissue: Tissue, foundation: Support) -> NodalProbl
         body.load.reshape(-1, DIRECTIONS),
         csr_array(body.support[::DIRECTIONS, ::DIRECTIONS]),
         _density(body.points, elements, foundation),
+        tuple(other.reshape(-1, DIRECTIONS) for other in body.others),
+        None if body.dead is None else burden.gravity,
+        _hanging(body, burden),
     )
+
+
+def _hanging(body: Body, burden: Burden) -> Floats | None:
+    if body.dead is None or not burden.weights:
+        return None
+    return hanging(body, burden).reshape(-1, DIRECTIONS)
 
 
 def _density(nodes: Floats, elements: Ints, foundation: Support) -> Floats:

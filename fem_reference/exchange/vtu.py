@@ -24,11 +24,13 @@ CELL_TYPES = {4: VTK_TETRA, 10: VTK_QUADRATIC_TETRA}
 
 
 def text(problem: NodalProblem, displacement: Floats) -> str:
-    """A .vtu file with the displacement [m] (n, 3), load [N] and support density [Pa/m]."""
+    """A .vtu file with the displacement [m] (n, 3), loads [N] and support density [Pa/m]."""
     fields = {
         "displacement": displacement,
         "load": problem.load,
         "support_density": problem.support_density,
+        **{f"load_{n}": forces for n, forces in enumerate(problem.others, 2)},
+        **({} if problem.hanging is None else {"weights": problem.hanging}),
     }
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(_grid(problem, fields))

@@ -12,14 +12,18 @@ from dataclasses import dataclass, replace
 
 from msm.timestep import whole_steps
 from study.models.table import named
+from study.plan import moved
 from study.plan.candidates import Candidate, candidates, resting
 from study.plan.look import Look, look
+from study.plan.moved import HISTORY, PEAK_FORCE, MovedLook
 from study.plan.prediction import Foresight, Measure
 from study.problem.problem import Problem
 from study.scene import Require, Scene
 from study.scene.problem import problem_of
 
-HISTORY, FIELD = "history", "field"
+FIELD = "field"
+MOVING = frozenset({HISTORY, PEAK_FORCE})
+"""Quantities that are those of a motion."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ class Plan:
     def moves(self) -> bool:
         """Whether anything is stepped in time, and not only brought to rest."""
         required = self.scene.require
-        return required is None or HISTORY in required.quantities
+        return required is None or not MOVING.isdisjoint(required.quantities)
 
     @property
     def large(self) -> bool:
@@ -66,12 +70,21 @@ def plan(scene: Scene) -> Plan:
     if scene.is_point:
         return Plan(scene, tuple(_point(scene)))
     problem = problem_of(scene)
+    if problem.is_burdened:
+        return _by_motions(scene, problem, required)
     seen = look(scene, problem)
     foresight = Foresight(seen, measure(required, problem))
     moves = HISTORY in required.quantities
     offered = list((candidates if moves else resting)(scene, seen, foresight))
     chosen = choose(offered, required)
     return Plan(chosen.scene, tuple(_decisions(scene, seen, foresight, chosen)), chosen)
+
+
+def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
+    """Of a scene with moved tools, or more than one load: lattices, for others may not follow."""
+    seen = moved.look(scene, problem, measure(required, problem))
+    chosen = choose(list(moved.lattices(scene, seen)), required)
+    return Plan(chosen.scene, tuple(_moved_decisions(scene, seen, chosen, required)), chosen)
 
 
 def measure(required: Require, problem: Problem) -> Measure:
@@ -147,11 +160,7 @@ def _decisions(
     required = scene.require
     assert required is not None  # noqa: S101 - there is nothing to decide without
     moves = HISTORY in required.quantities
-    yield Decision(
-        "time",
-        f"{scene.time.duration:g} s of motion" if moves else "no step: rest under the full load",
-        f"wanted: {', '.join(required.quantities)}",
-    )
+    yield Decision(*_time(scene, required))
     yield Decision("displacements", _geometry(chosen), _strain(seen, foresight))
     yield Decision("model", chosen.name, _why(chosen, required))
     if moves:
@@ -159,6 +168,29 @@ def _decisions(
     yield Decision("reference", *_reference(chosen))
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
+
+
+def _moved_decisions(
+    scene: Scene, seen: MovedLook, chosen: Candidate, required: Require
+) -> Iterator[Decision]:
+    finer = f"{1e3 * seen.spacing:.3g}"
+    yield Decision(*_time(scene, required))
+    yield Decision(
+        "displacements",
+        _geometry(chosen),
+        f"springs strained by up to {_percent(seen.strain)} on a lattice of {finer} mm",
+    )
+    yield Decision("model", chosen.name, _why(chosen, required))
+    yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
+    yield Decision("reference", "none", "a run tells the error by a lattice of twice the spacing")
+    yield Decision("output", *_output(required))
+    yield Decision("left out", *_left_out(scene, chosen))
+
+
+def _time(scene: Scene, required: Require) -> tuple[str, str, str]:
+    moves = not MOVING.isdisjoint(required.quantities)
+    how = f"{scene.time.duration:g} s of motion" if moves else "no step: rest under the full load"
+    return "time", how, f"wanted: {', '.join(required.quantities)}"
 
 
 def _geometry(chosen: Candidate) -> str:
@@ -193,9 +225,10 @@ def _reference(chosen: Candidate) -> tuple[str, str]:
 
 
 def _output(required: Require) -> tuple[str, str]:
-    field = FIELD in required.quantities
-    where = ", ".join(required.at) or "all control points"
-    return f"{where}{', the whole field' if field else ''}", "as wanted"
+    wanted = [", ".join(required.at) or "all control points"]
+    wanted += ["the whole field"] if FIELD in required.quantities else []
+    wanted += ["the force of the tools"] if PEAK_FORCE in required.quantities else []
+    return ", ".join(wanted), "as wanted"
 
 
 def _left_out(scene: Scene, chosen: Candidate) -> tuple[str, str]:

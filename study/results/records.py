@@ -179,8 +179,9 @@ class SpacingErrors:
     """Estimated errors of a lattice by its spacing, from the same motion on a coarser one.
 
     By Richardson's extrapolation from a lattice of `coarser_m`, with an assumed `order`; relative
-    L2 of the displacement by control point, of the force of each moved tool over time, and of the
-    largest force. Of the discretisation alone: what springs cannot do at any spacing is not in it.
+    L2 of the displacement by control point and of the force of each moved tool over time, and that
+    of the largest force, taken no smaller: two lattices may meet in one number by chance. Of the
+    discretisation alone: what springs cannot do at any spacing is not in it.
     """
 
     coarser_m: float

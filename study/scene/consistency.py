@@ -380,16 +380,22 @@ def _contact_contradictions(scene: Scene) -> Iterator[str]:
 
 def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
     """Wants that contradict each other, or that a single point has no part in."""
-    try:
-        refuse_beside_one_load(scene.features, "require")
-    except ValueError as error:
-        yield str(error)
     wanted = set(required.quantities)
-    if not wanted & {"rest", "history"}:
-        yield "require.quantities: name rest, history or both; field says where, not what"
+    if not wanted & {"rest", "history", "peak-force"}:
+        yield (
+            "require.quantities: name rest, history or both, or peak-force; field says where, not "
+            "what"
+        )
+    if "rest" in wanted:
+        try:
+            refuse_beside_one_load(scene.features, "require.quantities: rest")
+        except ValueError as error:
+            yield str(error)
+    if "peak-force" in wanted and "moved-tools" not in scene.features:
+        yield "require.quantities: peak-force is that of tools that are moved; remove it"
     if len(wanted) < len(required.quantities):
         yield "require.quantities: a quantity is named twice"
-    if required.rate is not None and "history" not in wanted:
+    if required.rate is not None and not wanted & {"history", "peak-force"}:
         yield "require.rate: nothing moves at rest; add history to require.quantities or remove it"
     for name in required.at:
         if scene.control_points and name not in scene.control_points:

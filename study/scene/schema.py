@@ -37,7 +37,7 @@ SuitedKey = Literal[
     "lattice.spacing",
     "reference.element_size",
 ]
-Quantities = Literal["rest", "history", "field"]
+Quantities = Literal["rest", "history", "field", "peak-force"]
 Aetiology = Annotated[str, Choice("fuzzy.liver.table1:AETIOLOGIES")]
 
 
@@ -376,9 +376,10 @@ class Time:
 class Require:
     """What is wanted of a scene, from which `study.plan` derives what of it is modelled.
 
-    `quantities`: the rest under the full load, the history of the motion, and with "field" the
-    whole organ beside the control points `at`, all by default. `error`: relative, the largest of
-    these; `rate`: states per second in real time; `memory` on top of the program's own.
+    `quantities`: the rest under the full load, the history of the motion, the largest force of
+    tools that are moved, and with "field" the whole organ beside the control points `at`, all by
+    default. `error`: relative, the largest of these; `rate`: states per second in real time;
+    `memory` on top of the program's own.
     """
 
     quantities: tuple[Quantities, ...] = ("history",)
