@@ -7,6 +7,8 @@ import tomllib
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+
 from study.models.estimates import FuzzySide, estimates, run_fuzzy
 from study.models.linear_limits import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Watch
@@ -43,6 +45,7 @@ from study.run.suiting import suited
 from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
 from study.run.tool_forces import force_rows, force_scores, largest_forces
 from study.run.warnings import warnings
+from study.run.watched import kept
 from study.scene import Scene
 from study.scene.file import validate, write_scene
 from study.scene.part import without
@@ -157,14 +160,23 @@ def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -
 
 
 def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
-    """Surface, tool, probes and inclusions, and each model's displacement on the surface."""
-    return {
+    """Surface, tool, probes and inclusions, and what is kept of each model to draw."""
+    seen = posed.watched
+    found = {
         "points": posed.points,
         "triangles": posed.triangles,
         "tool": posed.tool,
         "probes": posed.probes,
         **({"inclusions": posed.inclusions} if len(posed.inclusions) else {}),
-    } | {name: run.trajectory.surface_field for name, run in runs.items()}
+        "held": seen.held,
+        "loaded": seen.loaded,
+        "cut": seen.points,
+        "cut_triangles": seen.triangles,
+        "film": np.unique(seen.samples),
+    }
+    for name, run in runs.items():
+        found |= kept(seen, name, run.trajectory.surface_field)
+    return found
 
 
 @dataclass(frozen=True)
