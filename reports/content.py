@@ -5,6 +5,7 @@ from __future__ import annotations
 from reports import budget, first_figure, fuzzy_tables, score_tables, summary, tables
 from reports.alternatives import alternatives
 from reports.certified import certified_rows
+from reports.cut_figure import section
 from reports.differences import finite_elements, own_error, resolved
 from reports.digits import Group, fixed, short, words
 from reports.motion_figures import shown_probes
@@ -30,6 +31,7 @@ def document(results: Results) -> dict[str, object]:
         "warnings": [words(text) for text in record.warnings],
         "question": words(question(results)),
         "answer": _answer(results),
+        "cut_reference": next(iter(cut.lengths)) if (cut := section(results)) else "",
         "first_caption": words(first_figure.caption(results)),
         "alternatives": alternatives(results),
         "glance": summary.glance(results),

@@ -137,7 +137,7 @@ def views(results: Results) -> Views | None:
 def exaggeration(rest: Floats, lengths: list[Floats]) -> float:
     """By which displacements of these lengths [m] (s,) are drawn larger on points [m] (s, 3)."""
     extent = float(np.ptp(rest, axis=0).max())
-    return _round_down(SHOWN_DEFORMATION * extent / _limit(lengths))
+    return _round_down(SHOWN_DEFORMATION * extent / colour_limit(lengths))
 
 
 def _differences(rest: Floats, peak: dict[str, Floats], named: dict[str, str]) -> Sheet:
@@ -151,7 +151,7 @@ def _reach(field: Floats) -> float:
     return SCALE_LIMIT * float(_length(field).max())
 
 
-def _limit(lengths: list[Floats]) -> float:
+def colour_limit(lengths: list[Floats]) -> float:
     """End of the colour scale [m]: the largest value, unless some model is far beyond the first."""
     largest = [float(values.max()) for values in lengths]
     return min(max(largest), SCALE_LIMIT * largest[0]) or 1.0
@@ -220,8 +220,10 @@ def _mark_triangles(axes: Axes, views: Views, panel: Panel) -> None:
         (views.loaded > LOADED, "o", RED),
     ):
         for near, face in ((False, "none"), (True, colour)):
-            at = places[chosen & (is_near == near)]
-            axes.plot(at[:, 0], at[:, 1], marker, ms=2.2, mfc=face, mec=colour, mew=0.35, alpha=0.8)
+            at, look = places[chosen & (is_near == near)], 0.85 if near else 0.4
+            axes.plot(
+                at[:, 0], at[:, 1], marker, ms=2.2, mfc=face, mec=colour, mew=0.35, alpha=look
+            )
 
 
 def _draw_scene_key(axes: Axes, views: Views, sheet: Sheet) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from reports.budget_figure import budget_figure
 from reports.content import document
+from reports.cut_figure import cut_figure
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.first_figure import first_figure
 from reports.fuzzy_figures import sets_figure, surfaces_figure
@@ -151,6 +152,7 @@ def _plots(results: Results) -> Figures:
         "budget": budget_figure(results),
         "tool_force": force_figure(results),
         "first": first_figure(results),
+        "cut": cut_figure(results),
     }
     return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 

@@ -93,17 +93,25 @@ def _numbers(run: Results) -> Iterator[tuple[Key, Measured]]:
 
 def lines(names: Sequence[str], rows: Iterable[Compared]) -> list[str]:
     """The table for a terminal, those that differ first."""
-    ordered = sorted(rows, key=lambda row: list(VERDICTS).index(row.differs))
-    body = [_cells(row) for row in ordered]
-    table = [[*HEADER, *names, "verdict"], *body]
+    rows = list(rows)
+    table = [[*HEADER, *names, "verdict"], *cells(rows)]
     widths = [max(len(row[i]) for row in table) for i in range(len(table[0]))]
     told = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
-    apart = sum(row.differs is True for row in ordered)
-    return [
-        *(line.rstrip() for line in told),
-        f"{apart} of {len(ordered)} numbers differ by more than their errors; ± is numerical "
-        "(mesh, time steps, quadrature), not that of a model",
-    ]
+    return [*(line.rstrip() for line in told), verdict(rows)]
+
+
+def verdict(rows: Sequence[Compared]) -> str:
+    """How many numbers differ, in a sentence."""
+    apart = sum(row.differs is True for row in rows)
+    return (
+        f"{apart} of {len(rows)} numbers differ by more than their errors; ± is numerical "
+        "(mesh, time steps, quadrature), not that of a model"
+    )
+
+
+def cells(rows: Iterable[Compared]) -> list[list[str]]:
+    """The rows as printed, those that differ first."""
+    return [_cells(row) for row in sorted(rows, key=lambda r: list(VERDICTS).index(r.differs))]
 
 
 def text(names: Sequence[str], rows: Iterable[Compared]) -> str:

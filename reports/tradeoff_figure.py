@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import log10
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -37,6 +38,8 @@ UNRESOLVED_COLOUR = "#e9e9e9"
 LATE_COLOUR = "#f4f4f4"
 COLUMN = 34
 """Letters in a line of the list beside."""
+BESIDE = (0.4, 0.15)
+"""Decades of cost and error within which two names would overprint each other."""
 PER_CENT = 100.0
 HOLLOW = {"markerfacecolor": "white"}
 FRONT: Style = {"color": "#555555", "linewidth": 0.9}
@@ -101,15 +104,22 @@ def _bars(one: MeasuredConfiguration) -> Style:
 
 
 def _draw_front(axes: Axes, chosen: Sequence[MeasuredConfiguration], dashes: str) -> None:
-    """A step line; each new setting on the one that is drawn whole has its name."""
+    """A step line; each new setting on the one drawn whole has its name, if there is room."""
     by_cost = sorted(chosen, key=lambda one: one.timing.quartiles[1])
     walls = [one.timing.quartiles[1] for one in by_cost]
     heights = [_height(one) for one in by_cost]
     axes.plot(walls, heights, drawstyle="steps-post", linestyle=dashes, **FRONT)
     labels = [mark_of(one.settings) for one in by_cost]
+    named: tuple[float, float] | None = None
     for x, y, label, last in zip(walls, heights, labels, ["", *labels], strict=False):
-        if dashes == "-" and label != last:
+        if dashes == "-" and label != last and not (named and _is_beside(named, (x, y))):
             axes.annotate(label, (x, y), (-4, -4), **_small(ha="right", va="top"))
+            named = x, y
+
+
+def _is_beside(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether names below both places would overprint each other."""
+    return all(abs(log10(a / b)) < d for a, b, d in zip(one, other, BESIDE, strict=True))
 
 
 def _draw_rate(

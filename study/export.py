@@ -26,6 +26,7 @@ from fem_reference.solvers import solve_static
 from study.folders import replacing
 from study.handover import write as handover
 from study.mesh.kinds import TetrahedralMesh
+from study.mesh.save import save
 from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
 from study.problem.features import FEATURES
@@ -134,13 +135,11 @@ def _target(request: ExportRequest) -> _Target:
 
 def _write_mesh(to: str, target: _Target, folder: Path, progress: Progress) -> None:
     """The tetrahedra of the reference as a mesh file, corners only, in metres."""
-    import meshio
-
     with progress.stage("organ"):
         prepared = reference_of(target.scene).prepare(problem_of(target.scene))
     mesh = _level(prepared, target.elements, progress).mesh
     file, format_ = MESHES[to]
-    meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)]).write(folder / file, format_)
+    save(mesh, folder / file, format_)
     _write(folder, {MARK: _about_mesh(target.scene, file, mesh)})
 
 

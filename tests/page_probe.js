@@ -18,9 +18,11 @@
     found.keyed = picture("organ-left-plot");
     set("organ-view", "difference");
     found.difference = { picture: picture("organ-right-plot"), title: text("organ-right-title"), end: text("organ-right-end") };
-    set("organ-frame", 1);
-    found.end = { table: text("organ-table"), note: text("organ-note") };
-    set("organ-frame", 0);
+    set("organ-time", $("organ-time").max);
+    found.end = { table: text("organ-table"), note: text("organ-note"), picture: picture("organ-right-plot"), cursor: line(), other: $("time").value };
+    set("organ-time", 5);
+    found.middle = { table: text("organ-table"), picture: picture("organ-right-plot") };
+    set("organ-time", 10);
     return found;
   }
 

@@ -378,13 +378,19 @@ def _differences(pair: tuple[str, str]) -> list[FieldDifference]:
 def _fields(models: list[str], probe_count: int) -> dict[str, np.ndarray]:
     shape = np.exp(-((POINTS - [0.0, -0.05, 0.0]) ** 2).sum(axis=1) / 0.03**2)
     peak = 1e-3 * shape[:, np.newaxis] * np.array([0.0, 1.0, 0.0])
-    fields = {
+    fields: dict[str, np.ndarray] = {
         "points": POINTS,
         "triangles": TRIANGLES,
         "tool": np.array([[0.0, -0.05, 0.0], [0.0, 1.0, 0.0]]),
         "probes": POINTS[(3 + np.arange(probe_count)) % len(POINTS)],
     }
-    return fields | {m: SOFTNESS[m] * np.stack([peak, 0.2 * peak]) for m in models}
+    fields |= {"held": np.eye(8)[0], "loaded": np.eye(8)[1], "film": np.array([0, 10, SAMPLES - 1])}
+    fields |= {"cut": POINTS[[0, 2, 1, 3]], "cut_triangles": np.array([[0, 1, 2], [0, 2, 3]])}
+    for model in models:
+        frames = SOFTNESS[model] * np.stack([peak, 0.2 * peak])
+        film = np.stack([0.0 * peak, *frames]).astype(np.float32)
+        fields |= {model: frames, f"cut.{model}": frames[:, [0, 2, 1, 3]], f"film.{model}": film}
+    return fields
 
 
 def _fuzzy_arrays() -> dict[str, np.ndarray]:

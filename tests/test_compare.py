@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports import several
+from reports import canvas, several, several_pdf
 from study.commands.compare import compare as command
 from study.compare import differences, other_words
 from study.results.folder import write
@@ -184,6 +184,42 @@ def test_three_folders_make_one_table_with_those_that_differ_first(tmp_path, cap
     table = (tmp_path / "table.csv").read_text().splitlines()
     assert table[0] == "quantity,model,unit,a,a ±,b,b ±,c,c ±,verdict"
     assert any(line.endswith("within errors") for line in table)
+
+
+def test_a_report_lays_the_curves_of_all_runs_over_each_other(tmp_path, capsys):
+    runs = {"a": whole(), "b": scaled(whole(), 1.2)}
+    for name, run in runs.items():
+        (tmp_path / name).mkdir()
+        write(run, tmp_path / name)
+    folders = [tmp_path / name for name in runs]
+    for _ in range(2):
+        command(*folders, errors=True, out=tmp_path / "a.pdf")
+        assert capsys.readouterr().out.endswith(f"report in {tmp_path / 'a.pdf'}\n")
+    made = (tmp_path / "a.pdf").read_bytes()
+    assert made.startswith(b"%PDF")
+    command(*folders, errors=True, out=tmp_path / "b.pdf")
+    assert (tmp_path / "b.pdf").read_bytes() == made
+    assert several_pdf.several_pdf(["a", "b"], [whole(), whole()], []) != made
+
+
+def test_every_run_is_a_line_at_its_own_scale(monkeypatch):
+    monkeypatch.setattr(canvas, "svg", lambda figure: figure)
+    runs = [whole(), scaled(whole(), 1.2), results_of(["basafa"])]
+    figure = several_pdf.curves_figure(["a", "b", "c"], runs)
+    heights = {
+        axes.get_title(loc="left"): [
+            float(max(line.get_ydata())) for line in axes.lines if line.get_label() in "abc"
+        ]
+        for axes in figure.axes
+    }
+    first = 1e3 * whole().curve("basafa", "tool").displacement.max()
+    assert heights["Basafa benchmark"] == pytest.approx([first, 1.2 * first, first])
+    assert len(heights["Finite elements"]) == 2
+
+
+def test_out_has_an_ending_that_says_what_it_is(tmp_path):
+    with pytest.raises(ValueError, match=r"end it with \.csv for the table, or \.pdf"):
+        command(tmp_path, tmp_path, errors=True, out=tmp_path / "table.txt")
 
 
 def test_out_is_for_the_table_alone(tmp_path):

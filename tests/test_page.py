@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import shutil
@@ -18,7 +19,7 @@ import pytest
 from fuzzy.liver import stiffness
 from reports.page import write
 from reports.page.answer import answer, nearest
-from reports.page.data import interpolation_error, page
+from reports.page.data import film, interpolation_error, page
 from study.commands.view import view
 from study.results import folder as results_folder
 from study.results.folder import ResultsError
@@ -202,13 +203,23 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
 # --- what is drawn -------------------------------------------------------------------------------
 
 
-def test_a_model_lost_before_the_end_keeps_its_peak_only():
+def test_a_model_lost_before_the_end_keeps_the_frames_before():
     results = results_of()
-    fields = results.fields | {"basafa": results.fields["basafa"].copy()}
-    fields["basafa"][1] = np.nan
+    fields = results.fields | {"film.basafa": results.fields["film.basafa"].copy()}
+    fields["film.basafa"][2] = np.nan
     found = page(replace(results, fields=fields)).organ
-    assert found.fields["basafa"].shape[0] == 1
-    assert found.fields["fem"].shape[0] == 2
+    assert found.films["basafa"].values.shape[0] == 2
+    assert found.films["fem"].values.shape[0] == 3
+
+
+def test_a_film_is_off_by_half_of_its_unit_at_most():
+    frames = np.random.default_rng(5).normal(size=(4, 50, 3))
+    made = film(frames)
+    bytes_ = base64.b64decode(made.values.base64)
+    back = made.unit * np.frombuffer(bytes_, dtype="<i2").reshape(made.values.shape)
+    assert made.unit == np.abs(frames).max() / 32767
+    assert 0.4 * made.unit < np.abs(back - frames).max() <= 0.5 * made.unit * (1 + 1e-9)
+    assert film(np.zeros((2, 3, 3))).unit == 1.0
 
 
 def test_the_stated_error_of_interpolation_bounds_what_is_missed_of_the_fuzzy_systems():
@@ -310,7 +321,17 @@ def test_the_organ_turns_on_both_sides_and_shows_differences(moved):
     assert organ["keyed"] != organ["turned"][0]
     assert "− Finite elements" in organ["difference"]["title"]
     assert organ["difference"]["picture"] != organ["turned"][1]
-    assert "at the end" in organ["end"]["table"]
+
+
+def test_the_surface_follows_the_time_and_the_sliders_move_each_other(moved):
+    """Of the samples the surface is at rest at first, at its peak half way, and at a fifth last."""
+    organ, peak = moved[0]["steps"]["organ"], 1e3 * np.abs(results_of().fields["fem"][0]).max()
+    assert f"Finite elements{0.2 * peak:#.4g}" in organ["end"]["table"]
+    assert "at 1.000 s" in organ["end"]["table"]
+    assert organ["end"]["other"] == "19"
+    assert organ["end"]["cursor"] == pytest.approx(1.0)
+    assert f"Finite elements{0.5 * peak:#.4g}" in organ["middle"]["table"]
+    assert organ["middle"]["picture"] != organ["end"]["picture"]
 
 
 def test_the_time_slider_moves_the_cursor_the_phase_plane_and_the_control_points(moved):

@@ -157,9 +157,8 @@ def test_a_text_beyond_the_sheet_is_noticed(figures):
 
 
 def test_no_text_is_too_small_to_read(figures):
-    for name, figure in figures.items():
-        least = 5.5 if name == "surfaces" else 6.0  # numbers on the axes of a solid
-        assert min(text.get_fontsize() for text in figure.findobj(Text)) >= least
+    for figure in figures.values():
+        assert min(text.get_fontsize() for text in figure.findobj(Text)) >= canvas.TEXT_SIZE
 
 
 def test_three_rule_views_fit_a_page(figures):

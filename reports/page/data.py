@@ -1,4 +1,4 @@
-"""What the page draws, as records that become JSON; arrays as base64 of 32-bit numbers."""
+"""What the page draws, as records that become JSON; arrays as base64."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reports import fuzzy_figures, tradeoff
 from reports.appearance import labels, looks, reference_name, system_colour, system_name
 from reports.digits import short, words
-from reports.field_figures import drawable, exaggeration
+from reports.field_figures import HELD, LOADED, drawable, exaggeration
 from reports.motion_figures import ProbeMotion, motions
 from reports.page.answer import nearest
 from reports.ranking import columns, references, score_table, tool_probe
@@ -25,6 +25,8 @@ KILO = 1e-3
 MILLI = 1e3
 MOST_SETS = 12
 SHADES = 33
+STEPS = 2**15 - 1
+"""Of a displacement, up to the largest."""
 DASHES = {"fem": "solid", "basafa": "longdash", "reading": "dot"}
 OTHER_DASHES = ("solid", "dashdot", "dash", "longdashdot")
 
@@ -71,12 +73,21 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Organ:
-    """Surface at rest [mm], triangles, and displacement [mm] (2, s, 3) by model.
+class Film:
+    """Displacement of a surface (frames, s, 3) in whole numbers of a `unit` [mm]."""
 
-    The two frames are those of results: at the peak of the load and at the end, of a model that
-    diverged in between the first alone. `push`: direction of the tool; `probes` [mm]; `factor`: by
-    which displacements are exaggerated at first. `reference`: of the differences, if there is one.
+    values: Packed
+    unit: float
+
+
+@dataclass(frozen=True)
+class Organ:
+    """Surface at rest [mm], triangles, and its motion by model.
+
+    `samples`: those of the curves that the frames are of; a model that diverged has the first of
+    them alone. `held` and `loaded`: numbers of triangles. `push`: direction of the tool; `probes`
+    [mm]; `factor`: by which displacements are exaggerated at first. `reference`: of the
+    differences, if there is one.
     """
 
     points: Packed
@@ -84,8 +95,10 @@ class Organ:
     tool: tuple[float, ...]
     push: tuple[float, ...]
     probes: Packed
-    fields: dict[str, Packed]
-    frames: tuple[str, str]
+    films: dict[str, Film]
+    samples: tuple[int, ...]
+    held: Packed
+    loaded: Packed
     factor: float
     reference: str | None
 
@@ -206,11 +219,17 @@ def page(results: Results) -> Page:
     )
 
 
-def packed(array: NDArray[np.generic]) -> Packed:
-    """An array as 32-bit numbers, the least significant byte first on every machine."""
-    kind = "<i4" if array.dtype.kind in "iu" else "<f4"
+def packed(array: NDArray[np.generic], kind: str | None = None) -> Packed:
+    """An array as 32-bit numbers or as another kind, the lowest byte first on every machine."""
+    kind = kind or ("<i4" if array.dtype.kind in "iu" else "<f4")
     data = np.ascontiguousarray(array, dtype=kind).tobytes()
     return Packed(tuple(array.shape), kind, base64.b64encode(data).decode("ascii"))
+
+
+def film(frames: Floats) -> Film:
+    """Frames [mm] in 16 bits: each number is off by half a unit at most."""
+    unit = float(np.abs(frames).max(initial=0.0)) / STEPS or 1.0
+    return Film(packed(np.rint(frames / unit), "<i2"), unit)
 
 
 def _models(results: Results) -> Iterator[Model]:
@@ -261,8 +280,10 @@ def _organ(results: Results) -> Organ | None:
         tool=tuple(round(MILLI * float(x), 4) for x in place),
         push=tuple(round(float(x), 6) for x in push),
         probes=packed(MILLI * fields["probes"]),
-        fields={name: packed(MILLI * _finite(fields[name])) for name in names},
-        frames=("peak of the load", "end"),
+        films={name: film(MILLI * _finite(fields[f"film.{name}"])) for name in names},
+        samples=tuple(int(sample) for sample in fields["film"]),
+        held=packed(np.flatnonzero(fields["held"] > HELD)),
+        loaded=packed(np.flatnonzero(fields["loaded"] > LOADED)),
         factor=_factor(fields["points"], [fields[name][0] for name in names]),
         reference=next((name for name in results.record.references if name in names), None),
     )

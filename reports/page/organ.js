@@ -89,6 +89,8 @@ const organView = (() => {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(triangles), gl.STATIC_DRAW);
     gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1, 1);  // marks on the surface lie before it
     let last = null;
 
     function give(name, values, size) {
@@ -114,13 +116,14 @@ const organView = (() => {
       give("normal", normals(shown.places, triangles), 3);
       give("share", shown.shares, 1);
       gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
+      for (const mark of shown.marks) if (mark.kind === "on") drawMark(mark, ratio);
       gl.disable(gl.DEPTH_TEST);
-      for (const mark of shown.marks) drawMark(mark, ratio);
+      for (const mark of shown.marks) if (mark.kind !== "on") drawMark(mark, ratio);
       gl.enable(gl.DEPTH_TEST);
       last = { seen, places: shown.places, box };
     }
 
-    /** Points, or a line of them, of one colour over all else. */
+    /** Points, or a line of them, of one colour; over all else but where they are on the surface. */
     function drawMark({ places, colour, size, kind }, ratio) {
       give("place", new Float32Array(places), 3);
       give("normal", new Float32Array(places.length).fill(1), 3);

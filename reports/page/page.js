@@ -13,7 +13,8 @@
   /** Flat typed array of a packed one. */
   function flat(packed) {
     const bytes = Uint8Array.from(atob(packed.base64), (c) => c.charCodeAt(0));
-    return packed.kind === "<i4" ? new Int32Array(bytes.buffer) : new Float32Array(bytes.buffer);
+    const kinds = { "<i4": Int32Array, "<i2": Int16Array, "<f4": Float32Array };
+    return new kinds[packed.kind](bytes.buffer);
   }
 
   /** Rows of a packed array of two dimensions. */
@@ -175,15 +176,17 @@
 
   function goTo(sample) {
     state.sample = Math.max(0, Math.min(sample, longest.length - 1));
-    $("time").value = state.sample;
-    drawMotion();
+    for (const id of ["time", "organ-time"]) if ($(id)) $(id).value = state.sample;
+    if (document.documentElement.dataset.ready === "yes") drawMotion();
     if (organ && organ.views) drawOrgan();
   }
 
   function play() {
-    const button = $("play"), on = !state.playing;
-    button.textContent = on ? "pause" : "play";
-    button.setAttribute("aria-pressed", String(on));
+    const on = !state.playing;
+    for (const id of ["play", "organ-play"]) if ($(id)) {
+      $(id).textContent = on ? "pause" : "play";
+      $(id).setAttribute("aria-pressed", String(on));
+    }
     clearInterval(state.playing);
     const stride = Math.max(1, Math.round(longest.length / 100));
     state.playing = on ? setInterval(() => goTo((state.sample + stride) % longest.length), 100) : 0;
@@ -205,23 +208,43 @@
 
   const organ = data.organ && {
     points: flat(data.organ.points), triangles: flat(data.organ.triangles), probes: flat(data.organ.probes),
-    fields: new Map(Object.entries(data.organ.fields).map(([name, one]) => [name, { all: flat(one), frames: one.shape[0] }])),
+    films: new Map(Object.entries(data.organ.films).map(([name, one]) => [name, { all: flat(one.values), unit: one.unit, frames: one.values.shape[0] }])),
+    held: flat(data.organ.held), loaded: flat(data.organ.loaded), most: new Map(),
     count: data.organ.points.shape[0] };
   const SIDES = ["left", "right"], KEYS = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10] };
-  const INK = [0.84, 0.37, 0.0], RED = [0.8, 0.0, 0.0];
+  const INK = [0.84, 0.37, 0.0], RED = [0.8, 0.0, 0.0], BLUE = [0.0, 0.45, 0.7];
   // Seen from where the tool pushes, from a little above and aside.
   const eye = data.organ && { around: Math.atan2(-data.organ.push[1], -data.organ.push[0]) + 0.35,
     above: Math.max(-1.2, Math.min(1.2, Math.asin(-data.organ.push[2]) + 0.3)), zoom: 1 };
 
   const chosen = (side) => $(`organ-${side}`).value;
-  const frame = () => Number($("organ-frame").value);
   const factor = () => 10 ** Number($("organ-factor").value);
   const largest = (values) => values.reduce((most, x) => Math.max(most, x), 0);
 
-  function displacement(name) {
-    const found = organ.fields.get(name);
-    if (frame() >= found.frames) return null;
-    return found.all.subarray(3 * organ.count * frame(), 3 * organ.count * (frame() + 1));
+  /** Displacement [mm] of every vertex at a sample, linear between the frames that are kept; null once a model is lost. */
+  function displacement(name, sample = state.sample) {
+    const { all, unit, frames } = organ.films.get(name), samples = data.organ.samples, size = 3 * organ.count;
+    let k = 0;
+    while (k + 1 < samples.length && samples[k + 1] <= sample) k += 1;
+    const share = samples[k] === sample ? 0 : (sample - samples[k]) / (samples[k + 1] - samples[k]);
+    if (k + (share > 0 ? 1 : 0) >= frames) return null;
+    const next = share > 0 ? size : 0;
+    return Float32Array.from({ length: size }, (_, i) => unit * ((1 - share) * all[k * size + i] + share * all[k * size + next + i]));
+  }
+
+  /** Largest length [mm] over all frames of a model, or of its difference from another. */
+  function most(name, against) {
+    const key = `${name} ${against || ""}`;
+    if (!organ.most.has(key)) organ.most.set(key, data.organ.samples.reduce((found, sample) => {
+      const u = displacement(name, sample), v = against && displacement(against, sample);
+      return u && (v || !against) ? Math.max(found, largest(lengths(u, v))) : found;
+    }, 0));
+    return organ.most.get(key);
+  }
+
+  /** Middles of facets, by their numbers, where the surface is. */
+  function middles(facets, places) {
+    return Array.from(facets, (t) => [0, 1, 2].map((d) => [0, 1, 2].reduce((sum, c) => sum + places[3 * organ.triangles[3 * t + c] + d], 0) / 3)).flat();
   }
 
   /** Length of a displacement, or of its difference from another, at every vertex [mm]. */
@@ -265,22 +288,25 @@
   function shown() {
     const of = data.organ.reference, [u, v] = SIDES.map((side) => displacement(chosen(side)));
     const against = $("organ-view").value === "difference" && of ? displacement(of) : null;
-    const values = [lengths(u), lengths(v, against)], most = values.map(largest);
-    const common = Math.max(most[0], Math.min(most[1], 3 * most[0]));
-    return { values, limits: (against ? most : [common, common]).map((x) => x || 1), against: against && of };
+    const values = [lengths(u), lengths(v, against)], ends = [most(chosen("left")), most(chosen("right"), against && of)];
+    const common = Math.max(ends[0], Math.min(ends[1], 3 * ends[0]));
+    return { values, limits: (against ? ends : [common, common]).map((x) => x || 1), against: against && of };
   }
 
   function drawOrgan() {
     const lost = SIDES.map(chosen).filter((name) => displacement(name) === null).map(label);
-    if (lost.length) { tellOrgan(`${[...new Set(lost)].join(" and ")} diverged before this frame and has none.`); return; }
+    if (lost.length) { tellOrgan(`${[...new Set(lost)].join(" and ")} diverged before this time and has no surface.`); return; }
     const { values, limits, against } = shown(), push = data.organ.push, { half } = organ.box;
     SIDES.forEach((side, k) => {
       const name = chosen(side), u = displacement(name), view = organ.views[k];
       const tip = probesOf(name)[data.probes.findIndex((one) => one.name === data.tool_probe)] || data.organ.tool;
-      const marks = [{ places: [...tip.map((x, d) => x - 0.45 * half * push[d]), ...tip], colour: RED, size: 1, kind: "line" },
+      const places = organ.points.map((x, i) => x + factor() * u[i]);
+      const marks = [{ places: middles(organ.held, places), colour: BLUE, size: 4, kind: "on" },
+        { places: middles(organ.loaded, places), colour: RED, size: 4, kind: "on" },
+        { places: [...tip.map((x, d) => x - 0.45 * half * push[d]), ...tip], colour: RED, size: 1, kind: "line" },
         { places: probesOf(name).flat(), colour: INK, size: 9 }];
       view.values = values[k];
-      view.draw({ places: organ.points.map((x, i) => x + factor() * u[i]), shares: values[k].map((x) => x / limits[k]), marks },
+      view.draw({ places, shares: values[k].map((x) => x / limits[k]), marks },
         eye, paper());
       const what = k === 1 && against ? `${label(name)} − ${label(against)}` : label(name);
       $(`organ-${side}-title`).textContent = what;
@@ -306,18 +332,19 @@
   function tellOrgan(why) {
     const time = longest[state.sample];
     const at = Number.isFinite(time) ? ` Control points (orange) stand where their curves have them at ${time.toFixed(3)} s, along the push, whose line is red.` : "";
-    $("organ-note").textContent = `${why} The surface is kept at two times, the peak of the load and the end: choose one by "frame". Displacements are drawn ${factor().toPrecision(3)} times as large.${at} Drag, or use the buttons or the arrow keys, to turn both; point at the surface to read it.`.trim();
+    $("organ-note").textContent = `${why} The surface is kept at ${data.organ.samples.length} times and moves linearly in between. Blue dots: supports, red dots: where the surface is loaded. Displacements are drawn ${factor().toPrecision(3)} times as large.${at} Drag, or use the buttons or the arrow keys, to turn both; point at the surface to read it.`.trim();
     $("organ-factor-out").value = `× ${factor().toPrecision(3)}`;
+    $("organ-time-out").value = Number.isFinite(time) ? `${time.toFixed(3)} s` : "";
   }
 
   function tableOrgan() {
     const of = data.organ.reference, against = of && displacement(of);
-    const body = [...organ.fields.keys()].filter((name) => displacement(name)).map((name) => {
+    const body = [...organ.films.keys()].filter((name) => displacement(name)).map((name) => {
       const u = displacement(name);
       const off = against && name !== of ? largest(lengths(u, against)).toPrecision(4) : "–";
       return [label(name), largest(lengths(u)).toPrecision(4), off];
     });
-    fill($("organ-table"), `At the vertices of the surface, which may miss the control points, at the ${data.organ.frames[frame()]}`, ["model", "largest displacement [mm]",
+    fill($("organ-table"), `At the vertices of the surface, which may miss the control points, at ${(longest[state.sample] || 0).toFixed(3)} s`, ["model", "largest displacement [mm]",
       of ? `largest difference to ${label(of)} [mm]` : "difference"], body);
   }
 
@@ -358,7 +385,7 @@
     organ.box = box();
     organ.views = SIDES.map((side) => organView.make($(`organ-${side}-plot`), organ.triangles, data.scale, organ.box.centre, organ.box.half));
     if (organ.views.includes(null)) { absent($("organ"), "This browser has no WebGL 2, which draws the organ."); organ.views = null; return; }
-    const names = [...organ.fields.keys()], of = data.organ.reference;
+    const names = [...organ.films.keys()], of = data.organ.reference;
     for (const side of SIDES) {
       options($(`organ-${side}`), names.map(label), names);
       $(`organ-${side}-bar`).style.background = `linear-gradient(to right, ${data.scale.join(",")})`;
@@ -366,12 +393,14 @@
     }
     $("organ-left").value = of || names[0];
     $("organ-right").value = names.includes(data.nearest) ? data.nearest : names[names.length - 1];
-    options($("organ-frame"), data.organ.frames, [0, 1]);
+    Object.assign($("organ-time"), { max: Math.max(0, longest.length - 1), value: state.sample });
+    $("organ-time").addEventListener("input", (e) => goTo(Number(e.target.value)));
+    $("organ-play").addEventListener("click", play);
     Object.assign($("organ-factor"), { max: Math.log10(data.organ.factor) + 0.5, step: "any" });
     $("organ-factor").value = Math.log10(data.organ.factor);
     $("organ-view").disabled = !of;
     eye.zoom = fitting(organ.box, $("organ-left-plot").getBoundingClientRect());
-    for (const id of ["organ-left", "organ-right", "organ-view", "organ-frame", "organ-factor"]) $(id).addEventListener("input", drawOrgan);
+    for (const id of ["organ-left", "organ-right", "organ-view", "organ-factor"]) $(id).addEventListener("input", drawOrgan);
     document.querySelectorAll("[data-turn]").forEach((button) =>
       button.addEventListener("click", () => turn(...button.dataset.turn.split(",").map(Number))));
     document.querySelectorAll("[data-zoom]").forEach((button) =>

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from study.compare import Difference
 
 
+CSV, PDF = ".csv", ".pdf"
+"""Kinds of file that a comparison is written to."""
+
+
 def compare(
     first: Path,
     second: Path,
@@ -42,7 +46,8 @@ def compare(
     errors
         Compare by the errors of the numbers, and not by a tolerance.
     out
-        CSV file to write the table to as well.
+        File to write the table to as well, all of it as .csv, or with the curves over each other as
+        .pdf.
     """
     if others or errors:
         _by_errors([first, second, *others], out)
@@ -54,15 +59,25 @@ def compare(
 
 def _by_errors(folders: list[Path], out: Path | None) -> None:
     from reports import several
-    from study.folders import check_file, write_text
+    from study.folders import check_file, write_bytes, write_text
     from study.results.folder import read
 
     if out is not None:
+        if out.suffix.lower() not in (CSV, PDF):
+            raise ValueError(f"--out {out}: end it with {CSV} for the table, or {PDF} for a report")
         check_file(out)
     names = several.short_names([str(folder) for folder in folders])
-    rows = several.compared([read(folder) for folder in folders])
+    runs = [read(folder) for folder in folders]
+    rows = several.compared(runs)
     print("\n".join(several.lines(names, rows)))
-    if out is not None:
+    if out is None:
+        return
+    if out.suffix.lower() == PDF:
+        from reports.several_pdf import several_pdf
+
+        write_bytes(out, several_pdf(names, runs, rows))
+        print(f"report in {out}")
+    else:
         write_text(out, several.text(names, rows))
         print(f"table in {out}")
 

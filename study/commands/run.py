@@ -30,6 +30,7 @@ def run(
     html: bool = True,
     open_: Annotated[bool, Parameter(name="--open", negative=())] = False,
     fields: Switch = False,
+    save_mesh: Switch = False,
     resume: Switch = False,
     fresh: Switch = False,
     workers: int | None = None,
@@ -54,6 +55,8 @@ def run(
         Open report.html once it is made.
     fields
         Keep the motion of all nodes of lattices and fem as MODEL.vtkhdf, which ParaView reads.
+    save_mesh
+        Keep the tetrahedra of the organ as mesh.msh, which organ.mesh reads again.
     resume
         Go on within the models that an interrupted run into the same folder was at.
     fresh
@@ -71,8 +74,9 @@ def run(
     if workers is not None and workers < 1:
         raise ValueError(f"--workers {workers}: give 1 or more")
     chosen = read_scene(scene, set_ or ())
-    if fields and chosen.is_point:
-        raise ValueError("--fields: a single point has none; leave it out")
+    for flag, given in (("--fields", fields), ("--save-mesh", save_mesh)):
+        if given and chosen.is_point:
+            raise ValueError(f"{flag}: a single point has none; leave it out")
     folder = out or default_folder(scene)
     if chosen.require is not None:
         from study.plan.plan import lines
@@ -88,7 +92,7 @@ def run(
         chosen = found.scene
     if open_ and not (report and html):
         raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
-    how = _How(folder, report, report and html, fields, resume, fresh, workers)
+    how = _How(folder, report, report and html, fields, save_mesh, resume, fresh, workers)
     results = _results(chosen, how, user_store())
     if open_:
         from study.commands.view import show
@@ -106,6 +110,7 @@ class _How:
     report: bool
     page: bool
     fields: bool
+    mesh: bool
     resume: bool
     fresh: bool
     workers: int | None
@@ -116,7 +121,11 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
     from study.progress import on_stderr
     from study.run import unchanged
 
-    key = "" if store is None else unchanged.run_key(scene, how.folder, fields=how.fields)
+    key = (
+        ""
+        if store is None
+        else unchanged.run_key(scene, how.folder, fields=how.fields, mesh=how.mesh)
+    )
     left = None if store is None or how.fresh else unchanged.left_by(store, key, how.folder, scene)
     if left is not None:
         tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")
@@ -150,17 +159,19 @@ class _Wanted:
 def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
     from study.models.keeping import Keeping
     from study.models.model import Watch
+    from study.results import manifest
     from study.results.folder import continuing, replacing, told_to_start_again, write
     from study.run.stages import Means, told
     from study.run.study import run_study
     from study.stages.lanes import available
 
-    means = Means(store, how.fresh, how.workers or available())
     with (
         told_to_start_again(),
         replacing(how.folder) as partial,
         continuing(how.folder, scene, resume=how.resume) as state,
     ):
+        mesh = partial / manifest.MESH if how.mesh else None
+        means = Means(store, how.fresh, how.workers or available(), mesh)
         keeping = Keeping(state, how.resume, partial if how.fields else None)
         results = run_study(scene, Watch(progress, keeping), means)
         with progress.stage("results"):

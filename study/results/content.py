@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,12 @@ SAME_TIME = 1e-9
 """Share of the simulated time within which two times are the same; tables have twelve digits."""
 SAME_SCORE = 1e-9
 """Within which two scores are the same; tables have twelve digits."""
-SURFACE: Shapes = {"points": "n3", "triangles": "m3", "tool": "23", "probes": "p3"}
+SURFACE: Shapes = {
+    **{"points": "n3", "triangles": "m3", "tool": "23", "probes": "p3", "held": "m", "loaded": "m"},
+    **{"cut": "c3", "cut_triangles": "t3", "film": "f"},
+}
+OF_MODEL: Shapes = {"": "2n3", "cut.": "2c3", "film.": "fn3"}
+"""Arrays of a model by what stands before its name."""
 SETS: Shapes = {"sets": "s", "x": "x", "principal": "sx", "lower": "sx", "upper": "sx"}
 VIEW: Shapes = {
     **{"unit": "", "inputs": "d", "readings": "d", "answer": "", "interval?": "2"},
@@ -381,25 +386,28 @@ def _check_sensitivity(results: Results) -> None:
 
 
 def _check_fields(results: Results) -> None:
-    """Surface, tool, control points, inclusions, and displacements at the peak and the end."""
+    """Surface, tool, control points, inclusions, cut, and displacements of each model."""
     file, fields, record = "fields.npz", results.fields, results.record
     if results.scene.is_point:
         return check_names(file, fields, [])
     names = [model.name for model in record.models]
     inside = {"inclusions": "ko3"} if results.scene.tissue.inclusion else {}
     surface = {**SURFACE, **inside}
-    check_names(file, fields, [*surface, *names])
-    shapes = {**surface, **dict.fromkeys(names, "2n3")}
-    check_shapes(file, fields, shapes, {"p": len(record.probes)})
-    lost = {model.name for model in record.models if model.status == "diverged"}
+    of_models = {start + name: dims for name in names for start, dims in OF_MODEL.items()}
+    check_names(file, fields, [*surface, *of_models])
+    check_shapes(file, fields, {**surface, **of_models}, {"p": len(record.probes)})
+    diverged = {model.name for model in record.models if model.status == "diverged"}
+    lost = {start + name for name in diverged for start in OF_MODEL}
     check_numbers(file, {name: array for name, array in fields.items() if name not in lost})
-    triangles = fields["triangles"]
-    if (
-        triangles.dtype.kind not in "iu"
-        or not np.isin(triangles, range(len(fields["points"]))).all()
-    ):
-        raise ValueError(f"{file}: array triangles names points that are not there")
+    for name, of in (("triangles", "points"), ("cut_triangles", "cut")):
+        _check_indices(file, name, fields[name], len(fields[of]))
+    _check_indices(file, "film", fields["film"], results.scene.time.samples)
     return None
+
+
+def _check_indices(file: str, name: str, array: NDArray[Any], count: int) -> None:
+    if array.dtype.kind not in "iu" or not ((array >= 0) & (array < count)).all():
+        raise ValueError(f"{file}: array {name} names points that are not there")
 
 
 def _check_fuzzy(results: Results) -> None:

@@ -15,15 +15,17 @@ from study.results.errors import ResultsError
 NAME = "SHA256SUMS"
 REPORT, PAGE = "report.pdf", "report.html"
 FIELDS = ".vtkhdf"
+MESH = "mesh.msh"
+"""The tetrahedra of a run, if they are wanted."""
 DATA = frozenset(
     {
         *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
         *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
         *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
-        *("tool_force.csv", "tool_similarity.csv"),
+        *("tool_force.csv", "tool_similarity.csv", MESH),
     }
 )
-ALWAYS = DATA - {"fields.npz", "fuzzy.npz", "tool_force.csv", "tool_similarity.csv"}
+ALWAYS = DATA - {"fields.npz", "fuzzy.npz", "tool_force.csv", "tool_similarity.csv", MESH}
 """What every run writes; a point has no fields, a scene maybe no fuzzy systems or rigid tools."""
 LINE = re.compile(r"(?P<digest>[0-9a-f]{64}) [ *](?P<name>[^/\0]+)")
 REMEDY = "restore the folder as the run left it, or run the scene again"

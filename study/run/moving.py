@@ -23,6 +23,7 @@ from study.run.limits import (
 from study.run.posed import Posed, Posing
 from study.run.ready import set_up
 from study.run.stages import Stage, Stages
+from study.run.watched import thinned
 from study.scene import Scene
 from study.stages.fingerprint import key
 
@@ -236,7 +237,7 @@ class Moving:
 
     def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> Moved:
         model = self._prepare(name)
-        run = model.run(replace(self.watch, progress=progress))
+        run = thinned(model.run(replace(self.watch, progress=progress)))
         if not at_rest:
             return Moved(run)
         with progress.stage(f"{name}: at rest"):

@@ -13,6 +13,7 @@ from study.problem.response import Response
 from study.progress import Progress
 from study.results.records import Dimensionless
 from study.run.dimensionless import dimensionless
+from study.run.watched import Watched, to_watch, watched
 from study.scene import Scene
 from study.scene.part import without
 from study.scene.problem import problem_of
@@ -33,7 +34,7 @@ BLIND_TO = (
 class Posed:
     """What is seen of a problem: where, on which surface, and of which mesh (by its SHA-256).
 
-    `inclusions` [m] (regions, points, 3): points of the surface of each.
+    `inclusions` [m] (regions, points, 3): points of the surface of each; `watched`: for pictures.
     """
 
     response: Response
@@ -45,6 +46,7 @@ class Posed:
     dimensionless: Dimensionless
     mesh: str
     inclusions: Floats
+    watched: Watched
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ class Posing:
     def problem(self) -> Problem:
         """The organ with support, tool and probes. ValueError naming the key that does not fit."""
         with self.progress.stage("organ"):
-            return problem_of(self.part)
+            return to_watch(problem_of(self.part))
 
     def posed(self) -> Posed:
         """What is seen of it."""
@@ -79,6 +81,7 @@ class Posing:
             dimensionless(self.scene, problem),
             self.mesh,
             problem.inclusions,
+            watched(problem),
         )
 
     @property

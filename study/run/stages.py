@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from study.folders import tell
@@ -25,11 +26,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Means:
-    """What a run may use: a store, read unless `fresh`, and so many processes side by side."""
+    """What a run may use: a store, read unless `fresh`, and so many processes side by side.
+
+    `mesh`: file to keep the tetrahedra in, if they are wanted.
+    """
 
     store: Store | None = None
     fresh: bool = False
     workers: int = 1
+    mesh: Path | None = None
 
 
 ALONE = Means()

@@ -6,7 +6,12 @@ import time
 import tomllib
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from study.mesh.save import save
 from study.models.estimates import FuzzySide, estimates, run_fuzzy
 from study.models.linear_limits import STRAIN_LIMIT
 from study.models.model import SILENT, ModelRun, Watch
@@ -43,11 +48,15 @@ from study.run.suiting import suited
 from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
 from study.run.tool_forces import force_rows, force_scores, largest_forces
 from study.run.warnings import warnings
+from study.run.watched import kept
 from study.scene import Scene
 from study.scene.file import validate, write_scene
 from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.lanes import lanes
+
+if TYPE_CHECKING:
+    from study.run.moving import Moving
 
 SUITED, FUZZY, SIMILARITY = "scene suited to the organ", "fuzzy systems", "similarity"
 NO_FUZZY = (
@@ -145,6 +154,8 @@ def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -
     moving = Moving(scene, tuned, organ_sha256(scene), stages, watch)
     posed = moving.start()
     found = moving.motions(posed)
+    if stages.means.mesh is not None:
+        _save_mesh(moving, posed, stages.means.mesh)
     return Compared(
         posed.response,
         found.runs,
@@ -156,15 +167,34 @@ def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -
     )
 
 
+def _save_mesh(moving: Moving, posed: Posed, path: Path) -> None:
+    """Write the tetrahedra that the run was on. ValueError where they cannot be made again."""
+    if moving.posing.mesh != posed.mesh:
+        raise ValueError(
+            "--save-mesh: the mesher made another mesh than that of the results kept in the store; "
+            "add --fresh to compute on the new one"
+        )
+    save(moving.posing.problem.geometry.mesh, path)
+
+
 def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
-    """Surface, tool, probes and inclusions, and each model's displacement on the surface."""
-    return {
+    """Surface, tool, probes and inclusions, and what is kept of each model to draw."""
+    seen = posed.watched
+    found = {
         "points": posed.points,
         "triangles": posed.triangles,
         "tool": posed.tool,
         "probes": posed.probes,
         **({"inclusions": posed.inclusions} if len(posed.inclusions) else {}),
-    } | {name: run.trajectory.surface_field for name, run in runs.items()}
+        "held": seen.held,
+        "loaded": seen.loaded,
+        "cut": seen.points,
+        "cut_triangles": seen.triangles,
+        "film": np.unique(seen.samples),
+    }
+    for name, run in runs.items():
+        found |= kept(seen, name, run.trajectory.surface_field)
+    return found
 
 
 @dataclass(frozen=True)

@@ -35,13 +35,13 @@ class Left:
     has_page: bool
 
 
-def run_key(scene: Scene, folder: Path, *, fields: bool) -> str:
+def run_key(scene: Scene, folder: Path, *, fields: bool, mesh: bool) -> str:
     """SHA-256 of all that the files of a run into a folder depend on, and of where that is.
 
     ValueError for a file of the scene that is missing.
     """
     files = [organ_sha256(scene), rule_base_sha256(scene.fuzzy.rule_base)]
-    given = [resolved(scene), str(folder.absolute()), files, fields]
+    given = [resolved(scene), str(folder.absolute()), files, fields, mesh]
     return digest(["run", *given, everything("reports"), machine()])
 
 

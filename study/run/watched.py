@@ -1,0 +1,102 @@
+"""What a run looks at besides its curves: the surface at times in between, and a cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.mesh.cut import cut
+from study.models.model import ModelRun
+from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
+from study.results.arrays import Arrays
+
+Floats = NDArray[np.float64]
+
+FILM = 12
+"""Equal parts of the motion at whose ends the surface is kept."""
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Where a run is looked at for its pictures.
+
+    `samples`: those at which the surface is kept, the peak first and the last one last. Of the cut
+    through the tool's axis points [m] (c, 3) and triangles. `held` and `loaded` (m,): share of the
+    area of each triangle of the surface that a support holds, or a tool loads or would touch.
+    """
+
+    samples: tuple[int, ...]
+    points: Floats
+    triangles: NDArray[np.int64]
+    held: Floats
+    loaded: Floats
+
+
+def watched(problem: Problem) -> Watched:
+    """What is looked at of a problem as a scene poses it."""
+    peak, last = problem.observation.frames[0], problem.observation.frames[-1]
+    between = set(np.linspace(0, last, FILM + 1).round().astype(int).tolist()) - {peak, last}
+    tool = problem.tool
+    points, triangles = cut(problem.geometry.mesh, tool.centre, _across(problem))
+    return Watched((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
+
+
+def to_watch(problem: Problem) -> Problem:
+    """The problem whose models keep all that is looked at, see `kept`."""
+    found, seen = watched(problem), problem.observation
+    surface = np.vstack([seen.surface_points, found.points])
+    seen = replace(seen, frames=found.samples, surface_points=surface)
+    return replace(problem, observation=seen)
+
+
+def _across(problem: Problem) -> Floats:
+    """Normal of a plane in which the push lies, and the body's largest extent across it."""
+    points, push = problem.geometry.surface.points, problem.tool.direction
+    away = points - points.mean(axis=0)
+    away = away - np.outer(away @ push, push)
+    longest = np.linalg.eigh(away.T @ away)[1][:, -1]
+    normal = np.cross(push, longest)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _acted_on(problem: Problem) -> tuple[Floats, Floats]:
+    """Shares of the area of each triangle that is held, and loaded."""
+    rule, tools = problem.surface_rule, [problem.tool, *(one.tool for one in problem.loads)]
+    given = rule.points, rule.normals
+    held = (problem.foundation.density(*given) > 0.0) | problem.foundation.fixed(*given).any(axis=1)
+    loaded = np.any([tool.profile(*given) > 0.0 for tool in tools], axis=0)
+    areas = rule.weights.reshape(len(problem.geometry.surface.triangles), -1)
+    held, loaded = (
+        (areas * which.reshape(areas.shape)).sum(axis=1) / areas.sum(axis=1)
+        for which in (held, loaded)
+    )
+    return held, loaded
+
+
+def thinned(run: ModelRun) -> ModelRun:
+    """The run whose fields inside are kept at the peak and at the end alone: they are large."""
+    bounds = None if run.bounds is None else (_ends(run.bounds[0]), _ends(run.bounds[1]))
+    halved = None if run.halved is None else _ends(run.halved)
+    return replace(run, trajectory=_ends(run.trajectory), bounds=bounds, halved=halved)
+
+
+def _ends(one: Trajectory) -> Trajectory:
+    return replace(one, volume_field=one.volume_field[[0, -1]])
+
+
+def kept(found: Watched, name: str, field: Floats) -> Arrays:
+    """Arrays of a model's field (frames, s + c, 3): on the surface, in the cut, and as a film.
+
+    On surface and cut [m] at the peak and at the end; the film in single precision at all samples,
+    in order.
+    """
+    count = field.shape[1] - len(found.points)
+    order = np.unique(found.samples, return_index=True)[1]
+    return {
+        name: field[[0, -1], :count],
+        f"cut.{name}": field[[0, -1], count:],
+        f"film.{name}": field[order, :count].astype(np.float32),
+    }
