@@ -50,16 +50,18 @@ def laden(body: Body, burden: Burden) -> Body:
 
     ValueError for a load or a weight that touches no surface of the mesh.
     """
-    nodes = body.nodes
-    surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
-    others = tuple(
-        without_fixed(_placed(surface, patch, f"tool.{n}"), body.fixed)
-        for n, patch in enumerate(burden.loads, 2)
-    )
+    others: tuple[Floats, ...] = ()
     mass, nodal = body.mass, body.nodal_mass
-    for attached in _all_attached(surface, burden.weights):
-        mass = csc_array(mass + decoupled(attached, body.fixed))
-        nodal = nodal + attached.sum(axis=1)
+    if burden.loads or burden.weights:
+        nodes = body.nodes
+        surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
+        others = tuple(
+            without_fixed(_placed(surface, patch, f"tool.{n}"), body.fixed)
+            for n, patch in enumerate(burden.loads, 2)
+        )
+        for attached in _all_attached(surface, burden.weights):
+            mass = csc_array(mass + decoupled(attached, body.fixed))
+            nodal = nodal + attached.sum(axis=1)
     dead: Floats | None = None
     if burden.gravity.any() and not burden.given_loaded:
         dead = without_fixed(nodal * np.tile(burden.gravity, body.node_count), body.fixed)

@@ -201,9 +201,9 @@ def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
 
 def composed(nodes: Any, tissue: Tissue) -> Composition | None:
     """What the cells of a basis are made of, curved ones as they are; None for one tissue."""
-    inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
 
     def points(cells: slice) -> Floats:
+        inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
         numbers = np.arange(cells.start, cells.stop)
         return np.moveaxis(np.asarray(nodes.mapping.F(inside, tind=numbers)), 0, -1)
 

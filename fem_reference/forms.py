@@ -48,12 +48,13 @@ class Gradients:
 
 def pattern(basis: Any) -> Pattern:
     """That of a scikit-fem basis of one component."""
-    nodes = np.asarray(basis.element_dofs.T, dtype=np.int64)
-    pairs = nodes[:, :, None] * basis.N + nodes[:, None, :]
-    keys, place = np.unique(pairs.ravel(), return_inverse=True)
-    counts = np.bincount(keys // basis.N, minlength=basis.N)
-    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    return Pattern(indptr, (keys % basis.N).astype(np.int32), place.reshape(pairs.shape))
+    nodes = np.asarray(basis.element_dofs.T)
+    each = nodes.shape[1]
+    pairs = np.repeat(nodes, each, axis=1).ravel(), np.tile(nodes, each).ravel()
+    shape = (basis.N, basis.N)
+    found = csr_array((np.ones(len(pairs[0]), np.int8), pairs), shape=shape)  # in order, each once
+    entries = csr_array((np.arange(found.nnz), found.indices, found.indptr), shape=shape)
+    return Pattern(found.indptr, found.indices, entries[pairs].reshape(-1, each, each))
 
 
 def products(basis: Any, where: Pattern, density: Floats | None = None) -> csr_array:

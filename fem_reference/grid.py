@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -31,6 +32,15 @@ _EDGES = 0.5 * (_CORNERS[[0, 0, 0, 1, 1, 2]] + _CORNERS[[1, 2, 3, 2, 3, 3]])
 _LOOKED_AT = np.ascontiguousarray(np.vstack([_CORNERS, _EDGES, np.full((1, 3), 0.25)]).T)
 
 
+class _Derivatives(NamedTuple):
+    """At local coordinates in some cells: (3, 3, cells, q) by these, and the inverse if asked."""
+
+    local: Floats
+    cells: Any
+    by_local: Floats
+    inverse: Floats | None
+
+
 class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-fem has no types
     """scikit-fem's quadratic mapping with an inverse that starts in the straight cell.
 
@@ -38,28 +48,71 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
     some points of curved cells and for all beyond a face.
     """
 
-    _kept: tuple[Any, Any, dict[tuple[int, int], Floats]] = (None, None, {})
+    _kept: _Derivatives | None = None
+    _found: tuple[Floats, Any, Floats] | None = None
+
+    @cached_property
+    def bent(self) -> NDArray[np.bool_]:
+        """Cells (cells,) one of whose edges is no straight line with its node in the middle."""
+        nodes = self.mesh.doflocs[:, self.mesh.dofs.element_dofs]
+        ends = nodes[:, [0, 1, 0, 0, 1, 2]] + nodes[:, [1, 2, 2, 3, 3, 3]]  # scikit-fem's order
+        return np.asarray((np.abs(nodes[:, 4:] - 0.5 * ends) > SETTLED).any(axis=(0, 1)))
+
+    def _at(self, X: Floats, tind: Any) -> _Derivatives:
+        """Derivatives at points, kept for the last points alone.
+
+        scikit-fem keeps those of every step of Newton's method, as long as there is a mesh, and
+        inverts them for every shape function anew.
+        """
+        kept = self._kept
+        if kept is None or kept.local is not X or kept.cells is not tind:
+            kept = self._kept = _Derivatives(X, tind, self._derivatives(X, tind), None)
+        return kept
+
+    def _derivatives(self, X: Floats, tind: Any) -> Floats:
+        """Of coordinate i by local coordinate j (i, j, cells, q); each shape is looked at once."""
+        nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs
+        dofs = dofs if tind is None else dofs[:, tind]
+        found = np.zeros((3, 3, dofs.shape[1], X.shape[-1]))
+        for k, cells in enumerate(dofs):
+            slopes = self.elem.lbasis(X, k)[1]
+            for i, j in np.ndindex(3, 3):
+                found[i, j] += nodes[i, cells][:, None] * slopes[j]
+        return found
 
     def J(self, i: int, j: int, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
-        """Derivative of coordinate i by local coordinate j, kept for the last points alone.
+        """Derivative of coordinate i by local coordinate j."""
+        return np.asarray(self._at(X, tind).by_local[i, j])
 
-        scikit-fem keeps those of every step of Newton's method, as long as there is a mesh.
-        """
-        if self._kept[0] is not X or self._kept[1] is not tind:
-            self._kept = (X, tind, {})
-        known = self._kept[2]
-        if (i, j) not in known:
-            known[i, j] = self._J(i, j, X, tind)
-        return known[i, j]
+    def invDF(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+        """Derivative of local coordinate i by coordinate j (i, j, cells, q)."""
+        at = self._at(X, tind)
+        if at.inverse is None:
+            at = self._kept = at._replace(inverse=super().invDF(X, tind))
+        return np.asarray(at.inverse)
+
+    def F(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+        """Points [m] (3, cells, q) at local coordinates."""
+        nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs
+        dofs = dofs if tind is None else dofs[:, tind]
+        found = np.zeros((3, dofs.shape[1], X.shape[-1]))
+        for k, cells in enumerate(dofs):
+            share = self.elem.lbasis(X, k)[0]
+            for i in range(3):
+                found[i] += nodes[i, cells][:, None] * share
+        return found
 
     def invF(self, x: Floats, tind: Any = None, **_: Any) -> Floats:  # noqa: N802 - scikit-fem's
         """Local coordinates (3, cells, q) of points x [m] (3, cells, q), by Newton's method.
 
-        ValueError if a point has none.
+        ValueError if a point has none. The last ones are kept: scikit-fem asks for them twice.
         """
+        if self._found is not None and self._found[0] is x and np.array_equal(self._found[1], tind):
+            return self._found[2]
         local, left = self.located(x, tind)
         if left.max() > NEWTON_TOLERANCE:
             raise ValueError("a curved tetrahedron is distorted; enlarge reference.element_size")
+        self._found = x, tind, local
         return local
 
     def located(self, x: Floats, cells: Ints | None) -> tuple[Floats, Floats]:
@@ -105,13 +158,14 @@ def curved(mesh: TetrahedralMesh, project: Projection) -> Any:
     move = project(middle) - middle
     far = np.linalg.norm(move, axis=1) > FARTHEST * np.linalg.norm(last - first, axis=1)
     share = np.where(far, 0.0, 1.0)
-    volumes = np.abs(
-        np.linalg.det(np.moveaxis(flat.p[:, flat.t[1:]] - flat.p[:, flat.t[:1]], 2, 0))
-    )
+    cells = np.flatnonzero(np.isin(flat.t2e, edges).any(axis=0))  # the others are straight
+    corners = flat.p[:, flat.t[:, cells]]
+    volumes = np.abs(np.linalg.det(np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0)))
     for attempt in range(HALVINGS + 1):
         bent = _bent(flat, edges, middle + share[:, None] * move)
-        distorted = mapping(bent).detDF(_LOOKED_AT).min(axis=1) < LEAST_JACOBIAN * volumes
-        if not distorted.any():
+        least = mapping(bent).detDF(_LOOKED_AT, cells).min(axis=1)
+        distorted = cells[least < LEAST_JACOBIAN * volumes]
+        if not len(distorted):
             return bent
         share[np.isin(edges, flat.t2e[:, distorted])] *= 0.5 if attempt < HALVINGS - 1 else 0.0
     return bent

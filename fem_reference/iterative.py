@@ -3,23 +3,23 @@
 Quadratic elements are preconditioned by a solution with linear elements on the same mesh, an eighth
 of the unknowns, added to that of every node alone: the iterations do not grow as the mesh is
 refined. The linear elements are solved by factors, or, when they are many, by a cycle of algebraic
-multigrid with the six rigid motions as near-null space.
+multigrid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, bsr_matrix, csr_array
+from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import LinearOperator, cg, minres
 
+from fem_reference.blocks import Blocks, blocks_of, diagonal_of, symmetric
 from fem_reference.direct import IMBALANCE, Solve, factorised
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
+from fem_reference.multigrid import multigrid
 
 Floats = NDArray[np.float64]
 
@@ -46,17 +46,18 @@ class Solver(Protocol):
 
 def preconditioner(body: Body) -> Solve:
     """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
-    matrix = body.stiffness.matrix.tobsr(blocksize=(3, 3))
+    matrix = body.stiffness.matrix
     if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
     prolong = _from_vertices(body.nodes.mesh, body.node_count)
     coarse = _linear_level(_on_vertices(matrix, prolong), body.points[: prolong.shape[1]])
-    restrict, alone = csr_array(prolong.T), SHARE * _inverted_diagonal(matrix)
+    restrict, alone = csr_array(prolong.T), _of_nodes_alone(matrix)
 
     def both(residual: Floats) -> Floats:
-        by_node = residual.reshape(-1, 3)
-        vertices = coarse((restrict @ by_node).ravel()).reshape(-1, 3)
-        return np.asarray((alone @ by_node[..., None])[..., 0] + prolong @ vertices).ravel()
+        found = coarse((restrict @ residual.reshape(-1, 3)).ravel())
+        found = np.asarray(prolong @ found.reshape(-1, 3)).ravel()
+        alone.add_product(residual, found)
+        return found
 
     return both
 
@@ -69,10 +70,12 @@ def _on_vertices(matrix: bsr_array, prolong: csr_array) -> bsr_array:
     return by_node.T @ matrix @ by_node
 
 
-def _inverted_diagonal(matrix: bsr_array) -> Floats:
-    """Inverses of the diagonal blocks (nodes, 3, 3)."""
-    rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
-    return np.linalg.inv(matrix.data[rows == matrix.indices])
+def _of_nodes_alone(matrix: bsr_array) -> Blocks:
+    """A share of the inverses of the diagonal blocks."""
+    whole = blocks_of(matrix)
+    inverses = SHARE * np.linalg.inv(whole.data[diagonal_of(whole)])
+    places = np.arange(len(inverses) + 1, dtype=np.int32)
+    return Blocks(places[:-1], places[1:], places[:-1], inverses.astype(np.float32))
 
 
 def _from_vertices(mesh: Any, nodes: int) -> csr_array:
@@ -88,43 +91,7 @@ def _from_vertices(mesh: Any, nodes: int) -> csr_array:
 def _linear_level(matrix: bsr_array, points: Floats) -> Solve:
     if matrix.shape[0] < FACTORED_BELOW:
         return factorised(matrix)
-    from pyamg import smoothed_aggregation_solver
-
-    with _drawing_alike():
-        levels = smoothed_aggregation_solver(
-            bsr_matrix(matrix),
-            B=rigid_motions(points),
-            strength=("symmetric", {"theta": 0.0}),
-            smooth="jacobi",
-            presmoother=("block_gauss_seidel", {"sweep": "forward"}),
-            postsmoother=("block_gauss_seidel", {"sweep": "backward"}),
-        )
-    cycle = levels.aspreconditioner()
-    return lambda residual: np.asarray(cycle @ residual)
-
-
-@contextmanager
-def _drawing_alike() -> Iterator[None]:
-    """Let pyamg begin its estimates of eigenvalues alike, so that a solution is the same each time.
-
-    It draws from numpy's global generator, which is left as it was.
-    """
-    before = np.random.get_state()  # noqa: NPY002 - the one that pyamg draws from
-    np.random.seed(0)  # noqa: NPY002 - as above
-    try:
-        yield
-    finally:
-        np.random.set_state(before)  # noqa: NPY002 - as above
-
-
-def rigid_motions(points: Floats) -> Floats:
-    """Three translations and three rotations (3 n, 6) of points (n, 3), about their centre."""
-    x = points - points.mean(axis=0)
-    motions = np.zeros((len(points), 3, 6))
-    motions[:, :, :3] = np.eye(3)
-    for k in range(3):
-        motions[:, :, 3 + k] = np.cross(np.eye(3)[k], x)
-    return motions.reshape(-1, 6)
+    return multigrid(matrix, points)
 
 
 def iterative(body: Body, tolerance: float) -> Solver:
@@ -134,7 +101,7 @@ def iterative(body: Body, tolerance: float) -> Solver:
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        return _solver(cg, body.stiffness.matrix, inner, tolerance)
+        return _solver(cg, symmetric(body.stiffness.matrix), inner, tolerance)
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
 
@@ -169,7 +136,10 @@ def _refined(
     start: Floats | None = None,
 ) -> Floats:
     """Iterate again on what is left, as minimal residuals stop by a norm of their own."""
-    operator = LinearOperator(matrix.shape, matvec=inner, dtype=np.float64)
+    product, better = (
+        LinearOperator(matrix.shape, matvec=one, dtype=np.float64)
+        for one in (matrix.__matmul__, inner)
+    )
     found = np.zeros_like(load) if start is None else start
     left, scale = load - matrix @ found, float(np.linalg.norm(load))
     for _ in range(REFINEMENTS):
@@ -179,7 +149,7 @@ def _refined(
         wanted = STRICTER[method] * tolerance * scale / size
         within = {"rtol": max(wanted, ROUNDING), "maxiter": MAX_ITERATIONS}
         with np.errstate(all="ignore"):  # a singular matrix may end in 0 / 0, as the residual tells
-            more, _ = method(matrix, left, M=operator, **within)
+            more, _ = method(product, left, M=better, **within)
         found = found + more
         left = load - matrix @ found
         if not np.isfinite(left).all():

@@ -12,6 +12,9 @@ from study.mesh.locate import locate
 
 Floats = NDArray[np.float64]
 
+LEAST_SHARE = 0.3
+"""Of the largest squared norm of a strain, below which no principal strain is the largest."""
+
 
 def evaluation(body: Body | Outline, points: Floats) -> csr_array:
     """Matrix that takes values at nodes to values at points [m] (q, 3)."""
@@ -19,9 +22,10 @@ def evaluation(body: Body | Outline, points: Floats) -> csr_array:
     cells, barycentric = locate(body.mesh, points)
     local = np.ascontiguousarray(barycentric[:, 1:].T)[:, :, None]
     if isinstance(basis.mapping, CurvedMapping):
-        found, off = basis.mapping.located(points.T[:, :, None], cells)
+        bent = np.flatnonzero(basis.mapping.bent[cells])
+        found, off = basis.mapping.located(points[bent].T[:, :, None], cells[bent])
         # The few points beyond a strongly bent face keep their straight coordinates.
-        local = np.where(off < NEWTON_TOLERANCE, found, local)
+        local[:, bent] = np.where(off < NEWTON_TOLERANCE, found, local[:, bent])
     values = [np.asarray(basis.elem.lbasis(local, k)[0])[..., 0] for k in range(basis.Nbfun)]
     columns = basis.element_dofs[:, cells]
     rows = np.broadcast_to(np.arange(len(points)), columns.shape)
@@ -43,14 +47,29 @@ def carried(vectors: Floats, body: Body | Outline, other: Body) -> Floats:
 
 def largest_strain(body: Body, u: Floats) -> float:
     """Largest absolute principal strain at the integration points."""
-    gradient = _gradient(body, u)
-    strain = 0.5 * (gradient + np.swapaxes(gradient, -2, -1))
-    return float(np.abs(np.linalg.eigvalsh(strain)).max())
+    return _largest_strain(_gradient(body, u))
 
 
 def largest_rotation(body: Body, u: Floats) -> float:
     """Largest rotation [rad], as small ones go, at the integration points."""
+    return _largest_rotation(_gradient(body, u))
+
+
+def strain_and_rotation(body: Body, u: Floats) -> tuple[float, float]:
+    """Both."""
     gradient = _gradient(body, u)
+    return _largest_strain(gradient), _largest_rotation(gradient)
+
+
+def _largest_strain(gradient: Floats) -> float:
+    strain = 0.5 * (gradient + np.swapaxes(gradient, -2, -1))
+    size = np.einsum("...ij,...ij->...", strain, strain)
+    # No principal strain exceeds the norm, and the largest of three is a third of its square.
+    large = ~(size < LEAST_SHARE * size.max())
+    return float(np.abs(np.linalg.eigvalsh(strain[large])).max())
+
+
+def _largest_rotation(gradient: Floats) -> float:
     turn = gradient - np.swapaxes(gradient, -2, -1)
     return float(np.sqrt((turn**2).sum(axis=(-2, -1)).max() / 8.0))
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.elasticity import Body
-from fem_reference.observation import at_points, evaluation, largest_rotation, largest_strain
+from fem_reference.observation import at_points, evaluation, strain_and_rotation
 from study.problem.trajectory import Observation, empty_trajectory
 
 Floats = NDArray[np.float64]
@@ -47,6 +47,5 @@ class Recorder:
 
     def look(self, u: Floats) -> None:
         """Take note of how far a state is from small displacements."""
-        there = self.start + u
-        self.strain = max(self.strain, largest_strain(self.body, there))
-        self.rotation = max(self.rotation, largest_rotation(self.body, there))
+        strain, rotation = strain_and_rotation(self.body, self.start + u)
+        self.strain, self.rotation = max(self.strain, strain), max(self.rotation, rotation)

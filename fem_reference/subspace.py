@@ -228,18 +228,22 @@ def superposition(
     them, as exactly; shape ((times - 1) * inside + 1, m).
     """
     step = float(times[1] - times[0])
-    motion = SubspaceMotion(subspace, damping, factor, step)
-    count, modes = len(times) - 1, len(motion.state)
-    starts, y = np.zeros((count, modes, 4)), np.zeros((count, inside, modes, 2))
-    for n, (before, after) in enumerate(pairwise(factor(times))):
-        starts[n, :, :2] = motion.state[:, :2]
-        motion.advance(before, after)
-        starts[n, :, 2:], y[n, -1] = motion.state[:, 2:], motion.state[:, :2]
+    squares, modes = eigh(subspace.stiffness)
+    held = np.reshape(factor(times), (len(times), -1)) @ (modes.T @ subspace.loads).T
+    forced = np.stack([held[:-1], np.diff(held, axis=0) / step], axis=-1)
+    count, size = forced.shape[:2]
+    starts, y = np.zeros((count + 1, size, 2)), np.zeros((count, inside, size, 2))
+    moved = transitions(squares, damping, step)[:, :2]
+    added = np.einsum("mij,nmj->nmi", moved[..., 2:], forced)
+    for n in range(count):
+        starts[n + 1] = (moved[..., :2] @ starts[n, ..., None])[..., 0] + added[n]
+    y[:, -1] = starts[1:]
+    whole = np.concatenate([starts[:-1], forced], axis=-1)
     for part in range(1, inside):
-        moved = transitions(motion.squares, damping, step * part / inside)
-        y[:, part - 1] = np.einsum("mij,nmj->nmi", moved[:, :2], starts)
-    y = np.concatenate([np.zeros((1, modes, 2)), y.reshape(-1, modes, 2)])
-    return y[..., 0] @ motion.modes.T, y[..., 1] @ motion.modes.T
+        moved = transitions(squares, damping, step * part / inside)[:, :2]
+        y[:, part - 1] = np.einsum("mij,nmj->nmi", moved, whole)
+    y = np.concatenate([np.zeros((1, size, 2)), y.reshape(-1, size, 2)])
+    return y[..., 0] @ modes.T, y[..., 1] @ modes.T
 
 
 def transitions(squares: Floats, damping: RayleighDamping, step: float) -> Floats:

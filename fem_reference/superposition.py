@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -97,18 +96,16 @@ class Excitation:
         every = self.pace.per_sample
         return y[::every][: self.samples], rate[::every][: self.samples]
 
-    def curves(self, subspace: Subspace) -> ProbeCurves:
-        """The motion of the control points."""
+    def curves(self, subspace: Subspace, coordinates: tuple[Floats, Floats]) -> ProbeCurves:
+        """The motion of the control points by its coordinates and rates."""
         nodes, m = self.at_probes.shape[1], subspace.load.size
         shapes = (self.at_probes @ subspace.vectors.reshape(nodes, 3 * m)).reshape(-1, 3, m)
-        return ProbeCurves(
-            *(np.einsum("pdm,tm->tpd", shapes, y) for y in self.coordinates(subspace))
-        )
+        return ProbeCurves(*(np.einsum("pdm,tm->tpd", shapes, y) for y in coordinates))
 
-    def change(self, subspace: Subspace) -> CurveChange:
-        """Largest relative L2 changes of the curves by the last quarter of the vectors."""
-        whole = self.curves(subspace)
-        return curve_change(whole, self.curves(subspace.leading(fewer(subspace.load.size))))
+    def change(self, subspace: Subspace, whole: ProbeCurves) -> CurveChange:
+        """Largest relative L2 changes of its curves by the last quarter of the vectors."""
+        less = subspace.leading(fewer(subspace.load.size))
+        return curve_change(whole, self.curves(less, self.coordinates(less)))
 
 
 def fewer(vectors: int) -> int:
@@ -144,14 +141,11 @@ def excitation_of(
 
 def superposed(excitation: Excitation, subspace: Subspace) -> Superposed:
     """Motion in a subspace."""
-    return Superposed(
-        subspace,
-        *excitation.coordinates(subspace),
-        excitation.curves(subspace),
-        excitation.change(subspace),
-        float(excitation.times[1] - excitation.times[0]),
-        len(excitation.times) - 1,
-    )
+    coordinates = excitation.coordinates(subspace)
+    curves = excitation.curves(subspace, coordinates)
+    change = excitation.change(subspace, curves)
+    step, count = excitation.times[1] - excitation.times[0], len(excitation.times) - 1
+    return Superposed(subspace, *coordinates, curves, change, float(step), count)
 
 
 def subspace_motion(
@@ -198,11 +192,16 @@ def enough_ritz_vectors(
     usual, limit = (
         min(count * loads, body.stiffness.size) for count in (MAX_VECTORS, MOST_VECTORS)
     )
-    found, change = next(growing), CurveChange(np.inf, np.inf)
-    while found.load.size < limit and max(change) > TRUNCATION:
-        if found.load.size >= usual and change.displacement < GOOD:
+    tried, change = 1, CurveChange(np.inf, np.inf)
+    for found in growing:
+        size = found.load.size
+        if size < min(tried + GROWTH, limit):
+            continue
+        tried, whole = size, excitation.curves(found, excitation.coordinates(found))
+        change = excitation.change(found, whole)
+        advance(min(1.0, size / usual))
+        if max(change) <= TRUNCATION or size >= limit:
+            break
+        if size >= usual and change.displacement < GOOD:
             break  # what is left are waves in the velocity, of which each mesh has its own
-        *_, found = islice(growing, min(GROWTH, limit - found.load.size))
-        change = excitation.change(found)
-        advance(min(1.0, found.load.size / usual))
     return found

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
 from dataclasses import replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from threading import Event
@@ -28,9 +29,11 @@ from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
 from study.folders import FolderError, check_file, write_bytes
+from study.progress import Progress, Silent
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
 from study.stages.flat import Arrays
+from study.stages.lanes import Job, available, lanes
 from study.stages.once import made_once
 from study.sweep.program import everything
 
@@ -42,7 +45,10 @@ STANDARD: Literal["ua-1"] = "ua-1"
 """PDF/UA-1: tagged, with alternative texts, a language and a title."""
 NO_GLYPH = "could not be displayed with font"
 """In what typst says of a text that no font of its own has letters for."""
+PROCESSES = 2
+"""That draw plots at most: more of them wait for the dearest."""
 Figures = dict[str, list[bytes]]
+Draw = Callable[[], Mapping[str, list[bytes] | bytes | None]]
 Drawing = dict[str, str] | None
 NOWHERE = Provenance(
     versions={},
@@ -142,19 +148,36 @@ def _kept_plots(results: Results) -> Figures:
 
 
 def _plots(results: Results) -> Figures:
-    figures: Figures = {"motion": list(motion_figures(results))}
+    """All plots but pictures of the organ, drawn in two processes where there are processors."""
+    drawings = _drawings(results)
+    with lanes(min(PROCESSES, available()), Silent()) as side_by_side:
+        for number, draw in enumerate(drawings):
+            side_by_side.start(Job(str(number), partial(_drawn, draw)))
+        found = side_by_side.results()
+    drawn = {place: svg for one in found.values() for place, svg in one.items()}
+    return {
+        place: svg if isinstance(svg, list) else [svg]
+        for place, svg in drawn.items()
+        if svg is not None
+    }
+
+
+def _drawn(draw: Draw, _: Progress) -> Mapping[str, list[bytes] | bytes | None]:
+    return draw()
+
+
+def _drawings(results: Results) -> Iterator[Draw]:
+    """Functions that draw plots by place, the dearest first."""
+    yield lambda: {"motion": list(motion_figures(results)), "first": first_figure(results)}
     if results.fuzzy:
-        figures["sets"] = [sets_figure(results)]
-        figures["surfaces"] = [surfaces_figure(results)]
-        figures["rules"] = rule_figures(results)
-    single = {
+        yield lambda: {"rules": rule_figures(results)}
+        yield lambda: {"surfaces": surfaces_figure(results), "sets": sets_figure(results)}
+    yield lambda: {
         "sensitivity": sensitivity_figure(results.sensitivity),
         "budget": budget_figure(results),
         "tool_force": force_figure(results),
-        "first": first_figure(results),
         "cut": cut_figure(results),
     }
-    return figures | {place: [svg] for place, svg in single.items() if svg is not None}
 
 
 def _with_pictures(

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import fem_reference as fem
-from fem_reference import dynamics, subspace
+from fem_reference import dynamics
+from fem_reference import superposition as module
 from fem_reference.pace import OWN_STEPS, Pace, own_pace
 from fem_reference.subspace import superposition
 from study.models.finite_elements import reference_of
@@ -38,7 +39,7 @@ def sampled(problem, samples):
 def counted(monkeypatch):
     """Solutions by factors in TR-BDF2 and HHT, and steps of a subspace, as they are taken."""
     counts = {"solved": 0, "advanced": 0}
-    shifted, advance = dynamics.Oscillator.shifted, subspace.SubspaceMotion.advance
+    shifted, moved = dynamics.Oscillator.shifted, module.superposition
 
     def counting(self, *shares):
         solve = shifted(self, *shares)
@@ -49,12 +50,12 @@ def counted(monkeypatch):
 
         return solve_and_count
 
-    def advance_and_count(self, *loads):
-        counts["advanced"] += 1
-        advance(self, *loads)
+    def move_and_count(subspace, damping, factor, times, *inside):
+        counts["advanced"] += len(times) - 1
+        return moved(subspace, damping, factor, times, *inside)
 
     monkeypatch.setattr(dynamics.Oscillator, "shifted", counting)
-    monkeypatch.setattr(subspace.SubspaceMotion, "advance", advance_and_count)
+    monkeypatch.setattr(module, "superposition", move_and_count)
     return counts
 
 

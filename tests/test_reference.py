@@ -11,13 +11,14 @@ import pytest
 from scipy.sparse import csr_array
 
 from fem_reference import iterative as module
-from fem_reference import memory
+from fem_reference import memory, multigrid
 from fem_reference import model as fem
 from fem_reference import superposition as superposition_module
 from fem_reference.direct import factorised
 from fem_reference.elasticity import discretise
 from fem_reference.elements import chosen_element
-from fem_reference.iterative import iterative, rigid_motions
+from fem_reference.iterative import iterative
+from fem_reference.multigrid import rigid_motions
 from fem_reference.observation import (
     at_points,
     evaluation,
@@ -127,7 +128,7 @@ def test_multigrid_gives_the_same_bits_each_time_and_leaves_the_generator_alone(
     first, again = (iterative(body, 1e-3)(body.load) for _ in range(2))
     assert first.tobytes() == again.tobytes()
     np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # noqa: NPY002
-    monkeypatch.setattr(module, "_drawing_alike", nullcontext)  # negative control
+    monkeypatch.setattr(multigrid, "_drawing_alike", nullcontext)  # negative control
     assert iterative(body, 1e-3)(body.load).tobytes() != first.tobytes()
 
 

@@ -45,6 +45,15 @@ def _quick(monkeypatch):
     monkeypatch.setattr(renders, "WINDOWS", ())
 
 
+def test_plots_are_the_same_bytes_in_one_process_or_two(monkeypatch):
+    results = results_of()
+    monkeypatch.setattr(report, "available", lambda: 2)
+    two = report._plots(results)
+    monkeypatch.setattr(report, "available", lambda: 1)
+    assert report._plots(results) == two
+    assert {"motion", "sets", "rules"} <= two.keys()
+
+
 def kept(folder: Path) -> bytes:
     """The report of whole results in a folder."""
     folder.mkdir()

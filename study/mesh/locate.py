@@ -9,7 +9,10 @@ from study.mesh.kinds import TetrahedralMesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-CANDIDATES = 32
+FEW, CANDIDATES = 6, 32
+"""Tetrahedra that are looked at for each point, and for one that is inside none of the first."""
+INSIDE = 1e-9
+"""Smallest coordinate of a point that is in no other tetrahedron."""
 
 
 def locate(mesh: TetrahedralMesh, points: Floats) -> tuple[Ints, Floats]:
@@ -21,11 +24,19 @@ def locate(mesh: TetrahedralMesh, points: Floats) -> tuple[Ints, Floats]:
     from scipy.spatial import KDTree
 
     corner = mesh.points[mesh.tetrahedra]
-    count = min(CANDIDATES, len(corner))
-    near = KDTree(corner.mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
     inverse = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
-    local = np.einsum("qcij,qcj->qci", inverse[near], points[:, None] - corner[near, 0])
-    barycentric = np.concatenate([1.0 - local.sum(axis=2, keepdims=True), local], axis=2)
-    best = barycentric.min(axis=2).argmax(axis=1)
-    row = np.arange(len(points))
-    return near[row, best], barycentric[row, best]
+    tree = KDTree(corner.mean(axis=1))
+
+    def best(points: Floats, count: int) -> tuple[Ints, Floats]:
+        count = min(count, len(corner))
+        near = tree.query(points, k=count)[1].reshape(len(points), count)
+        local = np.einsum("qcij,qcj->qci", inverse[near], points[:, None] - corner[near, 0])
+        barycentric = np.concatenate([1.0 - local.sum(axis=2, keepdims=True), local], axis=2)
+        chosen = barycentric.min(axis=2).argmax(axis=1)
+        row = np.arange(len(points))
+        return near[row, chosen], barycentric[row, chosen]
+
+    cells, barycentric = best(points, FEW)
+    open_ = np.flatnonzero(barycentric.min(axis=1) <= INSIDE)
+    cells[open_], barycentric[open_] = best(points[open_], CANDIDATES)
+    return cells, barycentric

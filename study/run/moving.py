@@ -25,6 +25,7 @@ from study.run.ready import set_up
 from study.run.stages import Stage, Stages
 from study.run.watched import thinned
 from study.scene import Scene
+from study.similarity.batch import compile_measures
 from study.stages.fingerprint import key
 
 Work = Callable[[Progress], Any]
@@ -135,6 +136,8 @@ class Moving:
             for name in needs:
                 self._prepare(name)
             self.stages.start(stage)
+        if missing:
+            self.stages.beside("compiled measures", compile_measures)
         return posed
 
     def motions(self, posed: Posed) -> Motions:

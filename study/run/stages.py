@@ -98,9 +98,14 @@ class Stages:
         store = self.means.store
         self.lanes.start(Job(stage.name, lambda progress: _computed(stage, store, progress)))
 
+    def beside(self, name: str, work: Callable[[], None]) -> None:
+        """Let something be done on a lane that is free, by which what follows takes less time."""
+        self.lanes.start(Job(name, lambda _: work()))
+
     def results(self) -> dict[str, Any]:
         """Values of all stages by name, once those that were started have ended."""
-        self.found |= self.lanes.results()
+        given = self.lanes.results()
+        self.found |= {name: one for name, one in given.items() if isinstance(one, _Found)}
         return {name: found.value for name, found in self.found.items()}
 
     def records(self) -> tuple[StageRecord, ...]:
