@@ -41,7 +41,6 @@ Factors = Callable[[Floats], Floats]
 Advance = Callable[[float], None]
 
 GAMMA = 1.0 - np.sqrt(0.5)
-ORDER = 2
 HALVINGS = 6
 """How often a step, or an increment of a way, may be halved."""
 MARGIN = 0.5

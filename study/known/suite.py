@@ -77,6 +77,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         fixed_step,
         fuzzy_readings,
         inclusions,
+        large_contact,
         large_strain,
         lattice_shapes,
         long_steps,
@@ -99,6 +100,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         large_strain,
         inclusions,
         moved_tools,
+        large_contact,
         fuzzy_readings,
         curves,
     ):

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from fem_reference import model as fem
 from fem_reference.contact import large_motion
 from fem_reference.contact.finite import FiniteContact
-from fem_reference.contact.large_motion import ORDER, LargeSolution, Pressed, Steps
+from fem_reference.contact.large_motion import LargeSolution, Pressed, Steps
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.elasticity import Body, without_fixed
 from fem_reference.memory import refuse_too_large
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
-from study.models.errors import place, step_checks, time_step_errors
+from study.models.errors import place, step_checks, time_step_errors, tool_force_errors
 from study.models.finite_elements import ABLE, FRAME_RATE, FiniteElements, PreparedElements
-from study.models.in_contact import contact_record, force_step_errors
+from study.models.in_contact import contact_record
 from study.models.keeping import recorded
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
@@ -29,6 +29,7 @@ from study.organ.geometry import Level
 from study.organ.grading import resolved
 from study.problem.problem import Problem
 from study.problem.rigid import PLATE
+from study.problem.trajectory import Observation, Trajectory
 from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import CurveErrors, ElementsRecord, MeshLevel, ModelRecord
@@ -37,8 +38,10 @@ from study.scene import Reference, Scene
 Floats = NDArray[np.float64]
 
 ELEMENT, LAW, METHOD = "taylor-hood", "neo-hookean", "sdirk2"
-COARSER = (-1, 0)
+COARSER = (-2, 0)
 """Meshes below and of the model's own level, whose difference shows the error of the finer."""
+FEWEST = 5
+"""Samples of a motion of which every other one shows the error by steps."""
 BELOW = 3
 """Levels of the organ's mesh by which one is coarser that is refined under the tools."""
 UNDER, GROWING = 0.7, 0.7
@@ -168,31 +171,59 @@ class PreparedHyperelastic:
         return Stepper(take_step, displacement, step, len(pressed.body.free))
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion on two meshes, on the coarser also by half as long steps."""
+        """The motion on two meshes, on the coarser also by steps twice as long."""
         name, progress = self.model.name, watch.progress
         solved: list[MeshSolution] = []
         for below in COARSER:
             level = self.level(below)
             body = self.body(level)
             pressed = self.pressed(body)
-            found = self._moved(body, pressed, 1, progress)
+            found = self._moved(body, pressed, self.problem.observation, progress)
             if not solved:
-                half = self._moved(body, pressed, 2, progress)
-                whole = found.trajectory
-                errors = time_step_errors(ORDER, self.problem.probes, whole, half.trajectory)
-                force_steps = force_step_errors(whole, half.trajectory)
+                errors, force_steps = self._by_steps(body, pressed, found.trajectory, progress)
             solved = [*(one.outlined for one in solved), self._solution(level, body, found)]
         self.best = solved[-1]
         record = self._record(solved, found, errors, force_steps)
-        checks = tuple(step_checks(name, errors)) if found.trajectory.status == "finished" else ()
+        checks = tuple(step_checks(name, errors)) if errors else ()
         notes = (self._keep_fields(body, pressed, found, watch), self._of_overlooked(found))
         return ModelRun(found.trajectory, record, checks, tuple(filter(None, notes)))
 
-    def _moved(self, body: Body, pressed: Pressed, times: int, progress: Progress) -> LargeSolution:
+    def _moved(
+        self, body: Body, pressed: Pressed, seen: Observation, progress: Progress
+    ) -> LargeSolution:
         text = f"{self.model.name}: {len(body.mesh.tetrahedra)} tetrahedra"
-        with progress.stage(text + (", halved steps" if times > 1 else "")) as advance:
-            every = times * self._per_sample
-            return large_motion.run(body, pressed, self.problem.observation, every, advance)
+        doubled = seen is not self.problem.observation
+        with progress.stage(text + (", doubled steps" if doubled else "")) as advance:
+            return large_motion.run(body, pressed, seen, self._per_sample, advance)
+
+    def _by_steps(
+        self, body: Body, pressed: Pressed, found: Trajectory, progress: Progress
+    ) -> tuple[dict[str, CurveErrors], Floats]:
+        """Errors of curves and of the tools' forces (tools,) by the steps; none if it diverged.
+
+        By how much steps twice as long change them, as if that were of first order: where contact
+        begins and ends, the order of the steps is not seen.
+        """
+        seen, problem = self.problem.observation, self.problem
+        if found.status != "finished" or len(seen.times) < FEWEST:
+            return {}, np.zeros(0)
+        thinned = replace(seen, times=seen.times[::2], frames=(0,))
+        other = self._moved(body, pressed, thinned, progress).trajectory
+        if other.status != "finished":
+            return {}, np.zeros(0)
+        own = replace(
+            found,
+            displacement=found.displacement[::2],
+            velocity=found.velocity[::2],
+            tool_force=found.tool_force[::2],
+        )
+        names = tuple(one.name for one in problem.rigid_tools)
+        errors = {
+            probe: CurveErrors(displacement=0.5 * one.displacement, velocity=0.5 * one.velocity)
+            for probe, one in time_step_errors(1, problem.probes, other, own).items()
+        }
+        of_forces = tool_force_errors(1, names, other, own)
+        return errors, np.array([0.5 * of_forces[name] for name in names])
 
     def _solution(self, level: Level, body: Body, found: LargeSolution) -> MeshSolution:
         sizes = body.node_count, len(body.mesh.tetrahedra), body.element
