@@ -10,7 +10,7 @@ element `taylor-hood` of the linear reference.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -243,6 +243,20 @@ def on_nodes(
     corners = size + corners.reshape(-1, 4)
     held = csc_array((size, size)) if support is None else support
     return MixedSolid(nodes, lame, shear, slopes, nodes.dx, unknowns, corners, shares, held)
+
+
+def relieved(body: MixedSolid, moved: Floats) -> MixedSolid:
+    """The body whose shape without stress is that of a body moved by the displacements of `moved`.
+
+    `moved` in the order of w. Displacements count from the new shape; the nodes stay those of the
+    shape before.
+    """
+    change = kinematics(body.deformation(moved))
+    return replace(
+        body,
+        slopes=np.ascontiguousarray(change.inverse_transpose @ body.slopes),
+        weights=body.weights * change.volume,
+    )
 
 
 def kinematics(F: Floats) -> Kinematics:

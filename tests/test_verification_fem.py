@@ -9,6 +9,7 @@ from scipy.sparse import block_array, csc_array
 from scipy.special import jv
 
 from fem_reference import dynamics, elasticity, memory
+from fem_reference.contact.finite import FiniteContact
 from fem_reference.dynamics import Oscillator, march
 from fem_reference.elasticity import discretise
 from fem_reference.grid import straight
@@ -26,6 +27,7 @@ from study.known.verification import (
     damped_motion,
     half_space,
     iterations,
+    large_contact,
     manufactured,
     patch_test,
     rigid_motion,
@@ -184,6 +186,12 @@ def early_end_of_iterations(monkeypatch):
     monkeypatch.setattr(iterations, "TOLERANCE", 1e-4)
 
 
+def shared_out_wrongly(monkeypatch):
+    """A force under a tool of which the nodes feel a little less."""
+    exact = FiniteContact.derivative
+    monkeypatch.setattr(FiniteContact, "derivative", lambda *given: 0.999 * exact(*given))
+
+
 @pytest.fixture
 def coarser(monkeypatch):
     """The two dearest problems on the coarsest meshes that hold their limits."""
@@ -223,6 +231,7 @@ def test_nothing_is_seen_on_coarser_meshes_where_nothing_is_planted(problem):
         (other_stage, damped_motion.stepped),
         (forgotten_stiffness_damping, damped_motion.stepped),
         (early_end_of_iterations, iterations.findings),
+        (shared_out_wrongly, large_contact.findings),
     ],
 )
 def test_a_planted_error_is_seen(plant, problem, monkeypatch):

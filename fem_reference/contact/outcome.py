@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ContactOutcome:
-    """Of a body that was reduced to a subspace and `vertices` under tools.
+    """Of a body and `vertices` under tools; reduced to a subspace of `vectors`, or None of all.
 
     `truncation`: of the curves by the last quarter of the `vectors`, and `force_truncation` of the
     tools' forces (tools,) alike; `penetration` [m]: how deep any point was inside a tool at a
@@ -23,8 +23,8 @@ class ContactOutcome:
     """
 
     vertices: int
-    vectors: int
-    truncation: CurveChange
+    vectors: int | None
+    truncation: CurveChange | None
     force_truncation: Floats
     penetration: float
     at_rest: Floats

@@ -55,6 +55,7 @@ PROBLEMS = (
     _problem("ball in a body", "Eshelby 1957", "ball_inclusion:findings", quick=False),
     _problem("iterative solvers", "factors of the same matrix", "iterations:findings"),
     _problem("moved faces", "neo-Hooke's law; Gent and Lindley 1959", "finite_strain:findings"),
+    _problem("tools at large strain", "neo-Hooke's law; Hertz 1882", "large_contact:findings"),
 )
 """Problems with exact solutions that `verify` solves by the finite-element reference."""
 
@@ -76,6 +77,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         fixed_step,
         fuzzy_readings,
         inclusions,
+        large_contact,
         large_strain,
         lattice_shapes,
         long_steps,
@@ -98,6 +100,7 @@ def _stability(scene: Scene) -> Iterator[Case]:
         large_strain,
         inclusions,
         moved_tools,
+        large_contact,
         fuzzy_readings,
         curves,
     ):

@@ -110,7 +110,7 @@ def contact_record(
             peak_n=float(np.nanmax(np.linalg.norm(histories[-1], axis=1))),
             by_mesh=estimate(histories, sizes, order).error if comparable and touched else None,
             by_steps=float(steps[i]) if len(steps) else None,
-            by_subspace=float(outcome.force_truncation[i]),
+            by_subspace=None if outcome.vectors is None else float(outcome.force_truncation[i]),
         )
     return ContactRecord(
         vertices=outcome.vertices, penetration_m=outcome.penetration, forces=forces

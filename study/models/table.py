@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 MODELS = {
     "fem": "study.models.finite_elements:KIND",
+    "hyperelastic": "study.models.hyperelastic:KIND",
     "basafa": "study.models.basafa:KIND",
     "msm": "study.models.fuzzy_tuned:KIND",
     "reading": "study.models.reading:KIND",

@@ -134,7 +134,8 @@ class ElementsRecord:
 
     `subspace_vectors` and `truncation`, of which `truncation_error` is the larger, are those of a
     superposition, and so is `certified`, None where no bound was asked for or found;
-    `accuracy_missed`: the accuracy that was asked for and not reached.
+    `accuracy_missed`: the accuracy that was asked for and not reached. `law`: the hyperelastic law
+    of a motion at large strain, None of a linear one.
     """
 
     element: str
@@ -151,6 +152,7 @@ class ElementsRecord:
     accuracy_missed: float | None = None
     large_strain: LargeStrain | None = None
     contact: ContactRecord | None = None
+    law: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

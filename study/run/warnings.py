@@ -89,6 +89,8 @@ def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
 
 
 def _of_linear(scene: Scene, record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+    if elements.law is not None:
+        return
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
     if strain is not None and strain > STRAIN_LIMIT:
         yield (

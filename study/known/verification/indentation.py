@@ -59,13 +59,14 @@ def findings() -> Iterator[Finding]:
     """Forces of tools that are pressed into a half space."""
     for what, shape, bonded, element, nu in CASES:
         tissue = Tissue(poisson_ratio=nu)
-        tool, exact = _tool(shape, bonded=bonded), _exact(shape, tissue, bonded=bonded)
+        tool, exact = tool_of(shape, bonded=bonded), exact_force(shape, tissue, bonded=bonded)
         found = 4.0 * force(tool, tissue, element, FINEST[shape] * TOUCHED)
         label = f"force [N], {what}, {element}, nu {nu:g}"
         yield number_of(label, exact, found, LIMIT)
 
 
-def _tool(shape: int, *, bonded: bool) -> RigidTool:
+def tool_of(shape: int, *, bonded: bool) -> RigidTool:
+    """The tool that touches the area of TOUCHED when it is DEPTH deep, after a second."""
     radius = TOUCHED if shape == PUNCH else TOUCHED**2 / DEPTH
 
     def travel(times: Floats) -> Floats:
@@ -74,7 +75,8 @@ def _tool(shape: int, *, bonded: bool) -> RigidTool:
     return RigidTool("tool", shape, radius, np.zeros(3), DOWN, travel, bonded)
 
 
-def _exact(shape: int, tissue: Tissue, *, bonded: bool) -> float:
+def exact_force(shape: int, tissue: Tissue, *, bonded: bool) -> float:
+    """Force [N] on it in closed form."""
     nu, mu = tissue.poisson_ratio, shear_modulus(tissue)
     stiffness = tissue.youngs_modulus / (1.0 - nu**2)
     if shape == SPHERE:
@@ -86,11 +88,11 @@ def _exact(shape: int, tissue: Tissue, *, bonded: bool) -> float:
 
 def force(tool: RigidTool, tissue: Tissue, element: str, finest: float) -> float:
     """Force [N] that presses a quarter of a tool in, elements being `finest` [m] near it."""
-    body = _held(_quarter(tissue, element, finest, tool.shape == PUNCH))
+    body = held(quarter(tissue, element, finest, flat=tool.shape == PUNCH))
     ways = np.array([0.0, 1.0])
     touch = Touch.of([patch(body, tool, ways, 0.0)])
     solve = by_factors(body)
-    far = body.support @ _far(body, tissue)
+    far = body.support @ far_field(body, tissue)
     pushes = touch.pushes.toarray()
     downwards = -pushes[2::3].sum(axis=0)
     loads = (pushes + np.outer(far, downwards)).T
@@ -100,7 +102,7 @@ def force(tool: RigidTool, tissue: Tissue, element: str, finest: float) -> float
     return float(touch.on_tools(grip.force)[0] @ -DOWN)
 
 
-def _quarter(tissue: Tissue, element: str, finest: float, flat: bool) -> Body:
+def quarter(tissue: Tissue, element: str, finest: float, *, flat: bool) -> Body:
     """A quarter of the half space round the tool, on nothing that counts.
 
     Its elements are finest under a sphere, or at the edge of a flat punch, and grow with the
@@ -130,11 +132,11 @@ def _sizes(mesh: TetrahedralMesh, flat: bool) -> tuple[Floats, Floats]:
     return np.linalg.norm(edges, axis=2).max(axis=1), least
 
 
-def _held(body: Body) -> Body:
+def held(body: Body) -> Body:
     """With stiff springs instead of its support: across planes of symmetry, and at far faces."""
     x, stiffness = body.points, body.stiffness
     symmetric = (x < 1e-9) & [True, True, False]
-    far = _is_far(x)
+    far = is_far(x)
     own = stiffness.matrix - body.support
     springs = np.where(symmetric | far[:, None], STIFF * np.abs(own.diagonal()).max(), 0.0)
     support = diags_array(np.where(far[:, None], springs, 0.0).ravel())
@@ -142,15 +144,16 @@ def _held(body: Body) -> Body:
     return replace(body, stiffness=Stiffness(matrix, stiffness.pressure), support=support.tocsc())
 
 
-def _is_far(points: Floats) -> NDArray[np.bool_]:
+def is_far(points: Floats) -> NDArray[np.bool_]:
+    """Whether points [m] (n, 3) are on a face that no plane of symmetry or tool is at."""
     return np.asarray(np.any(np.abs(points) > SIZE - 1e-9, axis=1))
 
 
-def _far(body: Body, tissue: Tissue) -> Floats:
+def far_field(body: Body, tissue: Tissue) -> Floats:
     """Displacement [m] (n,) of the far faces for a newton that pushes down on the quarter."""
     x = body.points
     moved = np.zeros_like(x)
-    far = _is_far(x)
+    far = is_far(x)
     moved[far] = 4.0 * point_force(x[far], tissue)
     moved[(x < 1e-9) & [True, True, False]] = 0.0
     return moved.ravel()

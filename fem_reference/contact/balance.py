@@ -1,0 +1,223 @@
+"""Balance of forces of a body at large strain that rigid tools touch.
+
+    inertia M u + f(u, p) = load + G^T force,   0 <= gaps(u) _|_ force >= 0,   G = d gaps / du
+
+with the volumes of `fem_reference.mixed_strain`. Newton's method keeps the factors of one tangent
+for as long as it converges with them, and takes those of the state where it does not. In each
+iteration the forces under the tools follow from their compliance by a primal-dual active set
+(`fem_reference.contact.law`), so that neither penalty nor softening takes part: what is left of
+a gap that should be closed, and of the balance, is below a tolerance when a state is handed out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, csc_array, csr_array
+
+from fem_reference.contact.finite import FiniteContact
+from fem_reference.contact.law import Areas, forces
+from fem_reference.direct import symmetric_factors
+from fem_reference.mixed_strain import MixedSolid
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+TOLERANCE = 1e-5
+"""Of the unbalanced forces relative to those of tools and loads."""
+LEAST = 1e-3
+"""Of the shear modulus times the body's size squared, a force below which none counts."""
+CLOSED = 1e-7
+"""Of the body's size, how far a vertex may be off the tool that pushes it."""
+SLOW = 0.5
+"""Share of the residual left by an iteration for which it is worth while to factor anew."""
+SAME = 1e-6
+"""Of steps whose length differs by rounding."""
+MOST_ITERATIONS = 40
+SHORTEST_STEP = 1 / 64
+SLACK = 1e-3
+"""Of the body's size, how near a vertex is whose answer is found before it touches."""
+
+
+class UnbalancedError(ValueError):
+    """A state that is not found."""
+
+
+class Balanced(NamedTuple):
+    """Displacements and pressures w, and the forces [N] (c,) under the tools."""
+
+    w: Floats
+    force: Floats
+
+
+class Demand(NamedTuple):
+    """What is to balance at a time [s]: `inertia` [1/s^2] times the mass, and a `load` [N] (n,)."""
+
+    time: float
+    inertia: float
+    load: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class TouchedBody:
+    """A body that tools may touch.
+
+    `mass` [kg] (n, n); `free` (n + pressures,): unknowns that are not fixed; `origin` [m] (n,):
+    displacement of the given shape, to which the contact counts, from the one without stress.
+    """
+
+    solid: MixedSolid
+    contact: FiniteContact
+    mass: csc_array
+    free: Bools
+    origin: Floats
+
+    def given(self, w: Floats) -> Floats:
+        """Displacement [m] (n,) from the given shape."""
+        return np.asarray(w[: self.solid.size] - self.origin)
+
+    def off(self, state: Balanced, demand: Demand, pushed: csr_array) -> Floats:
+        """What does not balance, of forces [N] and of volumes [m^3], the derivative `pushed` G."""
+        n = self.solid.size
+        left = -self.solid.gradient(state.w)
+        left[:n] += demand.load + pushed.T @ state.force
+        left[:n] -= demand.inertia * (self.mass @ state.w[:n])
+        left[~self.free] = 0.0
+        return left
+
+    def tangent(self, state: Balanced, demand: Demand) -> csc_array:
+        """Derivative of what the body itself and the shape of the tools do, in the order of w."""
+        bend = self.contact.curvature(self.given(state.w), demand.time, state.force)
+        own = csc_array(demand.inertia * self.mass - bend)
+        pressures = csc_array((self.solid.pressures, self.solid.pressures))
+        whole = self.solid.tangent(state.w) + block_diag([own, pressures], format="csc")
+        return csc_array(whole) if self.free.all() else csc_array(whole[self.free][:, self.free])
+
+
+class Answers:
+    """Factors of a tangent, and what the body does under unit forces at vertices, when asked."""
+
+    def __init__(self, matrix: csc_array, free: Bools, pushed: csr_array, inertia: float) -> None:
+        self.free, self.pushed, self.inertia = free, pushed, inertia
+        self.factors: Any = symmetric_factors(matrix)
+        if self.factors is None:
+            raise UnbalancedError("the tangent is singular: nothing holds the body")
+        self._columns: dict[int, Floats] = {}
+
+    def solve(self, right: Floats) -> Floats:
+        """Answer to forces and volumes, in the order of w."""
+        found = np.zeros_like(right)
+        found[self.free] = self.factors.solve(right[self.free])
+        return found
+
+    def to(self, chosen: Ints) -> Floats:
+        """Answers (n + pressures, k) to unit forces of the constraints that are chosen."""
+        new = np.array([j for j in chosen if j not in self._columns], dtype=np.int64)
+        if len(new):
+            right = np.zeros((len(self.free), len(new)))
+            right[: self.pushed.shape[1]] = self.pushed[new].toarray().T
+            self._columns |= dict(zip(new.tolist(), self.solve(right).T, strict=True))
+        found = np.empty((len(self.free), len(chosen)))
+        for k, j in enumerate(chosen.tolist()):
+            found[:, k] = self._columns[j]
+        return found
+
+
+class Balance:
+    """Finds states of a body one after another, with factors that serve for as long as they can.
+
+    `iterations` and `factored` count what was done so far.
+    """
+
+    def __init__(self, body: TouchedBody) -> None:
+        self.body = body
+        self.iterations = self.factored = 0
+        self._answers: Answers | None = None
+        solid = body.solid
+        self._volume = np.where(
+            np.arange(len(body.free)) < solid.size, 1.0, solid.typical_shear / solid.length
+        )
+        self._least = LEAST * solid.typical_shear * solid.length**2
+
+    def found(self, guess: Balanced, demand: Demand, scale: float = 0.0) -> Balanced:
+        """The state that balances, sought from a guess; `scale` [N] of forces at work.
+
+        UnbalancedError where none is found.
+        """
+        state, before = guess, np.inf
+        for _ in range(MOST_ITERATIONS):
+            u = self.body.given(state.w)
+            gaps = self.body.contact.gaps(u, demand.time)
+            pushed = self.body.contact.derivative(u, demand.time)
+            off = self.body.off(state, demand, pushed)
+            size = self._size(off, state, pushed, gaps, scale)
+            if not np.isfinite(size):
+                break
+            if size <= 1.0:
+                return state
+            if self._worn(demand, size, before):
+                self._answers = self._factor(state, demand, pushed)
+            before = size
+            state = self._next(state, off, gaps, pushed)
+            self.iterations += 1
+        self._answers = None
+        raise UnbalancedError("no balance of forces")
+
+    def _worn(self, demand: Demand, size: float, before: float) -> bool:
+        """Whether the factors are of another system, or serve no longer."""
+        known = self._answers
+        if known is None or not math.isclose(known.inertia, demand.inertia, rel_tol=SAME):
+            return True
+        return size > SLOW * before
+
+    def _factor(self, state: Balanced, demand: Demand, pushed: csr_array) -> Answers:
+        self.factored += 1
+        matrix = self.body.tangent(state, demand)
+        return Answers(matrix, self.body.free, pushed, demand.inertia)
+
+    def _size(
+        self, off: Floats, state: Balanced, pushed: csr_array, gaps: Floats, scale: float
+    ) -> float:
+        """Of what is off, over what may be."""
+        at_work = max(scale, float(np.linalg.norm(pushed.T @ state.force)), self._least)
+        unbalanced = float(np.linalg.norm(self._volume * off)) / (TOLERANCE * at_work)
+        held = self.body.contact.held | (state.force > 0.0)
+        wrong = np.where(held, np.abs(gaps), np.maximum(-gaps, 0.0)).max(initial=0.0)
+        return max(unbalanced, float(wrong) / (CLOSED * self.body.solid.length))
+
+    def _next(self, state: Balanced, off: Floats, gaps: Floats, pushed: csr_array) -> Balanced:
+        """One iteration on."""
+        answers, n, held = self._answers, self.body.solid.size, self.body.contact.held
+        assert answers is not None  # noqa: S101 - made before
+        step = answers.solve(off)
+        gaps = gaps + pushed @ step[:n]
+        near = gaps < SLACK * self.body.solid.length
+        chosen = np.flatnonzero(held | (state.force > 0.0) | near)
+        columns = answers.to(chosen)
+        compliance = answers.pushed[chosen] @ columns[:n]
+        compliance = 0.5 * (compliance + compliance.T)
+        old = state.force[chosen]
+        areas = Areas(compliance, gaps[chosen] - compliance @ old, held[chosen])
+        try:
+            change = forces(areas, old) - old
+        except (np.linalg.LinAlgError, RuntimeError) as error:
+            raise UnbalancedError("the body gives way under the tools") from error
+        step = step + columns @ change
+        length = self._length(state.w, step)
+        force = state.force.copy()
+        force[chosen] += length * change
+        return Balanced(state.w + length * step, force)
+
+    def _length(self, w: Floats, step: Floats) -> float:
+        """Largest of 1, 1/2, 1/4, ... of a step that turns no element inside out."""
+        length = 1.0
+        while self.body.solid.volume_ratio(w + length * step).min() <= 0.0:
+            length *= 0.5
+            if length < SHORTEST_STEP:
+                raise UnbalancedError("elements would turn inside out")
+        return length

@@ -1,0 +1,397 @@
+"""Motion and rest of a neo-Hookean body under rigid tools that are moved, at large strain.
+
+The motion is stepped by the stiffly accurate diagonally implicit Runge-Kutta method of two stages
+and second order: Alexander (1977), SIAM J. Numer. Anal. 14:1006. Each stage ends with forces that
+keep the vertices out of the tools, and damps what the step cannot follow, so that what an impact
+sets ringing does not last. A step for which no balance is found is halved; where the shortest fails
+too, the motion ends and says when.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.contact.balance import (
+    Balance,
+    Balanced,
+    Demand,
+    TouchedBody,
+    UnbalancedError,
+)
+from fem_reference.contact.finite import FiniteContact
+from fem_reference.contact.patch import patch
+from fem_reference.elasticity import Body
+from fem_reference.hyperelasticity import largest_log_strain
+from fem_reference.mixed_strain import on_nodes, relieved
+from fem_reference.observation import at_points
+from fem_reference.recording import Recorder
+from study.problem.damping import RayleighDamping
+from study.problem.rigid import PLATE, RigidTool
+from study.problem.tissue import Tissue
+from study.problem.trajectory import Observation, Trajectory
+
+Floats = NDArray[np.float64]
+Factors = Callable[[Floats], Floats]
+Advance = Callable[[float], None]
+
+GAMMA = 1.0 - np.sqrt(0.5)
+HALVINGS = 6
+"""How often a step, or an increment of a way, may be halved."""
+MARGIN = 0.5
+"""Round what a tool would meet of the surface at rest, over its radius, of a plate its travel."""
+LOOKS, MOST_LOOKS = 32, 1000
+"""Places of a tool on its way at which the surface is looked at."""
+FARTHEST = 0.5
+"""Share of its radius that a tool may move in a step: it must not pass through a surface unseen."""
+RELIEVED, MOST_RELIEVING = 1e-6, 40
+"""Change of the unloaded shape, relative to what the load does, at which it is found."""
+
+
+def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Floats) -> TouchedBody:
+    """A body without stress, where tools may touch it on their way at times [s].
+
+    ValueError for a tool that meets nothing or cannot be followed, or a Poisson ratio at which no
+    pressure carries the volume.
+    """
+    solid = on_nodes(body.nodes, tissue, body.support, body.composition)
+    patches = [patch(body, one, _looked(one, times), _margin(one, times)) for one in tools]
+    FiniteContact.refuse(tools)
+    free = np.ones(solid.size + solid.pressures, dtype=np.bool_)
+    if body.fixed is not None:
+        free[: solid.size] = ~body.fixed
+    contact = FiniteContact(tuple(patches), solid.size)
+    return TouchedBody(solid, contact, body.mass, free, np.zeros(solid.size))
+
+
+def _looked(tool: RigidTool, times: Floats) -> Floats:
+    """Times [s] between which a tool moves by no more than a share of its radius."""
+    way = np.linalg.norm(np.diff(tool.travel(times), axis=0), axis=1).sum()
+    count = LOOKS if tool.shape == PLATE else max(LOOKS, int(way / (FARTHEST * tool.radius)))
+    return np.linspace(times[0], times[-1], min(count, MOST_LOOKS) + 1)
+
+
+def _margin(tool: RigidTool, times: Floats) -> float:
+    if tool.shape != PLATE:
+        return MARGIN * tool.radius
+    return MARGIN * float(np.linalg.norm(tool.travel(times), axis=1).max())
+
+
+class Moving(NamedTuple):
+    """State at a time [s]: w, velocity v [m/s] (n,) and forces [N] (c,) under the tools."""
+
+    time: float
+    w: Floats
+    v: Floats
+    force: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A body under tools, with all else that acts on it: `load` [N] (n,) at a time [s].
+
+    `dead` [N] (n,) is the part of it that acts at all times; `drag` [1/s]: damping over mass.
+    """
+
+    body: TouchedBody
+    load: Callable[[float], Floats]
+    dead: Floats
+    drag: float
+
+    @property
+    def nothing(self) -> Balanced:
+        """Without stress."""
+        return Balanced(np.zeros(len(self.body.free)), np.zeros(len(self.body.contact.held)))
+
+    def energy(self, state: Moving) -> float:
+        """Kinetic and stored [J]."""
+        kinetic = 0.5 * float(state.v @ (self.body.mass @ state.v))
+        return kinetic + self.body.solid.energy(state.w)
+
+    def on_tools(self, state: Moving) -> Floats:
+        """Forces [N] (tools, 3)."""
+        u = self.body.given(state.w)
+        return self.body.contact.on_tools(u, state.time, state.force)
+
+
+def pressed(
+    body: Body,
+    tissue: Tissue,
+    tools: Sequence[RigidTool],
+    damping: RayleighDamping,
+    factors: Factors,
+    times: Floats,
+    borne: Floats | None = None,
+) -> Pressed:
+    """A body under tools and loads; `borne` [N] (n,): forces at rest under which it is as given.
+
+    ValueError as of `touched`, for damping by stiffness, and where no unloaded shape is found.
+    """
+    refuse(damping, tissue)
+    free = touched(body, tissue, tools, times)
+    dead = np.zeros(free.solid.size) if body.dead is None else body.dead
+    if borne is not None:
+        free, dead = unloaded(free, borne), dead + borne
+    loads = body.loads
+
+    def load(time: float) -> Floats:
+        return np.asarray(dead + loads @ np.atleast_1d(factors(np.array([time]))[0]))
+
+    return Pressed(free, load, dead, damping.mass)
+
+
+def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
+    """ValueError for damping or tissue that a motion at large strain cannot have."""
+    if damping.stiffness > 0.0:
+        raise ValueError(
+            "damping.stiffness: at large strain damping goes by mass only; set it to 0, or leave "
+            "hyperelastic out of models"
+        )
+    if not tissue.poisson_ratio > 0.0:
+        raise ValueError(
+            "tissue.poisson_ratio: 0 leaves elements with a pressure of their own undefined; "
+            "enlarge it, or leave hyperelastic out of models"
+        )
+
+
+def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
+    """The body without stress that a load [N] (n,) deforms into the given shape.
+
+    By fixed-point iteration on the shape without stress: Sellier (2011), Comput. Methods Appl.
+    Mech. Eng. 200:3245. ValueError where it does not end.
+    """
+    given, at, last = body.solid, Demand(0.0, 0.0, load), np.inf
+    bare = replace(body, contact=FiniteContact((), given.size))
+    moved, state = np.zeros(given.size + given.pressures), None
+    for _ in range(MOST_RELIEVING):
+        solid = relieved(given, moved)
+        there = replace(bare, solid=solid, origin=-moved[: given.size])
+        guess = Balanced(np.zeros_like(moved) if state is None else state.w, np.zeros(0))
+        try:
+            state = Balance(there).found(guess, at, float(np.linalg.norm(load)))
+        except UnbalancedError:
+            break
+        off = there.given(state.w)
+        size = float(np.linalg.norm(off) / np.linalg.norm(state.w[: given.size]))
+        if size <= RELIEVED:
+            return replace(there, contact=body.contact)
+        if size > last:
+            break
+        last = size
+        moved[: given.size] -= off
+    raise ValueError(
+        "gravity.given: no shape without load is found from which the organ would sag into the "
+        'given one; reduce gravity.acceleration, or set it to "unloaded"'
+    )
+
+
+class Steps:
+    """Implicit steps of a body under tools."""
+
+    def __init__(self, pressed: Pressed) -> None:
+        self.pressed, self.balance = pressed, Balance(pressed.body)
+
+    def at_rest(self, start: Moving, time: float, load: Floats) -> Moving:
+        """The rest at a time [s] under a load [N] (n,), which grows from that of a rest before.
+
+        The tools are brought there on their way. UnbalancedError where the way ends before.
+        """
+        begun = self.pressed.body.solid.gradient(start.w)[: len(load)]
+        begun -= self._pushes(start)
+
+        def demand(share: float) -> Demand:
+            at = start.time + share * (time - start.time)
+            return Demand(at, 0.0, begun + share * (load - begun))
+
+        share, goal, now = 0.0, 1.0, start
+        scale = float(np.linalg.norm(load))
+        while share < 1.0:
+            try:
+                self._refuse_far(now.time, demand(goal).time)
+                found = self._kept_out(Balanced(now.w, now.force), demand(goal), scale)
+            except UnbalancedError:
+                goal = 0.5 * (share + goal)
+                if goal - share < 0.5**HALVINGS:
+                    raise
+                continue
+            now = Moving(demand(goal).time, found.w, np.zeros_like(now.v), found.force)
+            share, goal = goal, 1.0
+        return now
+
+    def _kept_out(self, guess: Balanced, demand: Demand, scale: float) -> Balanced:
+        """The state that balances; an UnbalancedError if it is pushed by the back of a tool."""
+        found, body = self.balance.found(guess, demand, scale), self.pressed.body
+        if body.contact.behind(body.given(found.w), demand.time, found.force):
+            raise UnbalancedError("a tool has gone through the surface")
+        return found
+
+    def _pushes(self, state: Moving) -> Floats:
+        """Nodal forces [N] (n,) of the tools."""
+        body = self.pressed.body
+        return np.asarray(body.contact.derivative(body.given(state.w), state.time).T @ state.force)
+
+    def start(self) -> Moving:
+        """At rest under what acts at all times, with the tools where they start."""
+        pressed, n = self.pressed, self.pressed.body.solid.size
+        w = np.zeros(len(pressed.body.free))
+        w[:n] = pressed.body.origin
+        begun = Moving(0.0, w, np.zeros(n), pressed.nothing.force)
+        return self.at_rest(begun, 0.0, pressed.dead)
+
+    def peak(self, time: float, load: Floats) -> Moving:
+        """At rest with the tools where they are at a time [s], under a load [N] (n,)."""
+        return self.at_rest(self.start(), time, load)
+
+    def march(self, start: Moving, step: float) -> Iterator[Moving]:
+        """States from a start on, a step [s] apart; ends with an UnbalancedError if it must."""
+        before, now = start, start
+        yield now
+        for k in range(1, 2**62):
+            goal = start.time + k * step
+            before, now = now, self._to(goal, now, before, HALVINGS)
+            yield now
+
+    def _to(self, goal: float, now: Moving, before: Moving, halvings: int) -> Moving:
+        """One step to a time [s], or where it fails two of half the length."""
+        try:
+            self._refuse_far(now.time, goal)
+            return self._step(goal, now, before)
+        except UnbalancedError:
+            if halvings == 0:
+                raise
+        middle = self._to(0.5 * (now.time + goal), now, before, halvings - 1)
+        return self._to(goal, middle, now, halvings - 1)
+
+    def _refuse_far(self, begun: float, time: float) -> None:
+        """UnbalancedError for a tool that moves too far at once."""
+        for tool in (one.tool for one in self.pressed.body.contact.patches):
+            away = np.linalg.norm(np.diff(tool.travel(np.array([begun, time])), axis=0))
+            if tool.shape != PLATE and away > FARTHEST * tool.radius:
+                raise UnbalancedError("a tool moves too far in a step")
+
+    def _step(self, goal: float, now: Moving, before: Moving) -> Moving:
+        step = goal - now.time
+        length, n = GAMMA * step, self.pressed.body.solid.size
+        guess = _onward(before, now, now.time + length)
+        first = self._stage(now.time + length, length, now.w[:n], now.v, guess)
+        acceleration = (first.v - now.v) / length
+        rest = step - length
+        guess = _onward(now, first, goal)
+        base = now.w[:n] + rest * first.v
+        return self._stage(goal, length, base, now.v + rest * acceleration, guess)
+
+    def _stage(
+        self, time: float, length: float, place: Floats, speed: Floats, guess: Balanced
+    ) -> Moving:
+        """The state at the end of a stage [s], from what it starts from and a guess."""
+        body, n = self.pressed.body, self.pressed.body.solid.size
+        inertia = 1.0 / length**2 + self.pressed.drag / length
+        given = self.pressed.load(time)
+        load = given + body.mass @ (inertia * place + speed / length)
+        if body.solid.volume_ratio(guess.w).min() <= 0.0:
+            raise UnbalancedError("elements would turn inside out")
+        scale = float(np.linalg.norm(given))
+        found = self._kept_out(guess, Demand(time, inertia, load), scale)
+        return Moving(time, found.w, (found.w[:n] - place) / length, found.force)
+
+
+def _onward(before: Moving, now: Moving, time: float) -> Balanced:
+    """A guess at a time [s], on the line through two states."""
+    if now.time <= before.time:
+        return Balanced(now.w, now.force)
+    share = (time - now.time) / (now.time - before.time)
+    return Balanced(now.w + share * (now.w - before.w), now.force)
+
+
+@dataclass(frozen=True, eq=False)
+class LargeSolution:
+    """A motion and what it took: `iterations` of Newton's method, and how often it `factored`.
+
+    `states` at the samples, as many as were reached. `largest_strain`: largest absolute principal
+    logarithmic strain in the kept frames, `smallest_volume`: smallest J there. `penetration` [m]:
+    how deep any point of the surface was inside a tool at a sample, and `overlooked` [m]: of what
+    no patch sees; `vertices` that tools may touch; `wall` [s].
+    """
+
+    trajectory: Trajectory
+    states: tuple[Moving, ...]
+    step: float
+    steps: int
+    iterations: int
+    factored: int
+    largest_strain: float
+    smallest_volume: float
+    penetration: float
+    overlooked: float
+    vertices: int
+    wall: float
+
+
+def run(
+    body: Body,
+    pressed: Pressed,
+    observation: Observation,
+    per_sample: int,
+    advance: Advance = lambda _: None,
+) -> LargeSolution:
+    """Motion from rest under loads and tools, by so many steps from sample to sample."""
+    started, times = clock.perf_counter(), observation.times
+    recorder = Recorder(body, observation, None, len(pressed.body.contact.patches))
+    step = float(times[1] - times[0]) / per_sample
+    steps, states = Steps(pressed), list[Moving]()
+    lost: float | None = None
+    try:
+        for n, state in enumerate(steps.march(steps.start(), step)):
+            if n % per_sample == 0:
+                _record(recorder, pressed, len(states), state)
+                states.append(state)
+                advance(len(states) / len(times))
+            if len(states) == len(times):
+                break
+    except UnbalancedError:
+        lost = float(times[len(states)])
+    trajectory = recorder.trajectory
+    if lost is not None:
+        trajectory = replace(trajectory, status="diverged", diverged_at=lost)
+    kept = [states[k] for k in set(observation.frames) if k < len(states)]
+    gradients = [pressed.body.solid.deformation(one.w) for one in kept]
+    contact, given = pressed.body.contact, pressed.body.given
+    return LargeSolution(
+        trajectory,
+        tuple(states),
+        step,
+        (len(times) - 1) * per_sample,
+        steps.balance.iterations,
+        steps.balance.factored,
+        max(map(largest_log_strain, gradients), default=0.0),
+        min((float(np.linalg.det(F).min()) for F in gradients), default=1.0),
+        max((contact.penetration(given(one.w), one.time) for one in states), default=0.0),
+        max((_beside(body, contact, given(one.w), one.time) for one in kept), default=0.0),
+        sum(one.count for one in contact.patches),
+        clock.perf_counter() - started,
+    )
+
+
+def _record(recorder: Recorder, pressed: Pressed, sample: int, state: Moving) -> None:
+    u = pressed.body.given(state.w)
+    points = recorder.at_probes
+    recorder.motion(sample, at_points(points, u), at_points(points, state.v))
+    recorder.trajectory.tool_force[sample] = pressed.on_tools(state)
+    recorder.field(sample, u)
+
+
+def _beside(body: Body, contact: FiniteContact, u: Floats, time: float) -> float:
+    """How deep [m] surface nodes that no patch sees are inside a tool that slides."""
+    boundary = body.nodes.get_dofs(body.nodes.mesh.boundary_facets()).flatten()  # scikit-fem's
+    deepest = 0.0
+    for one, seen in zip(contact.patches, contact.nodes, strict=True):
+        if not one.tool.bonded:
+            others = np.setdiff1d(boundary, seen)
+            moved = (body.points + u.reshape(-1, 3))[others]
+            deepest = max(deepest, -float(one.tool.gap(moved, time)[0].min(initial=np.inf)))
+    return deepest

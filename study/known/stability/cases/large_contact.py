@@ -1,0 +1,107 @@
+"""Rigid tools on neo-Hookean elements at the extremes: impacts, tools through the body, contrasts.
+
+A sphere is pressed into a small block and lifted. What finishes is held to a tool that is never
+pulled, and gets back no more work than it gave. What cannot go on says when.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.contact.large_motion import LargeSolution, run
+from fem_reference.contact.large_motion import pressed as under
+from fem_reference.elasticity import discretise
+from study.known.case import Case, Family
+from study.known.finding import Ending, Finding, at_most
+from study.known.pressed import DOWN
+from study.organ.block import block_mesh
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
+from study.problem.rigid import SPHERE, RigidTool
+from study.problem.tissue import Tissue
+from study.problem.trajectory import Observation
+from study.problem.varied import Ellipsoid, Region, VariedTissue
+
+Floats = NDArray[np.float64]
+
+SIZE, CELL, FOUNDATION = (0.06, 0.06, 0.03), 0.015, 1e7
+TOP = np.array([0.03, 0.03, 0.03])
+RADIUS, DEPTH, DAMPING = 0.015, 4e-3, 30.0
+SAMPLES = 61
+PULLED, GIVEN_BACK = 1e-9, 0.02
+"""Of the largest force, and of the largest work: the steps' own error has a share in it."""
+BALL = 0.008
+FAMILY = Family("large strain in contact", __name__)
+
+
+def cases() -> Iterator[Case]:
+    """Cases by what is extreme."""
+    for speed in (0.1, 1.0):
+        yield _case(f"impact at {speed:g} m/s", {"speed": speed})
+    # Waves of the tissue are slower: what is hit piles up in less than an element.
+    yield _case("impact at 10 m/s", {"speed": 10.0}, lost=True)
+    yield _case("sphere through the body", {"speed": 1.0, "depth": 0.06}, lost=True)
+    yield _case("zero gap, nothing pressed", {"depth": 1e-9})
+    for contrast in (1e-3, 1e3):
+        yield _case(f"a ball of {contrast:g} times the modulus", {"contrast": contrast})
+    yield _case("nu 0.4999", {"nu": 0.4999})
+    yield _case("under 10 g, given loaded", {"times_g": 10.0})
+
+
+def _case(name: str, settings: dict[str, float], *, lost: bool = False) -> Case:
+    expected: Ending = "diverged" if lost else "bounded"
+    return FAMILY.case(name, "pressed", settings, 0.0, expected=expected)
+
+
+def pressed(
+    speed: float = 0.04,
+    depth: float = DEPTH,
+    contrast: float = 1.0,
+    nu: float = 0.45,
+    times_g: float = 0.0,
+) -> Finding:
+    """The worse of pull and work given back, over what each may be; the run's ending."""
+    ramp = depth / speed
+
+    def travel(times: Floats) -> Floats:
+        corners = np.array([0.0, 1.0, 1.5, 2.5, 3.0]) * ramp
+        return np.outer(np.interp(times, corners, [0.0, depth, depth, 0.0, -depth]), DOWN)
+
+    times = np.linspace(0.0, 3.0 * max(ramp, 1e-3), SAMPLES)
+    sphere = RigidTool("tool", SPHERE, RADIUS, TOP, DOWN, travel)
+    distance = Ellipsoid(TOP - [0.0, 0.0, 0.014], np.full(3, BALL))
+    tissue = VariedTissue(
+        poisson_ratio=nu,
+        regions=(Region(name="ball", distance=distance, youngs_modulus=contrast * 9.5e3),),
+    )
+    found = _moved(tissue if contrast != 1.0 else Tissue(poisson_ratio=nu), sphere, times, times_g)
+    ending: Ending = "bounded" if found.trajectory.status == "finished" else "diverged"
+    share = _share(-found.trajectory.tool_force[:, 0], travel(times))
+    return at_most(1.0, share, "pull or work given back, over its limit", ending)
+
+
+def _moved(tissue: Tissue, sphere: RigidTool, times: Floats, times_g: float) -> LargeSolution:
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    base = Foundation(DOWN, 0.0, 1e-3, FOUNDATION)
+    body = discretise(block_mesh(SIZE, CELL), tissue, base, blunt, "taylor-hood")
+    borne = None
+    if times_g > 0.0:
+        borne = body.nodal_mass * np.tile(-9.81 * times_g * DOWN, body.node_count)
+    damping, nothing = RayleighDamping(DAMPING), np.zeros((0, 3))
+    given = under(body, tissue, (sphere,), damping, np.zeros_like, times, borne)
+    seen = Observation(times, TOP[None], (len(times) // 3, len(times) - 1), nothing, nothing)
+    return run(body, given, seen, 2)
+
+
+def _share(force: Floats, travel: Floats) -> float:
+    """Of pull and of work given back, the one that is more of what it may be."""
+    kept = np.isfinite(force).all(axis=1)
+    force, travel = force[kept], travel[kept]
+    work = np.cumsum((0.5 * (force[1:] + force[:-1]) * np.diff(travel, axis=0)).sum(axis=1))
+    pull = max(0.0, -float((force @ DOWN).min()))
+    back, most = max(0.0, -float(work.min())), max(float(work.max()), 1e-300)
+    largest = max(float(np.abs(force).max()), 1e-300)
+    return max(pull / (PULLED * largest), back / (GIVEN_BACK * most))

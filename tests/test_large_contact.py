@@ -1,0 +1,228 @@
+"""Rigid tools on neo-Hookean elements: derivatives, closed forms, press and lift, free fall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+from scipy.sparse import csc_array
+
+from fem_reference.contact.balance import UnbalancedError
+from fem_reference.contact.finite import FiniteContact
+from fem_reference.contact.large_motion import Steps, pressed, run, touched
+from fem_reference.contact.motion import at_peak
+from fem_reference.elasticity import discretise
+from study.known.verification.finite_strain import uniaxial
+from study.organ.block import block_mesh
+from study.problem.contact import Foundation, ToolPatch
+from study.problem.damping import RayleighDamping
+from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
+from study.problem.tissue import Tissue
+from study.problem.trajectory import Observation
+
+DOWN = np.array([0.0, 0.0, -1.0])
+SIZE = (0.06, 0.06, 0.03)
+TOP = np.array([0.03, 0.03, 0.03])
+TISSUE = Tissue(poisson_ratio=0.45)
+DAMPING = RayleighDamping(30.0)
+NOTHING = np.zeros((0, 3))
+EDGE = 0.04
+
+
+def block(cell=0.015, tissue=TISSUE):
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    base = Foundation(DOWN, 0.0, 1e-3, 1e7)
+    return discretise(block_mesh(SIZE, cell), tissue, base, blunt, "taylor-hood")
+
+
+def tool(shape=SPHERE, depth=3e-3, corners=(0.0, 0.1, 0.2, 0.3), **settings):
+    """Pressed in, held and lifted again by as much again as it went in."""
+    heights = np.array([0.0, depth, depth, -depth])[: len(corners)]
+
+    def travel(times):
+        return np.outer(np.interp(times, corners, heights), DOWN)
+
+    return RigidTool("tool", shape, 0.015, TOP, DOWN, travel, **settings)
+
+
+def observed(duration, samples, peak):
+    frames = (peak, samples - 1)
+    return Observation(np.linspace(0.0, duration, samples), TOP[None], frames, NOTHING, NOTHING)
+
+
+def moved(body, one, seen, per_sample=1, damping=DAMPING):
+    given = pressed(body, TISSUE, (one,), damping, np.zeros_like, seen.times)
+    return given, run(body, given, seen, per_sample)
+
+
+def at_rest(body, one, tissue=TISSUE, times=(0.0, 1.0)):
+    given = pressed(body, tissue, (one,), DAMPING, np.zeros_like, np.array(times))
+    return given, Steps(given).peak(times[-1], np.zeros(given.body.solid.size))
+
+
+def steady(depth, shape=SPHERE, **settings):
+    return tool(shape, depth, (0.0, 1.0), **settings)
+
+
+@pytest.mark.parametrize("one", [steady(3e-3), steady(3e-3, PLATE), steady(1e-3, bonded=True)])
+def test_derivatives_of_the_gaps(rng, one):
+    contact = touched(block(), TISSUE, (one,), np.array([0.0, 1.0])).contact
+    u, du = 1e-3 * rng.standard_normal((2, contact.size))
+    force = rng.random(len(contact.held))
+    steps = 0.5 ** np.arange(2, 7)
+    G, bend = contact.derivative(u, 1.0), contact.curvature(u, 1.0, force)
+    of_gaps, of_slope = [], []
+    for h in steps:
+        off = contact.gaps(u + h * du, 1.0) - contact.gaps(u, 1.0) - h * (G @ du)
+        of_gaps.append(np.linalg.norm(off))
+        turned = contact.derivative(u + h * du, 1.0).T @ force - G.T @ force
+        of_slope.append(np.linalg.norm(turned - h * (bend @ du)))
+    for off in (of_gaps, of_slope):
+        if max(off) > 1e-12:  # of a bonded tool they are linear
+            assert np.polyfit(np.log(steps), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.3)
+
+
+def test_forces_of_body_and_tool_are_in_balance(rng):
+    contact = touched(block(), TISSUE, (steady(3e-3),), np.array([0.0, 1.0])).contact
+    u, force = 1e-3 * rng.standard_normal(contact.size), rng.random(len(contact.held))
+    on_body = (contact.derivative(u, 1.0).T @ force).reshape(-1, 3).sum(axis=0)
+    assert contact.on_tools(u, 1.0, force)[0] == pytest.approx(-on_body)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.499])
+def test_frictionless_plates_take_the_closed_form(nu):
+    """An eighth of a block, the plate pressed on it by contact alone."""
+    tissue = Tissue(poisson_ratio=nu)
+    blunt = ToolPatch(np.full(3, EDGE), DOWN, EDGE, 0.0)
+    mesh = block_mesh((EDGE,) * 3, 0.5 * EDGE)
+    bare = discretise(mesh, tissue, Foundation(DOWN, 0.0, 1e-3, 1.0), blunt, "taylor-hood")
+    nothing = csc_array(bare.support.shape)
+    body = replace(bare, support=nothing, fixed=(bare.points < 1e-9).ravel())
+    plate = replace(steady(0.3 * EDGE, PLATE), tip=np.array([0.0, 0.0, EDGE]))
+    given, state = at_rest(body, plate, tissue)
+    lateral, stress = uniaxial(tissue, 0.7)
+    exact = body.points * (np.array([lateral, lateral, 0.7]) - 1.0)
+    found = given.body.given(state.w).reshape(-1, 3)
+    assert np.abs(found - exact).max() < 1e-5 * EDGE
+    assert given.on_tools(state)[0] @ DOWN == pytest.approx(stress * EDGE**2, rel=1e-4)
+
+
+@pytest.mark.parametrize("bonded", [False, True])
+def test_small_strains_are_those_of_the_linear_reference(bonded):
+    body, plate = block(), steady(1e-5, PLATE, bonded=bonded)
+    given, state = at_rest(body, plate)
+    linear = at_peak(body, (plate,), observed(1.0, 3, 2)).forces[0] @ DOWN
+    assert given.on_tools(state)[0] @ DOWN == pytest.approx(linear, rel=1e-3)
+    # Of ten per cent the law makes more than of a thousandth.
+    deep, far = at_rest(body, steady(3e-3, PLATE, bonded=bonded))
+    assert abs(deep.on_tools(far)[0] @ DOWN / (300.0 * linear) - 1.0) > 0.03
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    """A sphere that goes in and out smoothly, and leaves."""
+
+    def travel(times):
+        return np.outer(3e-3 * np.sin(np.pi * np.minimum(times / 0.2, 1.25)), DOWN)
+
+    body, seen = block(), observed(0.3, 61, 20)
+    sphere = replace(tool(), travel=travel)
+    return [moved(body, sphere, seen, n) for n in (1, 2)], body, sphere, seen
+
+
+def test_a_body_is_pushed_and_never_pulled(cycle):
+    found = cycle[0][0][1].trajectory
+    force = found.tool_force[:, 0] @ DOWN
+    assert found.status == "finished"
+    assert force.min() < -0.1
+    assert force.max() <= 1e-12
+    assert (found.tool_force[-8:] == 0.0).all()
+    assert np.abs(found.displacement[-1]).max() < 0.05 * np.abs(found.displacement).max()
+
+
+def test_the_tools_work_is_stored_or_damped(cycle):
+    """Up to the steps' error, which falls as they are halved."""
+    off = []
+    for given, found in cycle[0]:
+        body, sphere, seen = cycle[1:]
+        force = -found.trajectory.tool_force[:, 0]
+        steps = 0.5 * (force[1:] + force[:-1]) * np.diff(sphere.travel(seen.times), axis=0)
+        work = np.append(0.0, np.cumsum(steps.sum(axis=1)))
+        power = [DAMPING.mass * float(one.v @ (body.mass @ one.v)) for one in found.states]
+        taken = cumulative_trapezoid(power, seen.times, initial=0.0)
+        held = [given.energy(one) for one in found.states]
+        off.append(np.abs(taken + held - work).max() / work.max())
+    assert off[1] < 0.03
+    assert off[1] < off[0]
+
+
+def test_halved_steps_change_the_force_little(cycle):
+    whole, half = (one[1].trajectory.tool_force for one in cycle[0])
+    assert 0.0 < np.linalg.norm(whole - half) < 0.1 * np.linalg.norm(half)
+
+
+def test_a_tool_that_is_held_ends_at_rest():
+    body, sphere, seen = block(), tool(corners=(0.0, 0.1, 1.0)), observed(1.0, 41, 40)
+    given, found = moved(body, sphere, seen)
+    rest = Steps(given).peak(1.0, np.zeros(given.body.solid.size))
+    assert found.trajectory.tool_force[-1] == pytest.approx(given.on_tools(rest), rel=1e-3)
+
+
+def test_a_body_falls_freely():
+    """By g t^2 / 2, with neither strain nor rotation."""
+    bare, g = block(), np.array([1.0, 2.0, -9.81])
+    load = np.asarray(bare.mass @ np.tile(g, bare.node_count))
+    body = replace(bare, support=csc_array(bare.support.shape), load=load)
+    seen = observed(0.1, 11, 10)
+    given = pressed(body, TISSUE, (), RayleighDamping(0.0), np.ones_like, seen.times)
+    found = run(body, given, seen, 1)
+    exact = 0.5 * np.outer(seen.times**2, g)
+    assert found.trajectory.displacement[:, 0] == pytest.approx(exact, abs=1e-6)
+    assert found.trajectory.velocity[-1, 0] == pytest.approx(0.1 * g, rel=1e-4)
+    assert found.largest_strain < 1e-4
+
+
+def test_an_unloaded_shape_sags_into_the_given_one():
+    body = block()
+    weight = np.asarray(body.mass @ np.tile([3.0, 0.0, -9.81], body.node_count))
+    given = pressed(body, TISSUE, (), DAMPING, np.zeros_like, np.array([0.0, 1.0]), weight)
+    sagged = np.abs(given.body.origin).max()
+    assert sagged > 1e-4
+    start = Steps(given).start()
+    assert np.abs(given.body.given(start.w)).max() < 1e-5 * sagged
+    # Without the weight it springs back.
+    free = Steps(replace(given, dead=np.zeros_like(weight))).start()
+    assert np.abs(free.w[: len(weight)]).max() < 1e-3 * sagged
+
+
+def test_a_tool_through_the_body_ends_the_motion_and_says_when():
+    body, sphere = block(), tool(depth=0.2, corners=(0.0, 0.02, 0.3))
+    found = moved(body, sphere, observed(0.3, 61, 10))[1].trajectory
+    assert found.status == "diverged"
+    assert 0.0 < found.diverged_at < 0.1
+    assert np.isnan(found.tool_force[-1]).all()
+    with pytest.raises(UnbalancedError):
+        at_rest(body, steady(0.2))
+
+
+@pytest.mark.parametrize(
+    ("one", "damping", "nu", "key"),
+    [
+        (tool(friction=0.1), DAMPING, 0.4, r"tool\.friction"),
+        (tool(PUNCH), DAMPING, 0.4, r"tool\.shape"),
+        (tool(), RayleighDamping(1.0, 1e-3), 0.4, r"damping\.stiffness"),
+        (tool(), DAMPING, 0.0, r"tissue\.poisson_ratio"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(one, damping, nu, key):
+    tissue = Tissue(poisson_ratio=nu)
+    with pytest.raises(ValueError, match=key):
+        pressed(block(tissue=tissue), tissue, (one,), damping, np.zeros_like, np.arange(2.0))
+
+
+def test_a_bonded_punch_may_pull():
+    FiniteContact.refuse((tool(PUNCH, bonded=True),))
+    given, state = at_rest(block(), steady(-1e-3, PUNCH, bonded=True))
+    assert given.on_tools(state)[0] @ DOWN > 0.01
