@@ -24,16 +24,20 @@ MIXED = 6
 """Earlier shapes that Anderson's mixing looks back at (1965, J. ACM 12:547)."""
 
 
+class NoRestError(ValueError):
+    """A body that finds no rest under its weight."""
+
+
 def sagged(law: Law, net: Network, dead: Floats) -> Floats:
     """Displacement [m] (n, 3) at rest under a dead load [N] (n, 3) alone.
 
-    ValueError if there is none to be found.
+    NoRestError if there is none to be found.
     """
     if not dead.any():
         return np.zeros_like(dead)
     found, how = relax(law, net._replace(load=dead, outer=None), tolerance=AT_REST)
     if how.status != "at rest":
-        raise ValueError(
+        raise NoRestError(
             f"gravity: the lattice does not come to rest under it ({how.status} after {how.steps} "
             f"steps, {how.residual:.1g} of the load unbalanced); reduce gravity.acceleration or "
             "weight.mass, or enlarge lattice.spacing"
@@ -69,7 +73,7 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
             missed, np.zeros_like(dead), alpha=-1.0, M=MIXED, maxiter=ROUNDS, f_tol=enough
         )
     except NoConvergence:
-        raise ValueError(
+        raise NoRestError(
             "gravity.given: no unloaded shape was found that sags to the given one; reduce "
             "gravity.acceleration, or set gravity.given to unloaded"
         ) from None

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from msm.settled import NoRestError
 from reports import organ_ranking as told
 from reports.ranking_study import FEWEST, movers
 from study.commands.flags import WorkerFlags
@@ -94,6 +95,42 @@ def test_a_draw_is_scored_as_a_scene_that_says_the_same(scene, given):
         )
         # Looked at once in each tetrahedron, where a run does eight times.
         assert found[k, -1] == pytest.approx(max(0.0, 1.0 - field), abs=0.02)
+
+
+HUNG = (
+    *SHORT,
+    "gravity.acceleration=9.81 m/s^2",
+    "gravity.towards=inferior",
+    'weight=[{place={side="superior", at=[0.3, 0.5]}, mass="5 g", radius="15 mm"}]',
+)
+
+
+def test_gravity_and_weights_are_those_of_the_scene_in_every_draw(scene, given):
+    hung = organ.prepared(read_scene("block", HUNG))
+    posed = stated(**arguments(hung))
+    draw = as_the_scene(hung)
+    drawn = organ._posed(draw, hung, posed.problem)
+    assert np.array_equal(drawn.gravity, posed.problem.gravity)
+    assert drawn.weights == posed.problem.weights
+    found = scored(draw, posed)
+    assert np.isfinite(found).all()
+    assert np.abs(found - scored(as_the_scene(scene), given)).max() > 1e-3
+
+
+def test_a_draw_that_finds_no_rest_under_its_weight_counts_for_no_one(monkeypatch):
+    hung = organ.prepared(read_scene("block", HUNG))
+
+    def lost(*_):
+        raise NoRestError("it falls")
+
+    monkeypatch.setattr("msm.stepper.sagged", lost)
+    assert np.isnan(scored(as_the_scene(hung), stated(**arguments(hung)))).all()
+
+
+def test_tools_that_are_moved_are_refused_with_the_reason():
+    moved = ("tool.shape=sphere", "tool.displacement=2 mm")
+    with pytest.raises(ValueError, match="place and force of a blunt tool"):
+        _ = organ_request.OrganRequest(scene="block", overrides=moved).given
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 COARSER = 2.0
 """Spacing of the lattice that tells the error, times that of the one whose error it is."""
 ORDER = 1.0
-"""Assumed of two lattices. Estimates so are 0.5 to 2.7 times the error: docs/tools.md."""
+"""Assumed of two lattices. Estimates were 0.3 to 4.6 times the error of forces: docs/tools.md."""
 TINY = 1e-300
 
 

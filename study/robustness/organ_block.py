@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.table1 import AETIOLOGIES
+from msm.settled import NoRestError
 from study.models.model import Simulation
 from study.models.table import models_of
 from study.problem.problem import Problem
@@ -114,7 +115,11 @@ def _seen(problem: Problem) -> Problem:
 
 
 def evaluated(drawn: Sequence[OrganDraw], scene: Scene, problem: Problem) -> Block:
-    """Estimates and scores of draws; NaN where a motion diverged, or its cells are inside out."""
+    """Estimates and scores of draws; NaN where a motion diverged, or its cells are inside out.
+
+    Or where a body finds no rest under its weight. Gravity, weights and further loads are those of
+    the scene in every draw.
+    """
     moduli = estimates(drawn)
     found = [
         _scores(draw, dict(zip(SYSTEMS, map(float, row), strict=True)), scene, problem)
@@ -127,10 +132,11 @@ def _scores(draw: OrganDraw, moduli: Mapping[str, float], scene: Scene, problem:
     """Scores (contenders, measures) of a draw."""
     drawn = as_drawn(replace(scene, patient=replace(scene.patient, **_patient(draw))), draw)
     posed = _posed(draw, drawn, problem)
-    found = {
-        model.name: model.prepare(posed).simulate()
-        for model in models_of(drawn, {name: _estimate(name, e) for name, e in moduli.items()})
-    }
+    models = models_of(drawn, {name: _estimate(name, e) for name, e in moduli.items()})
+    try:
+        found = {model.name: model.prepare(posed).simulate() for model in models}
+    except NoRestError:
+        return np.tile(DIVERGED, (len(CONTENDERS), 1))
     truth = found.pop("basafa")
     named = {READING: found[READING]} | {name: found[f"msm-{name}"] for name in SYSTEMS}
     return np.stack([_compared(posed, named[name], truth) for name in CONTENDERS])

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.problem.features import refuse_beside_one_load
 from study.results.tables import write_table
 from study.robustness import rows, summary
 from study.robustness.design import check_size
@@ -28,6 +27,7 @@ from study.robustness.ranges import write_ranges
 from study.robustness.unknowns import groups
 from study.run.stated import arguments, stated
 from study.run.suiting import read_suited
+from study.scene import Scene
 from study.sweep.canonical import Plain
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
@@ -85,7 +85,7 @@ class OrganRequest:
     def given(self) -> Plain:
         """The scene as every draw has it, as plain values. ValueError of one that will not do."""
         scene = read_suited(self.scene, self.overrides)
-        refuse_beside_one_load(scene.features, "robustness")
+        _refuse_moved(scene)
         return arguments(prepared(scene))
 
     @cached_property
@@ -108,6 +108,15 @@ class OrganRequest:
     def _task(self, row: int, points: int, finer: float = 1.0) -> Task:
         asked = Asked(self.seed, row, points, self.about, finer)
         return Task(FUNCTION, {"asked": asdict(asked), **self.given})
+
+
+def _refuse_moved(scene: Scene) -> None:
+    """ValueError for tools that are moved, of which a draw has no force to change."""
+    if "moved-tools" in scene.features:
+        raise ValueError(
+            "robustness: a draw changes place and force of a blunt tool, and the scene has rigid "
+            "tools that are moved; leave these out, or use run"
+        )
 
 
 def planned(request: OrganRequest) -> str:
