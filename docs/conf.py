@@ -13,6 +13,10 @@ from sphinx.application import Sphinx
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
+from reports.cut_figure import cut_figure  # noqa: E402 - once the path leads there
+from reports.page.answer import answer  # noqa: E402
+from study.results import Results  # noqa: E402
+
 PROJECT = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 FACES = {
     "study.problem": "The problem",
@@ -24,6 +28,12 @@ FACES = {
     "study.results": "Results",
 }
 """Packages whose interface has a page each, with their titles."""
+SITE = "site"
+"""Folder of files that the site takes as they are."""
+REPORTS = ("report.pdf", "report.html")
+RESULTS = sorted(path for path in (HERE.parent / "results").glob("*") if path.is_dir())
+FINISHED = [path for path in RESULTS if all((path / name).is_file() for name in REPORTS)]
+"""Results of this clone that have both reports, which a page shows; there need be none."""
 
 project = PROJECT["name"]
 author = PROJECT["authors"][0]["name"]
@@ -38,6 +48,7 @@ html_theme = "furo"
 html_title = f"{project} {release}"
 html_copy_source = False
 html_show_copyright = False
+html_extra_path = [f"generated/{SITE}"] if FINISHED else []
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -82,8 +93,33 @@ def example_page(scripts: list[Path]) -> str:
     return "\n".join(parts)
 
 
+def finished_page(runs: list[Path], folder: Path) -> str:
+    """The page of finished reports, which are copied into a folder of the site with a picture."""
+    parts = [
+        "# Finished reports\n",
+        "As the commands left them, to look at before a run of your own.\n",
+    ]
+    for run in runs:
+        at = folder / "finished" / run.name
+        at.mkdir(parents=True)
+        for name in REPORTS:
+            shutil.copyfile(run / name, at / name)
+        results = Results.load(run)
+        parts += [f"## {results.record.title or run.name}\n", f"`liver-study run {run.name}`\n"]
+        parts += ["\n\n".join(answer(results).sentences) + "\n"]
+        links = " · ".join(
+            f'<a href="../finished/{run.name}/{name}">{name}</a>' for name in REPORTS
+        )
+        if (drawn := cut_figure(results)) is not None:
+            (at / "cut.svg").write_bytes(drawn)
+            picture = f"../finished/{run.name}/cut.svg"
+            links += f'<br><img src="{picture}" alt="A cut through the tool in each model">'
+        parts += [f"<p>{links}</p>\n"]
+    return "\n".join(parts)
+
+
 def write_pages(folder: Path) -> None:
-    """Write a page for every package of FACES that there is, and one of the short programs."""
+    """Write a page for every package of FACES that there is, of short programs, and of reports."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for name, title in FACES.items():
@@ -92,6 +128,9 @@ def write_pages(folder: Path) -> None:
     scripts = sorted((HERE / "gallery").glob("*.py"))
     if scripts:
         (folder / "examples.md").write_text(example_page(scripts), encoding="utf-8")
+    if FINISHED:
+        text = finished_page(FINISHED, folder / SITE)
+        (folder / "reports.md").write_text(text, encoding="utf-8")
 
 
 write_pages(HERE / "generated")

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import typst
 
-from reports.field_figures import field_figures, job, views
-from reports.renders import render
+from reports.cut_figure import cut_figure
 from study.results import Results
 
 HERE = Path(__file__).parent
@@ -45,14 +44,14 @@ def rows(results: Results) -> list[list[object]]:
 
 
 def picture(results: Results) -> bytes:
-    """PNG of the deformed organ in each model at peak load, as page one of the report has it."""
-    seen = views(results)
-    if seen is None:
+    """PNG of the cut through the tool's axis at peak load, as the report has it."""
+    drawn = cut_figure(results)
+    if drawn is None:
         raise ValueError("results without fields: run the liver with renders = true")
     with tempfile.TemporaryDirectory() as name:
         page = Path(name) / "page.typ"
-        (page.parent / "fields.svg").write_bytes(field_figures(seen, render(job(seen)))[0])
-        page.write_text('#set page(width: auto, height: auto, margin: 6pt)\n#image("fields.svg")')
+        (page.parent / "cut.svg").write_bytes(drawn)
+        page.write_text('#set page(width: auto, height: auto, margin: 6pt)\n#image("cut.svg")')
         return bytes(typst.compile(str(page), format="png", ppi=100))
 
 

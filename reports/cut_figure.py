@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 COLUMNS = 3
-LEVELS = 9
+LEVELS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75, 1.0])
+"""Shares of the largest displacement: it falls off fast round the tool."""
 TALLEST = 2.0
 """Height of a panel [inch], however deep the organ."""
 MARGIN = 0.08
-ARROW = 0.3
-"""Length of the arrow over the width of the cut."""
+ARROW = 0.25
+"""Length of the arrow over the height of the cut."""
 MILLI = 1e3
 
 
@@ -96,7 +97,7 @@ def _figure(found: Cut) -> Figure:
 
     low, high = found.places.min(axis=0), found.places.max(axis=0)
     low, high = low - MARGIN * (high - low), high + MARGIN * (high - low)
-    high[1] += 2.0 * MARGIN * (high - low)[1]  # room for the arrow
+    high[1] += ARROW * float(np.ptp(found.places[:, 1]))
     width, height = high - low
     rows = -(-len(found.lengths) // COLUMNS)
     panel = min(canvas.TEXT_WIDTH / COLUMNS * height / width, TALLEST)
@@ -104,7 +105,7 @@ def _figure(found: Cut) -> Figure:
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     plane = Triangulation(*found.places.T, found.triangles)
     first = next(iter(found.lengths.values()))
-    levels = np.linspace(0.0, colour_limit(list(found.lengths.values())), LEVELS)
+    levels = LEVELS * colour_limit(list(found.lengths.values()))
     for axes, (name, lengths) in zip(grid, found.lengths.items(), strict=False):
         _draw(axes, plane, lengths, levels)
         if lengths is not first:
@@ -119,8 +120,10 @@ def _figure(found: Cut) -> Figure:
 
 
 def _draw(axes: Axes, plane: Triangulation, lengths: Floats, levels: Floats) -> None:
-    style = {"levels": levels, "cmap": "YlGnBu", "extend": "max"}
-    axes.tricontourf(plane, lengths, **style)
+    from matplotlib.colors import BoundaryNorm
+
+    norm = BoundaryNorm(levels, 256)
+    axes.tricontourf(plane, lengths, levels=levels, cmap="YlGnBu", norm=norm, extend="max")
     axes.tricontour(plane, lengths, levels=levels[1:], colors="#222222", linewidths=0.4)
     for ends in _rim(plane.triangles):
         axes.plot(plane.x[ends], plane.y[ends], color="#222222", lw=0.8)

@@ -32,7 +32,7 @@ SCALE_LIMIT = 3.0
 """The colour scale ends at most at this multiple of the first model's largest value."""
 SCENE_WIDTH = 2.44
 """Width of the picture of the scene [inch]."""
-KEY_HEIGHT = 0.9
+KEY_HEIGHT = 1.0
 RED, BLUE = "#D00000", "#0072B2"
 HELD, LOADED = 0.5, 0.02
 """Share of a triangle's area that is held, or loaded, from which on it is marked."""
@@ -232,8 +232,8 @@ def _draw_scene_key(axes: Axes, views: Views, sheet: Sheet) -> None:
     named += ["…"] if len(views.probes) > len(named) else []
     axes.text(0.56, 1.0, "\n".join(named), transform=axes.transAxes, va="top", linespacing=1.1)
     width = views.camera.half_width
-    _draw_triad(axes, views.camera, (-0.72 * width, -0.66 * width), 0.13 * width)
-    _draw_scale_bar(axes, views.camera, (-0.4 * width, -0.7 * width))
+    _draw_triad(axes, views.camera, (-0.72 * width, -0.74 * width), 0.13 * width)
+    _draw_scale_bar(axes, views.camera, (-0.4 * width, -0.76 * width))
 
 
 def _panels(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
@@ -246,7 +246,7 @@ def _panels(views: Views, sheet: Sheet, pictures: Pictures) -> Figure:
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for i, (axes, panel) in enumerate(zip(grid, sheet.panels, strict=False)):
         _frame(axes, camera)
-        axes.set_title(panel.title, pad=2)
+        axes.set_title(panel.title, pad=7)
         _draw_panel(axes, views, panel, sheet, pictures, i)
         _mark(axes, views, panel.points[views.anchors])
     for axes in grid[count - 1 :]:

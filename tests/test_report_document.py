@@ -87,6 +87,31 @@ def test_other_numbers_make_other_bytes():
     assert report.pdf(results) != report.pdf(other)
 
 
+def test_the_report_is_tagged_and_a_figure_without_a_text_is_refused(monkeypatch):
+    """PDF/UA-1 asks for more than is looked at here; typst refuses what it can see lack."""
+    results = without_arrays()
+    made = report.pdf(results)
+    assert b"pdfuaid:part>1<" in made
+    sound = report.template
+    bare = sound().replace(b", alt: data.alternatives.at(place).at(i)", b"")
+    assert bare != sound()
+    monkeypatch.setattr(
+        report, "template", lambda name: bare if name == report.TEMPLATE else sound(name)
+    )
+    with pytest.raises(typst.TypstError, match="alt"):
+        report.pdf(results)
+
+
+def test_every_figure_that_is_drawn_has_a_text_of_its_own():
+    results = results_of(probes=[f"point-{i}" for i in range(5)])
+    figures, _ = report.draw(replace(results, fuzzy={}))
+    texts = document(results)["alternatives"]
+    for place, drawn in figures.items():
+        assert len(texts[place]) >= len(drawn), place
+    assert len(set(texts["motion"])) == len(figures["motion"]) == 2
+    assert "Finite elements 0.997 mm" in texts["first"][0]
+
+
 def test_a_folder_without_results_is_refused(tmp_path):
     with pytest.raises(ResultsError, match="no results here"):
         report.make_report(tmp_path)

@@ -62,10 +62,20 @@ class Posing:
         return without(self.scene, BLIND_TO)
 
     @cached_property
-    def problem(self) -> Problem:
+    def stated(self) -> Problem:
         """The organ with support, tool and probes. ValueError naming the key that does not fit."""
         with self.progress.stage("organ"):
-            return to_watch(problem_of(self.part))
+            return problem_of(self.part)
+
+    @cached_property
+    def watched(self) -> Watched:
+        """What its pictures show."""
+        return watched(self.stated)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The same, looked at for its pictures too."""
+        return to_watch(self.stated, self.watched)
 
     def posed(self) -> Posed:
         """What is seen of it."""
@@ -81,7 +91,7 @@ class Posing:
             dimensionless(self.scene, problem),
             self.mesh,
             problem.inclusions,
-            watched(problem),
+            self.watched,
         )
 
     @property

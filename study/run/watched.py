@@ -15,8 +15,10 @@ from study.results.arrays import Arrays
 
 Floats = NDArray[np.float64]
 
-FILM = 12
-"""Equal parts of the motion at whose ends the surface is kept."""
+FRAMES = 9
+"""Samples at which the surface is kept; finite elements look for their largest strain at each."""
+STRAIGHT = 0.05
+"""Share of a load's largest value by which it may leave a straight line between two frames."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +39,37 @@ class Watched:
 
 def watched(problem: Problem) -> Watched:
     """What is looked at of a problem as a scene poses it."""
-    peak, last = problem.observation.frames[0], problem.observation.frames[-1]
-    between = set(np.linspace(0, last, FILM + 1).round().astype(int).tolist()) - {peak, last}
-    tool = problem.tool
+    (peak, last), tool = problem.observation.frames, problem.tool
+    between = set(_frames(_loads(problem), {0, peak, last})) - {peak, last}
     points, triangles = cut(problem.geometry.mesh, tool.centre, _across(problem))
     return Watched((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
 
 
-def to_watch(problem: Problem) -> Problem:
+def _loads(problem: Problem) -> Floats:
+    """Every load and every way of a tool over the samples (samples, k), each up to 1."""
+    times = problem.observation.times
+    ways = [np.linalg.norm(one.travel(times), axis=1) for one in problem.rigid_tools]
+    found = np.column_stack([problem.factors(times), *ways])
+    return np.asarray(found / np.maximum(np.abs(found).max(axis=0), np.finfo(float).tiny))
+
+
+def _frames(loads: Floats, given: set[int]) -> list[int]:
+    """Samples where lines between them come nearest to the loads, then in the widest gaps."""
+    found, samples = sorted(given), np.arange(len(loads))
+    while len(found) < min(FRAMES, len(loads)):
+        lines = np.stack([np.interp(samples, found, one[found]) for one in loads.T], axis=1)
+        away = np.abs(loads - lines).max(axis=1)
+        if away.max() > STRAIGHT:
+            found = sorted({*found, int(away.argmax())})
+            continue
+        widest = int(np.diff(found).argmax())
+        found = sorted({*found, (found[widest] + found[widest + 1]) // 2})
+    return found
+
+
+def to_watch(problem: Problem, found: Watched) -> Problem:
     """The problem whose models keep all that is looked at, see `kept`."""
-    found, seen = watched(problem), problem.observation
+    seen = problem.observation
     surface = np.vstack([seen.surface_points, found.points])
     seen = replace(seen, frames=found.samples, surface_points=surface)
     return replace(problem, observation=seen)
