@@ -40,27 +40,36 @@ class Blocks:
 
 @dataclass(frozen=True)
 class SymmetricBlocks:
-    """A symmetric matrix by blocks of 3 x 3, of which one half is read; `diagonal`: its entries."""
+    """A symmetric matrix by blocks of 3 x 3: the first of each row on its diagonal, others above.
 
-    whole: Blocks
-    diagonal: Ints
+    What is below is not read.
+    """
+
+    upper: Blocks
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
-        return (3 * len(self.diagonal), 3 * len(self.diagonal))
+        return (3 * len(self.upper.first), 3 * len(self.upper.first))
 
     def __matmul__(self, x: Floats) -> Floats:
         """The product with a vector."""
-        found = np.zeros(len(x))
-        _add_symmetric(
-            self.diagonal, self.whole.last, self.whole.indices, self.whole.data, x, found
-        )
+        found, upper = np.zeros(len(x)), self.upper
+        _add_symmetric(upper.first, upper.last, upper.indices, upper.data, x, found)
         return found
 
     def __abs__(self) -> SymmetricBlocks:
-        whole = replace(self.whole, data=np.abs(self.whole.data))
-        return replace(self, whole=whole)
+        return SymmetricBlocks(replace(self.upper, data=np.abs(self.upper.data)))
+
+    @property
+    def single(self) -> SymmetricBlocks:
+        """A copy in single precision, a quarter of the memory."""
+        upper = self.upper
+        count = upper.last - upper.first
+        ends = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+        kept = np.repeat(upper.first - ends[:-1], count) + np.arange(ends[-1])
+        data = upper.data[kept].astype(np.float32)
+        return SymmetricBlocks(Blocks(ends[:-1], ends[1:], upper.indices[kept], data))
 
 
 def blocks_of(matrix: Any, dtype: Any = np.float64) -> Blocks:
@@ -74,7 +83,7 @@ def blocks_of(matrix: Any, dtype: Any = np.float64) -> Blocks:
 def symmetric(matrix: Any) -> SymmetricBlocks:
     """A symmetric matrix of scipy's by blocks of 3 x 3."""
     blocks = blocks_of(matrix)
-    return SymmetricBlocks(blocks, diagonal_of(blocks))
+    return SymmetricBlocks(replace(blocks, first=diagonal_of(blocks)))
 
 
 def diagonal_of(blocks: Blocks) -> Ints:
@@ -101,17 +110,17 @@ def _add_product(
 
 @kernel
 def _add_symmetric(
-    diagonal: Ints, last: Ints, indices: Ints, data: Floats, x: Floats, y: Floats
+    first: Ints, last: Ints, indices: Ints, data: Floats, x: Floats, y: Floats
 ) -> None:
     """Y += A x by the diagonal and what is above it."""
-    for i in range(len(diagonal)):
+    for i in range(len(first)):
         at = 3 * i
         a, b, c = x[at], x[at + 1], x[at + 2]
-        own = data[diagonal[i]]
+        own = data[first[i]]
         p = own[0, 0] * a + own[0, 1] * b + own[0, 2] * c
         q = own[1, 0] * a + own[1, 1] * b + own[1, 2] * c
         r = own[2, 0] * a + own[2, 1] * b + own[2, 2] * c
-        for k in range(diagonal[i] + 1, last[i]):
+        for k in range(first[i] + 1, last[i]):
             j, block = 3 * indices[k], data[k]
             u, v, w = x[j], x[j + 1], x[j + 2]
             p += block[0, 0] * u + block[0, 1] * v + block[0, 2] * w
