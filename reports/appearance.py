@@ -13,7 +13,11 @@ from typing import Any
 from study.results.folder import Results
 
 SYSTEM_NAMES = {"mamdani": "Mamdani", "sugeno": "Sugeno", "interval-type-2": "Interval type-2"}
-REFERENCE_NAMES = {"fem": "the finite-element reference", "basafa": "the Basafa benchmark"}
+REFERENCE_NAMES = {
+    "fem": "the finite-element reference",
+    "hyperelastic": "the hyperelastic reference",
+    "basafa": "the Basafa benchmark",
+}
 
 Dashes = str | tuple[float, tuple[float, ...]]
 """A line style as matplotlib takes it."""
@@ -49,6 +53,7 @@ SYSTEM_LOOKS = {
 }
 LOOKS = {
     "fem": Look("#000000", "-", 1.3, 3.0),
+    "hyperelastic": Look("#0072B2", "-", 1.3, 3.0),
     "basafa": Look("#D55E00", (0, (7, 1.6)), 1.3, 3.1),
     "reading": Look("#B8860B", (0, (1, 1)), 1.4, 3.05),
     **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},

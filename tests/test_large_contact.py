@@ -15,12 +15,17 @@ from fem_reference.contact.large_motion import Steps, pressed, run, touched
 from fem_reference.contact.motion import at_peak
 from fem_reference.elasticity import discretise
 from study.known.verification.finite_strain import uniaxial
+from study.models import hyperelastic
+from study.models.model import SILENT
+from study.models.table import models_of
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 DOWN = np.array([0.0, 0.0, -1.0])
 SIZE = (0.06, 0.06, 0.03)
@@ -226,3 +231,38 @@ def test_a_bonded_punch_may_pull():
     FiniteContact.refuse((tool(PUNCH, bonded=True),))
     given, state = at_rest(block(), steady(-1e-3, PUNCH, bonded=True))
     assert given.on_tools(state)[0] @ DOWN > 0.01
+
+
+SCENE = (
+    'organ.size=["60 mm", "60 mm", "40 mm"]',
+    "tool.shape=sphere",
+    "tool.radius=20 mm",
+    "tool.displacement=4 mm",
+    "reference.element_size=20 mm",
+    "time.samples=21",
+    "time.duration=0.5 s",
+    "tool.history.ramp=0.2 s",
+    "tool.history.hold=0.1 s",
+    "tool.history.release=0.15 s",
+)
+
+
+@pytest.mark.slow
+def test_as_a_model_it_tells_its_errors_and_agrees_with_the_linear_rest(monkeypatch):
+    monkeypatch.setattr(hyperelastic, "OWN_STEPS", 20)
+    scene = read_scene("block", ('models=["hyperelastic"]', *SCENE))
+    problem = problem_of(scene)
+    (one,) = models_of(scene, {})
+    prepared = one.prepare(problem)
+    prepared.refuse()
+    found = prepared.run(SILENT)
+    elements = found.record.elements
+    force = elements.contact.forces["tool"]
+    assert elements.law == "neo-hookean"
+    assert 0.0 < force.by_mesh < 0.5
+    assert 0.0 < force.by_steps < 0.1
+    assert force.by_subspace is None
+    peak = problem.observation.frames[0]
+    linear = at_peak(prepared.best.body, problem.rigid_tools, problem.observation).forces[0]
+    moved = found.trajectory.tool_force[peak, 0]
+    assert np.linalg.norm(moved - linear) < force.by_mesh * np.linalg.norm(linear)
