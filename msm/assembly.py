@@ -15,6 +15,7 @@ from msm import lattice as cells
 from msm import volume as volumes
 from msm.calibration import SPRING_POISSON_RATIO, lame
 from msm.damping import UNDAMPED, NodalDamping
+from msm.graded import GradedLattice
 from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
@@ -138,7 +139,7 @@ def of_tissue(assembly: Assembly, material: Material, modulus: float) -> tuple[A
         return assembly, material
     found = made.moduli(Tissue(youngs_modulus=modulus, poisson_ratio=nu), one_ratio=term is None)
     springs = assembly.connect(found.shear / lame(modulus, nu)[1])
-    if term is not None and isinstance(assembly.lattice, CellLattice):
+    if term is not None and isinstance(assembly.lattice, CellLattice | GradedLattice):
         term = volumes.of_cells(assembly.lattice, found.lame - found.shear, nu)
     return replace(assembly, springs=springs), replace(material, volume=term)
 
@@ -151,17 +152,26 @@ def assemble_graded(
     foundation: Support,
     tool: ToolPatch,
     flexion: float = 0.0,
+    tissue: Tissue | None = None,
 ) -> Assembly:
-    """Graded lattice over the body. ValueError if empty, not held, or not touched by the tool."""
+    """Graded lattice over the body. ValueError if empty, not held, or not touched by the tool.
+
+    `density` and `tissue` as in `assemble`.
+    """
     lattice = graded.build(body, *_box(surface), grading)
     weights, _ = lattice.interpolation(surface.points)
-    return Assembly(
+    made = cells.composed(lattice, tissue)
+    densities = np.full(len(lattice.fill), density) if made is None else made.density(density)
+    whole = Assembly(
         lattice,
         graded.springs(lattice, flexion),
-        graded.node_masses(lattice, density),
+        graded.node_masses(lattice, densities),
         *contact(weights, surface, foundation, tool),
+        made,
+        partial(graded.springs, lattice, flexion),
         masters=lattice.masters if lattice.hanging else None,
     )
+    return held(whole, weights, surface, foundation)
 
 
 def _box(surface: SurfaceRule) -> tuple[Floats, Floats]:

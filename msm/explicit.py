@@ -42,10 +42,10 @@ def symplectic_euler(
                 pushed = force[i, d] + factors[n, 0] * net.load[i, d]
                 v[i, d] = kept * v[i, d] + share * pushed
                 u[i, d] += dt * v[i, d]
-        interpolate_both(net, u, v)
         stop_at_tools(net.outer, factors[n], dt, u.T, v.T)
         hold(net.fixed, u)
         hold(net.fixed, v)
+        interpolate_both(net, u, v)
 
 
 @kernel(nogil=True)

@@ -21,7 +21,7 @@ from scipy.spatial import KDTree
 
 from msm.hanging import hanging_nodes
 from msm.kinematics import inverted_cells
-from msm.lattice import CORNERS, CellLattice, interpolation, node_volumes
+from msm.lattice import CORNERS, CellLattice, at_nodes, interpolation
 from msm.octree import Grading, Leaves, leaves
 from msm.springs import Springs, connect
 from study.organ.occupancy import SolidShape
@@ -57,6 +57,16 @@ class GradedLattice:
     def cells(self) -> Ints:
         """Node numbers (c, 8), corners in the order of CORNERS, the finest cells first."""
         return np.concatenate([one.cells for one in self.levels])
+
+    @property
+    def origin(self) -> Floats:
+        """Lower corner [m] (3,) of the box of the cells."""
+        return self.levels[0].origin
+
+    @property
+    def index(self) -> Ints:
+        """Where each cell lies (c, 3), in edges of its own, from the origin."""
+        return np.concatenate([one.index for one in self.levels])
 
     @property
     def edges(self) -> Floats:
@@ -169,13 +179,20 @@ def _ties(level: int, of: Leaves, used: Ints, strides: Ints) -> Iterator[tuple[I
             yield node[there], np.searchsorted(used, ((lowest + half * corner) @ strides)[there])
 
 
-def springs(lattice: GradedLattice, flexion: float = 0.0) -> Springs:
-    """Springs of all cells, relative to k_ref at the finest edge; `flexion` as in `msm.springs`.
+def springs(
+    lattice: GradedLattice, flexion: float = 0.0, stiffness: Floats | None = None
+) -> Springs:
+    """Springs of all cells, relative to k_ref at the finest edge.
 
-    Flexion springs span cells of one size.
+    `flexion` and `stiffness` (c,) as in `msm.springs`; flexion springs span cells of one size.
     """
-    parts = [connect(one, flexion) for one in lattice.levels if len(one.cells)]
+    shares = _by_level(lattice, np.ones(len(lattice.edges)) if stiffness is None else stiffness)
     levels = [one for one in lattice.levels if len(one.cells)]
+    parts = [
+        connect(one, flexion, stiffness=share)
+        for one, share in zip(lattice.levels, shares, strict=True)
+        if len(one.cells)
+    ]
     ends = np.concatenate([one.ends for one in parts])
     rest = np.concatenate([one.rest for one in parts])
     weight = np.concatenate(
@@ -188,7 +205,16 @@ def springs(lattice: GradedLattice, flexion: float = 0.0) -> Springs:
     return Springs(ends[order], rest[order], weight[order])
 
 
-def node_masses(lattice: GradedLattice, density: float) -> Floats:
-    """Mass [kg] (n,) of the nodes, that of hanging ones with their masters."""
-    volumes = sum(node_volumes(one) for one in lattice.levels)
-    return np.asarray(density * (lattice.masters.T @ volumes))
+def _by_level(lattice: GradedLattice, values: Floats) -> list[Floats]:
+    """Values (c,) of all cells, by their size."""
+    return np.split(values, np.cumsum([len(one.cells) for one in lattice.levels])[:-1])
+
+
+def node_masses(lattice: GradedLattice, density: Floats) -> Floats:
+    """Mass [kg] (n,) of the nodes, that of hanging ones with their masters.
+
+    `density` [kg/m^3] (c,): of what each cell is made of.
+    """
+    filled = _by_level(lattice, lattice.fill * density)
+    masses = sum(at_nodes(one, share) for one, share in zip(lattice.levels, filled, strict=True))
+    return np.asarray(lattice.masters.T @ masses)

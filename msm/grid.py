@@ -1,11 +1,15 @@
-"""A cubic lattice as a regular grid: neighbours at constant offsets, read in blocks of lanes.
+"""A lattice as regular grids: neighbours at constant offsets, read in blocks of lanes.
 
-The nodes of the organ's bounding box are numbered along its longest axis first. A block is as many
-nodes in a row of that numbering as a vector has lanes; only blocks that hold a node of the lattice
-are kept, so rows are trimmed to the organ. Springs are sorted by direction, each with the node of
-its lower number: of all springs of one direction the other end lies equally far ahead. What a block
-needs, weights of springs included, stands together; a spring or node that the lattice does not have
-has no weight.
+A cubic lattice is one grid, one of cells of several sizes a grid for each. The nodes of a grid's
+box are numbered along its longest axis first. A block is as many nodes in a row of that numbering
+as a vector has lanes; only blocks that hold a node are kept, so rows are trimmed to the organ.
+Springs are sorted by direction, each with the node of its lower number: of all springs of one
+direction the other end lies equally far ahead. What a block needs, weights of springs included,
+stands together; a spring or node that the lattice does not have has no weight.
+
+A node at which sizes meet stands in a grid of each. One of these places has its mass; the others,
+as all of a node that hangs, follow the places of the nodes that move them, and give them their
+forces (`msm.grid_joints`).
 """
 
 from __future__ import annotations
@@ -15,6 +19,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.graded import GradedLattice
+from msm.grid_joints import Joints
+from msm.grid_parts import Part, by_size, joined, whole
 from msm.lattice import CORNERS, CellLattice, LatticeMesh
 from msm.network import Network
 from msm.outer import Outer, placed
@@ -30,9 +37,9 @@ MOST_COUPLINGS = 125
 class Grid(NamedTuple):
     """What the kernels of a grid read, and the motion that they work on.
 
-    With m places of the box, b blocks of l lanes and s directions: `lanes`, see `msm.simd`; their
-    precision is that of all arrays of reals. `place` (n,): of each node. `u` [m], `v` [m/s],
-    `force` [N], each (3, m).
+    With m places, b blocks of l lanes and s directions: `lanes`, see `msm.simd`; their precision is
+    that of all arrays of reals. `u` [m], `v` [m/s], `force` [N], each (3, m), of all grids of a
+    lattice.
 
     Springs: first place `start` (b,) of each block; `offset` (s,), `rest` [m] (s, 3), `length` [m]
     and `per_length` [1/m], each (s,), of each direction; `weight` (b s, l), relative to k_ref.
@@ -40,12 +47,11 @@ class Grid(NamedTuple):
     `spacing` [m]. Foundation: `held_start`, `held_offset`, `held` [N/m]. Nodes, each (b, l):
     `mass`, `gamma_0`, `gamma_1` as in `Network`, `kept` and `share`, which integrators fill;
     `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement. `beta`
-    [s], `linear` and `outer` as in `Network`, but None for no: kernels are compiled without what is
-    not wanted. `fixed` (f, 2): component and place of what does not move.
+    [s] and `linear` as in `Network`, but None for no: kernels are compiled without what is not
+    wanted.
     """
 
     lanes: Lanes
-    place: Ints
     u: Floats
     v: Floats
     force: Floats
@@ -71,117 +77,111 @@ class Grid(NamedTuple):
     uneven: bool
     beta: float | None
     linear: Literal[True] | None
+
+
+class Grids(NamedTuple):
+    """A lattice as `grids`, one for each size of its cells, whose motion is in the same arrays.
+
+    `place` (n,): of each node. `joints`: how the grids move each other, None for a single one.
+    `fixed` (f, 2): component and place of what does not move. `outer` as in `Network`.
+    """
+
+    grids: tuple[Grid, ...]
+    place: Ints
+    joints: Joints | None
     fixed: Ints
     outer: Outer | None
 
 
-def grid_of(
+def grids_of(
     lattice: LatticeMesh, net: Network, width: int | None = None, *, single: bool = False
-) -> Grid | None:
-    """The grid of a network on a lattice, with lanes as the processor has; None if it is no grid.
+) -> Grids | None:
+    """The grids of a network on a lattice, with lanes as the processor has; None if it has none.
 
-    That is one on tetrahedra, with springs or cells of their own rest, or with a foundation that
-    couples nodes far apart. `single`: in single precision, of which the processor takes twice as
-    many at once.
+    That is one on tetrahedra, with springs or cells of their own rest, or, of one size of cells,
+    with a foundation that couples nodes far apart. `single`: in single precision, of which the
+    processor takes twice as many at once.
     """
-    if not isinstance(lattice, CellLattice) or net.is_strained:
-        return None
-    index, strides, count = _numbering(lattice)
-    held = _couplings(net, index @ strides)
-    if len(held.offset) > MOST_COUPLINGS:
+    if not isinstance(lattice, CellLattice | GradedLattice) or net.is_strained:
         return None
     width = width or (2 * widest() if single else widest())
-    springs, rest = _springs(net, index, strides)
-    length = np.linalg.norm(rest, axis=1)
-    reach = max(np.abs(found).max(initial=0) for found in (springs.offset, held.offset))
-    margin = int(max(reach, strides.sum())) + width
-    place = margin + index @ strides
+    parts = [whole(lattice, net)] if isinstance(lattice, CellLattice) else by_size(lattice, net)
+    if any(len(part.held.offset) > MOST_COUPLINGS for part in parts):
+        return None
+    place, first = [], 0
+    for part in parts:
+        margin = part.reach + width
+        place.append(first + margin + part.numbers)
+        first += part.count + 2 * margin
+    motion = np.zeros((3, 3, first))
+    primary = np.zeros(len(net.mass), dtype=np.int64)
+    for part, at in reversed(list(zip(parts, place, strict=True))):
+        primary[part.node] = at  # in the smallest cells that have it, which own it
+    grids = Grids(
+        tuple(
+            _grid(part, net, at, motion, width, single=single)
+            for part, at in zip(parts, place, strict=True)
+        ),
+        primary,
+        None if len(parts) == 1 else joined(parts, place, primary, net),
+        np.stack([net.fixed[:, 1], primary[net.fixed[:, 0]]], axis=1).astype(np.int64),
+        None if net.outer is None else placed(net.outer, primary),
+    )
+    return _in_single(grids) if single else grids
+
+
+def _grid(
+    part: Part, net: Network, place: Ints, motion: Floats, width: int, *, single: bool
+) -> Grid:
+    """The grid of a part whose nodes stand at places (k,) of the motion."""
+    springs, held, owned = part.springs, part.held, part.owned
     blocks = _Blocks(place, width)
-    cells = _Blocks(place[net.cells[:, 0]], width)
+    cells = _Blocks(place[part.lowest], width)
     supports = _Blocks(place[held.node], width)
-    u, v, force = np.zeros((3, 3, count + 2 * margin))
-    grid = Grid(
+    length = np.linalg.norm(part.rest, axis=1)
+    own, node = place[owned], part.node[owned]
+    u, v, force = motion
+    return Grid(
         lanes=lanes_of(width, single=single),
-        place=place,
         u=u,
         v=v,
         force=force,
         start=blocks.start,
         offset=springs.offset,
-        rest=rest,
+        rest=part.rest,
         length=length,
         per_length=1.0 / length,
         weight=blocks.rows(place[springs.node], springs.which, springs.value, len(springs.offset)),
         cell_start=cells.start,
-        corner=CORNERS @ strides,
-        bulk=cells.rows(cells.place, 0, net.bulk),
-        spacing=net.spacing,
+        corner=CORNERS @ part.strides,
+        bulk=cells.rows(cells.place, 0, net.bulk[part.cells]),
+        spacing=float(part.spacing),
         held_start=supports.start,
         held_offset=held.offset,
         held=supports.rows(supports.place, held.which, held.value, len(held.offset)),
-        mass=blocks.rows(place, 0, net.mass, without=1.0),
-        gamma_0=blocks.rows(place, 0, net.gamma_0),
-        gamma_1=blocks.rows(place, 0, net.gamma_1),
-        kept=blocks.rows(place, 0, 0.0),
-        share=blocks.rows(place, 0, 0.0),
-        load=blocks.rows(place[:, None], np.arange(3), net.load, 3),
+        mass=blocks.rows(own, 0, net.mass[node], without=1.0),
+        gamma_0=blocks.rows(own, 0, net.gamma_0[node]),
+        gamma_1=blocks.rows(own, 0, net.gamma_1[node]),
+        kept=blocks.rows(own, 0, 0.0),
+        share=blocks.rows(own, 0, 0.0),
+        load=blocks.rows(own[:, None], np.arange(3), net.load[node], 3),
         uneven=bool(net.gamma_1.any()),
         beta=net.beta or None,
         linear=True if net.linear else None,
-        fixed=np.stack([net.fixed[:, 1], place[net.fixed[:, 0]]], axis=1).astype(np.int64),
-        outer=None if net.outer is None else placed(net.outer, place),
     )
-    return _rounded(grid) if single else grid
+
+
+def _in_single(of: Grids) -> Grids:
+    """All arrays of reals of the grids in single precision."""
+    return of._replace(grids=tuple(_rounded(grid) for grid in of.grids))
 
 
 def _rounded(grid: Grid) -> Grid:
-    """All arrays of reals in single precision."""
     return Grid._make(_single(x) if isinstance(x, np.ndarray) else x for x in grid)
 
 
 def _single(x: NDArray[Any]) -> NDArray[Any]:
     return x.astype(np.float32) if x.dtype == np.float64 else x
-
-
-def _numbering(lattice: CellLattice) -> tuple[Ints, Ints, int]:
-    """Where the nodes stand in their box (n, 3), how far the next one is along each axis, and m."""
-    index = np.rint((lattice.nodes - lattice.origin) / lattice.spacing).astype(np.int64)
-    index -= index.min(axis=0)
-    counts = index.max(axis=0) + 1
-    strides = np.ones(3, dtype=np.int64)
-    first, second, third = np.argsort(-counts, kind="stable")
-    strides[second] = counts[first]
-    strides[third] = counts[first] * counts[second]
-    return index, strides, int(counts.prod())
-
-
-class _Pairs(NamedTuple):
-    """Pairs of nodes by direction: the first node, which direction, a value; offsets of those."""
-
-    node: Ints
-    which: Ints
-    value: Floats
-    offset: Ints
-
-
-def _springs(net: Network, index: Ints, strides: Ints) -> tuple[_Pairs, Floats]:
-    """The springs from their ends of lower number, and the rest vector [m] of each direction."""
-    ends = net.ends.astype(np.int64)
-    apart = index[ends[:, 1]] - index[ends[:, 0]]
-    ahead = apart @ strides > 0
-    node = np.where(ahead, ends[:, 0], ends[:, 1])
-    steps, which = np.unique(np.where(ahead, 1, -1)[:, None] * apart, axis=0, return_inverse=True)
-    weight = net.scale / net.length
-    return _Pairs(node, which.ravel(), weight, steps @ strides), net.spacing * steps
-
-
-def _couplings(net: Network, number: Ints) -> _Pairs:
-    """The entries of the foundation, by how far ahead of the row's node the column's stands."""
-    counts = net.row[1:].astype(np.int64) - net.row[:-1].astype(np.int64)
-    node = np.repeat(np.arange(len(number)), counts)
-    ahead = number[net.column.astype(np.int64)] - number[node]
-    offset, which = np.unique(ahead, return_inverse=True)
-    return _Pairs(node, which, net.value, offset)
 
 
 class _Blocks:

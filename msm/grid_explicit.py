@@ -1,6 +1,6 @@
-"""The explicit integrators of `msm.explicit` over a regular grid, compiled.
+"""The explicit integrators of `msm.explicit` over regular grids, compiled.
 
-Each takes the motion (n, 3) of the nodes into the grid, takes its steps there and gives it back.
+Each takes the motion (n, 3) of the nodes into the grids, takes its steps there and gives it back.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.forces import hold
-from msm.grid import Grid
+from msm.grid import Grid, Grids
 from msm.grid_forces import add_internal_forces, add_stiffness_damping, damping
+from msm.grid_joints import add_joint_foundation, follow, share_out
 from msm.kernel import inner_kernel, kernel
 from msm.outer import add_outer_forces, stop_at_tools
 from msm.simd import every, load, store
@@ -21,92 +22,130 @@ Floats = NDArray[np.float64]
 
 
 @kernel(nogil=True)
-def symplectic_euler(
-    law: Any, grid: Grid, factors: Floats, dt: float, u: Floats, v: Floats
-) -> None:
+def symplectic_euler(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """V += dt a(u), damped at the end; then u += dt v. Load at the end of the step."""
-    take_in(grid, u, v)
-    set_shares(grid, dt)
+    take_in(of, u, v)
+    moving = of.grids[0]
+    for grid in of.grids:
+        set_shares(grid, dt)
     for n in range(factors.shape[0]):
-        add_internal_forces(law, grid, grid.u, grid.force)
-        add_outer_forces(grid.outer, factors[n], 0, grid.force)
-        add_stiffness_damping(law, grid, grid.beta, grid.u, grid.v, grid.force)
-        if grid.uneven:
-            set_shares(grid, dt)
-        kick_and_drift(grid, factors[n, 0], dt)
-        stop_at_tools(grid.outer, factors[n], dt, grid.u, grid.v)
-        hold(grid.fixed, grid.u)
-        hold(grid.fixed, grid.v)
-    give_back(grid, u, v)
+        add_forces(law, of, factors[n], 0, moving.u)
+        add_damping(law, of, moving.beta)
+        for grid in of.grids:
+            if grid.uneven:
+                set_shares(grid, dt)
+            kick_and_drift(grid, factors[n, 0], dt)
+        stop_at_tools(of.outer, factors[n], dt, moving.u, moving.v)
+        hold(of.fixed, moving.u)
+        hold(of.fixed, moving.v)
+        follow_all(of)
+    give_back(of, u, v)
 
 
 @kernel(nogil=True)
-def velocity_verlet(law: Any, grid: Grid, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
+def velocity_verlet(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Half a kick, a drift, half a kick; damping implicit in the first half, explicit after."""
-    take_in(grid, u, v)
-    set_shares(grid, 0.5 * dt)
-    add_internal_forces(law, grid, grid.u, grid.force)
+    take_in(of, u, v)
+    moving = of.grids[0]
+    for grid in of.grids:
+        set_shares(grid, 0.5 * dt)
+    if factors.shape[0] > 0:
+        add_forces(law, of, factors[0], 0, moving.u)
     for n in range(factors.shape[0]):
-        if n == 0:
-            add_outer_forces(grid.outer, factors[n], 0, grid.force)
-        if grid.uneven:
-            set_shares(grid, 0.5 * dt)
-        kick_and_drift(grid, factors[n, 0], dt)
-        add_internal_forces(law, grid, grid.u, grid.force)
-        add_outer_forces(grid.outer, factors[n], 1, grid.force)
-        kick_again(grid, factors[n, 1], 0.5 * dt)
-    give_back(grid, u, v)
+        for grid in of.grids:
+            if grid.uneven:
+                set_shares(grid, 0.5 * dt)
+            kick_and_drift(grid, factors[n, 0], dt)
+        follow_all(of)
+        add_forces(law, of, factors[n], 1, moving.u)
+        for grid in of.grids:
+            kick_again(grid, factors[n, 1], 0.5 * dt)
+        follow(of.joints, moving.v)
+    give_back(of, u, v)
 
 
 @kernel(nogil=True)
-def runge_kutta_4(law: Any, grid: Grid, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
+def runge_kutta_4(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """The classical four stages."""
-    take_in(grid, u, v)
-    at, speed = grid.u.copy(), grid.v.copy()
+    take_in(of, u, v)
+    moving = of.grids[0]
+    at, speed = moving.u.copy(), moving.v.copy()
     du, dv = np.zeros_like(at), np.zeros_like(at)
     for n in range(factors.shape[0]):
         for stage in range(4):
             weight = dt / 6.0 if stage in (0, 3) else dt / 3.0
             ahead = 0.5 * dt if stage < 2 else dt
-            add_internal_forces(law, grid, at, grid.force)
-            add_outer_forces(grid.outer, factors[n], (stage + 1) // 2, grid.force)
-            for b in range(grid.start.shape[0]):
-                c, i = damping(grid, at, b), grid.start[b]
-                for d in range(3):
-                    moving = load(speed, d, i, grid.lanes)
-                    pushed = pushes(grid, b, d, factors[n, (stage + 1) // 2]) - c * moving
-                    rate = pushed / load(grid.mass, b, 0, grid.lanes)
-                    add_to(grid, du, d, i, weight * moving)
-                    add_to(grid, dv, d, i, weight * rate)
-                    store(at, d, i, load(grid.u, d, i, grid.lanes) + ahead * moving)
-                    store(speed, d, i, load(grid.v, d, i, grid.lanes) + ahead * rate)
-                    store(grid.force, d, i, every(0.0, grid.lanes))
-        finish(grid, at, speed, du, dv)
-    give_back(grid, u, v)
+            add_forces(law, of, factors[n], (stage + 1) // 2, at)
+            for grid in of.grids:
+                factor = factors[n, (stage + 1) // 2]
+                take_stage(grid, factor, weight, ahead, at, speed, du, dv)
+            follow(of.joints, at)
+            follow(of.joints, speed)
+        for grid in of.grids:
+            finish(grid, du, dv)
+        follow_all(of)
+        at[:], speed[:] = moving.u, moving.v
+    give_back(of, u, v)
 
 
 @inner_kernel()
-def take_in(grid: Grid, u: Floats, v: Floats) -> None:
-    """Set the motion in the grid to that of the nodes, beyond them to rest, forces to zero."""
-    none = every(0.0, grid.lanes)
-    for b in range(grid.start.shape[0]):
-        for d in range(3):
-            store(grid.u, d, grid.start[b], none)
-            store(grid.v, d, grid.start[b], none)
-            store(grid.force, d, grid.start[b], none)
-    for n in range(grid.place.shape[0]):
-        for d in range(3):
-            grid.u[d, grid.place[n]] = u[n, d]
-            grid.v[d, grid.place[n]] = v[n, d]
+def add_forces(law: Any, of: Grids, row: Floats, stage: int, u: Floats) -> None:
+    """Add all forces [N] on the nodes displaced by u (3, m), but those of the first load."""
+    force = of.grids[0].force
+    for grid in of.grids:
+        add_internal_forces(law, grid, u, force)
+    add_joint_foundation(of.joints, u, 1.0, force)
+    add_outer_forces(of.outer, row, stage, force)
+    share_out(of.joints, force)
+    hold(of.fixed, force)
 
 
 @inner_kernel()
-def give_back(grid: Grid, u: Floats, v: Floats) -> None:
-    """Set the motion of the nodes to that in the grid."""
-    for n in range(grid.place.shape[0]):
+def add_damping(law: Any, of: Grids, beta: float | None) -> None:
+    """Add the stiffness part of Rayleigh damping [N], if there is one."""
+    if beta is None:
+        return
+    moving = of.grids[0]
+    for grid in of.grids:
+        add_stiffness_damping(law, grid, beta, moving.u, moving.v, moving.force)
+    add_joint_foundation(of.joints, moving.v, beta, moving.force)
+    share_out(of.joints, moving.force)
+    hold(of.fixed, moving.force)
+
+
+@inner_kernel()
+def follow_all(of: Grids) -> None:
+    """Set the motion of what follows others."""
+    follow(of.joints, of.grids[0].u)
+    follow(of.joints, of.grids[0].v)
+
+
+@inner_kernel()
+def take_in(of: Grids, u: Floats, v: Floats) -> None:
+    """Set the motion in the grids to that of the nodes, beyond them to rest, forces to zero."""
+    for grid in of.grids:
+        none = every(0.0, grid.lanes)
+        for b in range(grid.start.shape[0]):
+            for d in range(3):
+                store(grid.u, d, grid.start[b], none)
+                store(grid.v, d, grid.start[b], none)
+                store(grid.force, d, grid.start[b], none)
+    moving = of.grids[0]
+    for n in range(of.place.shape[0]):
         for d in range(3):
-            u[n, d] = grid.u[d, grid.place[n]]
-            v[n, d] = grid.v[d, grid.place[n]]
+            moving.u[d, of.place[n]] = u[n, d]
+            moving.v[d, of.place[n]] = v[n, d]
+    follow_all(of)
+
+
+@inner_kernel()
+def give_back(of: Grids, u: Floats, v: Floats) -> None:
+    """Set the motion of the nodes to that in the grids."""
+    moving = of.grids[0]
+    for n in range(of.place.shape[0]):
+        for d in range(3):
+            u[n, d] = moving.u[d, of.place[n]]
+            v[n, d] = moving.v[d, of.place[n]]
 
 
 @inner_kernel()
@@ -158,15 +197,41 @@ def kick_again(grid: Grid, factor: float, half: float) -> None:
 
 
 @inner_kernel()
-def finish(grid: Grid, at: Floats, speed: Floats, du: Floats, dv: Floats) -> None:
-    """End a step of Runge-Kutta: move on, and set the first stage of the next one."""
+def take_stage(
+    grid: Grid,
+    factor: float,
+    weight: float,
+    ahead: float,
+    at: Floats,
+    speed: Floats,
+    du: Floats,
+    dv: Floats,
+) -> None:
+    """Add a stage of Runge-Kutta to the sums, and go to where the next one is; forces are used up.
+
+    Velocities first move the displacement and are then moved themselves.
+    """
+    for b in range(grid.start.shape[0]):
+        c, i = damping(grid, at, b), grid.start[b]
+        for d in range(3):
+            moving = load(speed, d, i, grid.lanes)
+            pushed = pushes(grid, b, d, factor) - c * moving
+            rate = pushed / load(grid.mass, b, 0, grid.lanes)
+            add_to(grid, du, d, i, weight * moving)
+            add_to(grid, dv, d, i, weight * rate)
+            store(at, d, i, load(grid.u, d, i, grid.lanes) + ahead * moving)
+            store(speed, d, i, load(grid.v, d, i, grid.lanes) + ahead * rate)
+            store(grid.force, d, i, every(0.0, grid.lanes))
+
+
+@inner_kernel()
+def finish(grid: Grid, du: Floats, dv: Floats) -> None:
+    """End a step of Runge-Kutta: move on by the sums, which begin anew."""
     none = every(0.0, grid.lanes)
     for b in range(grid.start.shape[0]):
         i = grid.start[b]
         for d in range(3):
             add_to(grid, grid.u, d, i, load(du, d, i, grid.lanes))
             add_to(grid, grid.v, d, i, load(dv, d, i, grid.lanes))
-            store(at, d, i, load(grid.u, d, i, grid.lanes))
-            store(speed, d, i, load(grid.v, d, i, grid.lanes))
             store(du, d, i, none)
             store(dv, d, i, none)

@@ -18,7 +18,7 @@ from numba.core import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from msm.forces import cofactors, corner_shares, hold
+from msm.forces import cofactors, corner_shares
 from msm.grid import Grid
 from msm.kernel import inner_kernel
 from msm.kinematics import dot, slopes
@@ -36,7 +36,6 @@ def add_internal_forces(law: Any, grid: Grid, u: Floats, force: Floats) -> None:
     add_spring_forces(law, grid, grid.linear, u, force)
     add_volume_forces(grid, grid.linear, u, force)
     add_foundation_forces(grid, u, 1.0, force)
-    hold(grid.fixed, force)
 
 
 @inner_kernel()
@@ -49,7 +48,6 @@ def add_stiffness_damping(
     add_spring_damping(law, grid, grid.linear, beta, u, v, force)
     add_volume_damping(grid, grid.linear, beta, u, v, force)
     add_foundation_forces(grid, v, beta, force)
-    hold(grid.fixed, force)
 
 
 @inner_kernel(inline="always")

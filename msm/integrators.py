@@ -21,7 +21,7 @@ class Integrator(NamedTuple):
     c dt / m = `damping` for damping alone. With `implicit_volume`, omega is that of the network
     without its volume term. With `linear_only` it takes linear springs only; only with
     `stiffness_damping` it takes the stiffness part of Rayleigh damping. `on_grid`: the same with a
-    `msm.grid.Grid` for the network, if there is one; on cubic lattices it is taken for `advance`.
+    `msm.grid.Grids` for the network, if there is one; on cubic cells it is taken for `advance`.
     """
 
     order: int

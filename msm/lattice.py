@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from msm.kinematics import inverted_cells
 from study.organ.occupancy import SolidShape
 from study.problem.tissue import Tissue
 from study.problem.varied import Composition, composition
+
+if TYPE_CHECKING:
+    from msm.graded import GradedLattice
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -135,7 +138,7 @@ def at_nodes(lattice: CellLattice, density: Floats) -> Floats:
     return volumes.astype(np.float64)
 
 
-def composed(lattice: CellLattice, tissue: Tissue | None) -> Composition | None:
+def composed(lattice: CellLattice | GradedLattice, tissue: Tissue | None) -> Composition | None:
     """What each cell is made of, were it whole; None for tissue that is the same everywhere.
 
     From as many points of each cell as tell how full it is.
@@ -144,8 +147,8 @@ def composed(lattice: CellLattice, tissue: Tissue | None) -> Composition | None:
     inside = np.stack(np.meshgrid(*[(np.arange(s) + 0.5) / s] * 3, indexing="ij"), axis=-1)
 
     def points(cells: slice) -> Floats:
-        corners = lattice.index[cells][:, None, :]
-        return np.asarray(lattice.origin + lattice.spacing * (corners + inside.reshape(-1, 3)))
+        corners, edges = lattice.index[cells][:, None, :], lattice.edges[cells][:, None, None]
+        return np.asarray(lattice.origin + edges * (corners + inside.reshape(-1, 3)))
 
     return composition(tissue, len(lattice.cells), points)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material, arrays, assemble, of_tissue
 from msm.checkpoint import Checkpoint, Keeper, identity, program
+from msm.grid import Grid
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
@@ -19,7 +20,7 @@ from msm.linearised import largest_strain
 from msm.network import Network
 from msm.stability import DEFAULT, Follower, critical_time_step
 from msm.statics import static_displacement
-from msm.stepper import LatticeStepper, grid_for, refuse_unfit
+from msm.stepper import LatticeStepper, grids_for, refuse_unfit
 from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
@@ -137,8 +138,12 @@ def _identity(
     body = assembly.lattice.nodes, stepper.law, stepper.net, stepper.start, _driven(stepper, times)
     runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
     # Which round differently.
-    lanes = () if stepper.grid is None else (stepper.grid.u.dtype.name, len(stepper.grid.lanes))
+    lanes = () if stepper.grids is None else _lanes(stepper.grids.grids[0])
     return identity(runs, lanes, body, integrator, step, seen, history)
+
+
+def _lanes(grid: Grid) -> tuple[str, int]:
+    return grid.u.dtype.name, len(grid.lanes)
 
 
 def _driven(stepper: LatticeStepper, times: Floats) -> Floats:
@@ -177,7 +182,7 @@ def refuse(
     refuse_unfit(integrator, material, assembly.burden)
     net = arrays(assembly, material, linear=linear)
     if single:  # else there is nothing to refuse, and a grid takes a while
-        grid_for(assembly.lattice, net, integrator, single=True)
+        grids_for(assembly.lattice, net, integrator, single=True)
     follower = Follower(material.law, net, INTEGRATORS[integrator])
     _pace(step, observation, follower.limit(np.zeros_like(net.load)))
 

@@ -24,6 +24,7 @@ from msm.damping import NodalDamping
 from msm.integrators import INTEGRATORS
 from msm.laws import Hooke
 from msm.network import Network, network
+from msm.outer import Burden, Outer
 from msm.springs import Springs
 from msm.stability import longest_step
 from msm.statics import TOLERANCE, extended, solved, stiffness_at_rest
@@ -43,12 +44,14 @@ class ReducedLattice:
     """A lattice, linear about rest, among the modes of a few vectors.
 
     `shapes` (n, 3, m): displacement of the nodes by mode, of modal mass 1 kg; `squares` [1/s^2]
-    (m,): squared angular frequencies; `load` (m,): the full load along each mode.
+    (m,): squared angular frequencies; `load` (m,): the full load along each mode, `others`
+    (loads, m) the further ones.
     """
 
     shapes: Floats
     squares: Floats
     load: Floats
+    others: Floats
 
     def displacement(self, coordinates: Floats) -> Floats:
         """Displacement [m] (n, 3) of the nodes at modal coordinates (m,)."""
@@ -59,8 +62,8 @@ class ReducedLattice:
 def ritz_vectors(assembly: Assembly, material: Material, count: int) -> Floats:
     """At most `count` load-dependent Ritz vectors (3 n, m), orthonormal in the mass.
 
-    Fewer where these span all that the load moves. ValueError if the support does not hold the
-    lattice.
+    Of several loads each has its own sequence, and these take turns. Fewer where these span all
+    that the loads move. ValueError if the support does not hold the lattice.
     """
     return np.column_stack(list(islice(_ritz_vectors(assembly, material), max(count, 1))))
 
@@ -68,14 +71,23 @@ def ritz_vectors(assembly: Assembly, material: Material, count: int) -> Floats:
 def _ritz_vectors(assembly: Assembly, material: Material) -> Iterator[Floats]:
     mass, stiffness = np.repeat(assembly.mass, 3), stiffness_at_rest(assembly, material)
     found = np.zeros((len(mass), 0))
-    pushed, tolerance = assembly.load.ravel(), TOLERANCE
-    while found.shape[1] < len(mass):
-        vector = _new_direction(solved(stiffness, pushed, tolerance), found, mass)
-        if vector is None:
-            return
-        yield vector
-        found = np.column_stack([found, vector])
-        pushed, tolerance = mass * vector, LOOSE
+    pushed, tolerance = [assembly.load.ravel(), *_further_loads(assembly)], TOLERANCE
+    while pushed and found.shape[1] < len(mass):
+        following = []
+        for load in pushed:
+            vector = _new_direction(solved(stiffness, load, tolerance), found, mass)
+            if vector is not None:  # else the others span what this load moves
+                yield vector
+                found = np.column_stack([found, vector])
+                following.append(mass * vector)
+        pushed, tolerance = following, LOOSE
+
+
+def _further_loads(assembly: Assembly) -> Floats:
+    """Loads [N] (loads, 3 n) beside the first."""
+    if assembly.burden is None:
+        return np.zeros((0, assembly.load.size))
+    return assembly.burden.loads.reshape(-1, assembly.load.size)
 
 
 def _new_direction(vector: Floats, found: Floats, mass: Floats) -> Floats | None:
@@ -92,15 +104,15 @@ def reduced(assembly: Assembly, material: Material, vectors: Floats) -> ReducedL
     pushed = stiffness_at_rest(assembly, material) @ vectors
     squares, modes = eigh(vectors.T @ pushed)
     shapes = extended(assembly, np.asarray(vectors @ modes))
-    load = shapes.T @ assembly.load.ravel()
-    return ReducedLattice(shapes.reshape(-1, 3, len(squares)), squares, load)
+    load, others = shapes.T @ assembly.load.ravel(), _further_loads(assembly) @ shapes
+    return ReducedLattice(shapes.reshape(-1, 3, len(squares)), squares, load, others)
 
 
 class ReducedMotion:
     """The motion of a reduced lattice, from rest, under the load times `factor` of the time [s].
 
-    `t` [s]: where it is. It is stepped by an integrator of lattices; where a step is longer than
-    the integrator takes these modes, equal parts of it are.
+    `further`: factors of the other loads. `t` [s]: where it is. It is stepped by an integrator of
+    lattices; where a step is longer than the integrator takes these modes, equal parts of it are.
     """
 
     def __init__(
@@ -109,9 +121,15 @@ class ReducedMotion:
         damping: NodalDamping,
         factor: Callable[[Floats], Floats],
         integrator: str,
+        further: tuple[Callable[[Floats], Floats], ...] = (),
     ) -> None:
         self.method, self.factor = INTEGRATORS[integrator], factor
         self.law, self.net = Hooke(1.0), mass_points(lattice, damping)
+        self.burden = _burden(lattice, further) if further else None
+        if self.burden is not None:
+            stages, place = len(self.method.at), np.arange(len(lattice.squares))
+            given = self.burden.dead, self.burden.loads, stages, self.burden.width
+            self.net = self.net._replace(outer=Outer(place, *given, None))
         self.u, self.v = np.zeros_like(self.net.load), np.zeros_like(self.net.load)
         self.t = 0.0
         fastest = float(np.sqrt(lattice.squares.max()))
@@ -133,12 +151,22 @@ class ReducedMotion:
         step = dt / parts
         starts = np.asarray(self.t + step * np.arange(count * parts), dtype=np.float64)
         factors = np.stack([self.factor(starts + at * step) for at in self.method.at], axis=1)
+        if self.burden is not None:
+            factors = np.hstack([factors, self.burden.drive(starts, step, self.method.at)])
         self.method.advance(self.law, self.net, factors, step, self.u, self.v)
         self.t += count * dt
 
     def restart(self) -> None:
         """Put it at rest again, at the time zero."""
         self.u[:], self.v[:], self.t = 0.0, 0.0, 0.0
+
+
+def _burden(lattice: ReducedLattice, factors: tuple[Callable[[Floats], Floats], ...]) -> Burden:
+    """The further loads on the modes as mass points."""
+    count = len(lattice.squares)
+    loads = np.zeros((len(factors), count, 3))
+    loads[:, :, 0] = lattice.others
+    return Burden(np.zeros((count, 3)), np.zeros(count), loads, factors)
 
 
 def mass_points(lattice: ReducedLattice, damping: NodalDamping) -> Network:

@@ -52,13 +52,12 @@ def stiffness_at_rest(assembly: Assembly, material: Material) -> csr_array:
     whole = csr_array(springs + kron(assembly.foundation, eye_array(3)))
     if material.volume is not None:
         whole = csr_array(whole + volumes.stiffness_matrix(material.volume, count))
-    if assembly.fixed is not None:
-        whole = _decoupled(whole, assembly.fixed.ravel())
-    if assembly.masters is None:
-        return whole
-    spread = kron(assembly.masters, eye_array(3))
-    alone = np.repeat(hanging_nodes(assembly.masters), 3)
-    return csr_array(spread.T @ whole @ spread + diags_array(alone * whole.diagonal().mean()))
+    if assembly.masters is not None:
+        spread = kron(assembly.masters, eye_array(3))
+        alone = np.repeat(hanging_nodes(assembly.masters), 3)
+        own = diags_array(alone * whole.diagonal().mean())
+        whole = csr_array(spread.T @ whole @ spread + own)
+    return whole if assembly.fixed is None else _decoupled(whole, assembly.fixed.ravel())
 
 
 def extended(assembly: Assembly, motion: Floats) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from msm import outer as outers
 from msm.assembly import Assembly, Material, arrays
-from msm.grid import Grid, grid_of
+from msm.grid import Grids, grids_of
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
@@ -62,7 +62,7 @@ class LatticeStepper:
         self.law, self.factor = material.law, factor
         self.burden = assembly.burden
         self.net, self.start = _at_start(assembly, material, integrator, linear=linear)
-        self.grid = grid_for(assembly.lattice, self.net, integrator, single=single)
+        self.grids = grids_for(assembly.lattice, self.net, integrator, single=single)
         self.follower = Follower(self.law, self.net, self.method)
         self.u, self.v = self.start.copy(), np.zeros_like(self.start)
         self.contact = None if self.net.outer is None else self.net.outer.contact
@@ -74,11 +74,13 @@ class LatticeStepper:
     def advance(self, count: int, dt: float) -> None:
         """Take so many steps of dt [s] and nothing else."""
         starts = np.asarray(self.t + dt * np.arange(count), dtype=np.float64)
-        factors = np.stack([self.factor(starts + at * dt) for at in self.method.at], axis=1)
+        factors = np.empty((count, len(self.method.at)))
+        for stage, at in enumerate(self.method.at):
+            factors[:, stage] = self.factor(starts + at * dt)
         if self.burden is not None:
             factors = np.hstack([factors, self.burden.drive(starts, dt, self.method.at)])
-        if self.method.on_grid is not None and self.grid is not None:
-            self.method.on_grid(self.law, self.grid, factors, dt, self.u, self.v)
+        if self.method.on_grid is not None and self.grids is not None:
+            self.method.on_grid(self.law, self.grids, factors, dt, self.u, self.v)
         else:
             self.method.advance(self.law, self.net, factors, dt, self.u, self.v)
         self.t += count * dt
@@ -86,10 +88,17 @@ class LatticeStepper:
 
     def take_step(self, dt: float) -> None:
         """Take one step of dt [s] with what a run does between steps: every LOOK it looks."""
-        self.advance(1, dt)
-        if self.unseen >= LOOK:
-            self.farthest()
-            self.limit()
+        self.take_steps(1, dt)
+
+    def take_steps(self, count: int, dt: float) -> None:
+        """Take so many steps of dt [s], as many at once as there are between two looks."""
+        while count > 0:
+            taken = max(1, min(count, LOOK - self.unseen))
+            self.advance(taken, dt)
+            count -= taken
+            if self.unseen >= LOOK:
+                self.farthest()
+                self.limit()
 
     def farthest(self) -> tuple[float, int]:
         """Largest component [m] of u and its node; NaN and infinity count as infinite."""
@@ -127,19 +136,19 @@ class LatticeStepper:
             outers.start(self.contact, self.burden.tools, self.u)
 
 
-def grid_for(lattice: LatticeMesh, net: Network, integrator: str, *, single: bool) -> Grid | None:
-    """The grid that an integrator steps on, None if it steps over the list of springs.
+def grids_for(lattice: LatticeMesh, net: Network, integrator: str, *, single: bool) -> Grids | None:
+    """The grids that an integrator steps on, None if it steps over the list of springs.
 
     ValueError for single precision where there is none.
     """
     on_grid = INTEGRATORS[integrator].on_grid is not None
-    grid = grid_of(lattice, net, single=single) if on_grid else None
-    if single and grid is None:
+    grids = grids_of(lattice, net, single=single) if on_grid else None
+    if single and grids is None:
         raise ValueError(
             "single precision is for explicit integrators on a cubic lattice whose foundation "
             "couples neighbouring nodes only; set lattice.precision to double"
         )
-    return grid
+    return grids
 
 
 def _at_start(

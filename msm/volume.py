@@ -72,7 +72,9 @@ def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: floa
     return VolumeTerm(lattice.cells, bulk, lattice.edges, lattice.spacing, poisson_ratio)
 
 
-def of_cells(lattice: CellLattice, kappa: Floats, poisson_ratio: float) -> VolumeTerm:
+def of_cells(
+    lattice: CellLattice | GradedLattice, kappa: Floats, poisson_ratio: float
+) -> VolumeTerm:
     """The term of cells with a kappa [Pa] (c,) each, whose surrounding tissue has the given ratio.
 
     ValueError where kappa is negative, and swelling would gain energy.
@@ -82,7 +84,7 @@ def of_cells(lattice: CellLattice, kappa: Floats, poisson_ratio: float) -> Volum
             "tissue.inclusion: a lattice with a volume term has Poisson ratios from "
             f"{SPRING_POISSON_RATIO}; raise poisson_ratio of the inclusion or leave the term out"
         )
-    bulk = kappa * lattice.fill * lattice.spacing**3
+    bulk = kappa * lattice.fill * lattice.edges**3
     return VolumeTerm(lattice.cells, bulk, lattice.edges, lattice.spacing, poisson_ratio)
 
 

@@ -6,13 +6,20 @@ import pickle
 import numpy as np
 import pytest
 
-from msm.model import Automatic
+from fem_reference.subspace import Subspace, SubspaceMotion
+from msm import model as msm
+from msm.model import Automatic, Counts
 from study.models import corrected
 from study.models.keeping import Keeping
+from study.models.lattice import asked_step
 from study.models.model import SILENT, Watch
 from study.models.remainder import FINER, ORDER, PreparedRemainder, remainder_errors
 from study.models.table import kind, model
+from study.models.together import Frame
+from study.problem.contact import Load
+from study.problem.damping import RayleighDamping
 from study.problem.trajectory import Trajectory
+from study.progress import Silent
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
@@ -123,6 +130,94 @@ def test_it_is_stepped_as_it_is_run():
     assert apart(first, found.surface_field[1]) < 1e-5
     stepper.restart()
     np.testing.assert_array_equal(last(), first)
+
+
+def test_a_frame_is_the_steps_that_it_has():
+    """Under two loads that have corners within it."""
+    rng = np.random.default_rng(2)
+    loads = rng.standard_normal((2, 3))
+    among = Subspace(np.eye(3), np.diag([40.0, 900.0, 9e4]), loads[0], (loads[1],))
+    damping = RayleighDamping(30.0, 1e-3)
+
+    def factors(times):
+        return np.stack([np.minimum(times / 0.004, 1.0), np.abs(times - 0.007)], axis=1)
+
+    by_steps, by_frames = (SubspaceMotion(among, damping, factors, 1e-3) for _ in range(2))
+    frame = Frame(by_frames, damping, 5)
+    for _ in range(3):
+        by_steps.go_on(5)
+        frame.go_on()
+    assert by_frames.time == pytest.approx(by_steps.time)
+    found, wanted = (one.state[:, :2] for one in (by_frames, by_steps))
+    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-14)
+
+
+# --- several loads --------------------------------------------------------------------------------
+
+
+def beside(first, second):
+    """A block under two blunt tools of given forces [N], the second pressed as a sinusoid."""
+    scene = scene_of(FEW, f"tool.force={first} N")
+    problem = problem_of(scene)
+    centre = problem.tool.centre + np.array([0.02, 0.0, 0.0])
+    other = dataclasses.replace(problem.tool, centre=centre, force=second)
+
+    def wave(times):
+        return np.sin(2.0 * np.pi * 5.0 * times)
+
+    posed = dataclasses.replace(problem, loads=(Load(other, wave),))
+    return model(scene, "corrected").prepare(posed)
+
+
+@pytest.fixture(scope="module")
+def two():
+    return beside(0.3, 0.3)
+
+
+def test_several_loads_are_followed_as_a_fine_lattice_follows_them(two):
+    """The remainder of the coarse lattice is that of one of half its spacing, roughly."""
+    found = two.simulate().trajectory.displacement
+    elements = two.fine.solved_on(None, Silent()).found.trajectory.displacement
+    finer = beside(0.3, 0.3)
+    fine = finer.model.coarse.varied(spacing=0.005).prepare(finer.problem)
+    step = asked_step(fine.model.lattice)
+    truth = elements + PreparedRemainder(fine, 20).run(step).trajectory.displacement
+    assert apart(elements, truth) > 0.02
+    assert apart(found, truth) < 0.5 * apart(elements, truth)
+
+
+def test_small_loads_are_superposed():
+    """Each alone and both together, small enough to be linear."""
+    both, first, second = (
+        beside(*forces).simulate().trajectory.displacement
+        for forces in ((1e-3, 1e-3), (1e-3, 1e-9), (1e-9, 1e-3))
+    )
+    assert apart(first + second, both) < 1e-3
+    assert apart(first, both) > 0.1
+
+
+def test_the_linear_lattice_follows_every_load(two):
+    """In its vectors as step by step; without the second load it does not."""
+    lattice, step = two.coarse, Counts(np.full(30, 20))
+    given = lattice.assembly, lattice.springs.material, two.problem.factor, two.problem.observation
+    linear = msm.run(*given, step, linear=True).trajectory.displacement
+    whole = msm.run(*given, step).trajectory.displacement
+
+    def by_vectors(one):
+        return whole - PreparedRemainder(one, 24).run(step).trajectory.displacement
+
+    assert apart(by_vectors(lattice), linear) < 2e-3
+    deaf = dataclasses.replace(two.problem, loads=())
+    lost = dataclasses.replace(lattice, problem=deaf)
+    assert apart(by_vectors(lost), linear) > 0.1
+
+
+def test_it_is_stepped_under_several_loads_as_it_is_run(two):
+    found, stepper = two.simulate(1e-3).trajectory, two.stepper()
+    stepper.take_steps(round(0.3 / stepper.step))
+    mesh, seen = two.problem.geometry.mesh.points, two.problem.geometry.surface.points
+    used = [int(abs(mesh - point).sum(axis=1).argmin()) for point in seen]
+    assert apart(stepper.displacement()[used], found.surface_field[1]) < 0.02
 
 
 # --- what goes wrong -----------------------------------------------------------------------------

@@ -9,8 +9,9 @@ from scipy.linalg import eigh
 from msm import octree
 from msm.assembly import Material, arrays, assemble, assemble_graded
 from msm.calibration import reference_stiffness
-from msm.damping import UNDAMPED
+from msm.damping import UNDAMPED, NodalDamping
 from msm.forces import internal_forces
+from msm.grid import grids_of
 from msm.hanging import hanging_nodes, interpolate
 from msm.integrators import INTEGRATORS
 from msm.laws import Basafa, Hooke
@@ -228,6 +229,70 @@ def test_a_stretch_stores_the_same_as_in_one_size(problem, assembly, law):
         u = uniform(one.lattice, gradient)
         work.append((force(m, free(arrays(one, m)), u) * u).sum())
     assert work[0] == pytest.approx(work[1], rel=1e-10)
+
+
+# --- as grids -------------------------------------------------------------------------------------
+
+
+def loaded(assembly, m, name, change=lambda grids: grids):
+    """Motion (u, v) after some steps under the load, over the list of springs and over grids."""
+    net, method = arrays(assembly, m), INTEGRATORS[name]
+    dt = 0.5 * critical_time_step(assembly, m)
+    start = assembly.masters @ np.random.default_rng(9).standard_normal(net.load.shape)
+    found = []
+    for advance, over in (
+        (method.advance, net),
+        (method.on_grid, change(grids_of(assembly.lattice, net))),
+    ):
+        u, v = 1e-5 * start, 1e-3 * start
+        advance(m.law, over, np.ones((60, len(method.at))), dt, u, v)
+        found.append((u, v))
+    return found
+
+
+def off_by(pair):
+    return max(np.abs(a - b).max() / np.abs(a).max() for a, b in zip(*pair, strict=True))
+
+
+@pytest.mark.parametrize("name", ["symplectic-euler", "velocity-verlet", "runge-kutta-4"])
+def test_grids_move_as_the_list_of_springs_does(assembly, name):
+    assert off_by(loaded(assembly, material(assembly), name)) < 1e-12
+
+
+def test_grids_are_damped_as_the_list_of_springs_is(assembly):
+    m = replace(material(assembly), damping=NodalDamping(20.0, beta=1e-4))
+    assert off_by(loaded(assembly, m, "symplectic-euler")) < 1e-12
+
+
+def nudged(field, change):
+    """A wrong entry among what joins the grids, of the support the largest."""
+
+    def planted(grids):
+        values = getattr(grids.joints, field).copy()
+        of_support = field in {"column", "value"}
+        values[np.argmax(grids.joints.value) if of_support else len(values) // 2] += change
+        return grids._replace(joints=grids.joints._replace(**{field: values}))
+
+    return planted
+
+
+@pytest.mark.parametrize(
+    ("field", "change"), [("copy", 1), ("master", 1), ("part", 1e-4), ("column", 1), ("value", 1.0)]
+)
+def test_a_wrong_joint_is_seen(assembly, field, change):
+    pair = loaded(assembly, material(assembly), "symplectic-euler", nudged(field, change))
+    assert off_by(pair) > 1e-9
+
+
+def test_every_spring_and_cell_is_in_one_grid(assembly):
+    net = arrays(assembly, material(assembly))
+    grids = grids_of(assembly.lattice, net).grids
+    assert len(grids) == 3
+    weights = [one.weight.sum() for one in grids]  # flexion and larger edges may share a place
+    assert sum(weights) == pytest.approx((net.scale / net.length).sum(), rel=1e-12)
+    assert sum(np.count_nonzero(one.bulk) for one in grids) == len(net.cells)
+    # A row has the directions of its own cells alone: edges, face diagonals, flexion.
+    assert [len(one.offset) for one in grids] == [12, 12, 12]
 
 
 # --- rest and motion ------------------------------------------------------------------------------

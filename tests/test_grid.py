@@ -7,9 +7,8 @@ from msm.assembly import Material, arrays, assemble
 from msm.calibration import reference_stiffness
 from msm.damping import NodalDamping
 from msm.forces import internal_forces
-from msm.grid import grid_of
-from msm.grid_explicit import take_in
-from msm.grid_forces import add_internal_forces
+from msm.grid import grids_of
+from msm.grid_explicit import add_forces, take_in
 from msm.integrators import INTEGRATORS
 from msm.kernel import kernel
 from msm.laws import Basafa, Hooke, piecewise
@@ -25,6 +24,8 @@ E, NU = 4e3, 0.45
 SAME = 1e-12
 """Relative, after STEPS steps: sums in another order, products fused, as each processor does it."""
 STEPS = 100
+NOTHING = np.zeros(1)
+"""Drives no further load."""
 DAMPED = NodalDamping(30.0)
 FAMILIES = {
     "plain": (0.0, 0.0),
@@ -39,9 +40,9 @@ EXPLICIT = [name for name, method in INTEGRATORS.items() if method.on_grid is no
 
 
 @kernel()
-def set_forces(law, grid, u):
-    take_in(grid, u, u)
-    add_internal_forces(law, grid, grid.u, grid.force)
+def set_forces(law, of, u):
+    take_in(of, u, u)
+    add_forces(law, of, NOTHING, 0, of.grids[0].u)
 
 
 def law_of(kind, k):
@@ -98,11 +99,11 @@ def compare(assembly, made, width, integrator="symplectic-euler", *, linear=Fals
     net = net._replace(load=net.load * 20.0)
     method = INTEGRATORS[integrator]
     dt = 0.3 * critical_time_step(assembly, made)
-    grid = grid_of(assembly.lattice, net, width)
-    assert len(grid.lanes) == width
+    grids = grids_of(assembly.lattice, net, width)
+    assert {len(grid.lanes) for grid in grids.grids} == {width}
     if change is not None:
-        change(grid)
-    found = moved(method, made.law, net, dt, method.on_grid, grid)
+        change(grids)
+    found = moved(method, made.law, net, dt, method.on_grid, grids)
     return apart(found, moved(method, made.law, net, dt))
 
 
@@ -182,8 +183,9 @@ def test_springs_alone_move_alike(bodies):
 
 
 def nudge(field, place, change):
-    def planted(grid):
-        getattr(grid, field)[place] += change
+    def planted(grids):
+        part = grids if field in grids._fields else grids.grids[0]
+        getattr(part, field)[place] += change
 
     return planted
 
@@ -216,12 +218,12 @@ def test_a_spring_pressed_to_a_point_is_not_a_number(bodies):
     made = material(assembly)
     net = arrays(assembly, made)
     for width in {1, widest()}:
-        grid = grid_of(assembly.lattice, net, width)
+        grids = grids_of(assembly.lattice, net, width)
         u = np.zeros_like(net.load)
         i, j = net.ends[0].astype(int)
         u[j] = u[i] - net.rest[0]
-        set_forces(made.law, grid, u)
-        assert np.isnan(grid.force[:, grid.place[[i, j]]]).any()
+        set_forces(made.law, grids, u)
+        assert np.isnan(grids.grids[0].force[:, grids.place[[i, j]]]).any()
 
 
 def test_after_a_divergence_the_grid_is_as_new(bodies):
@@ -257,9 +259,9 @@ def test_the_steps_of_a_stretch_are_those_of_its_parts(bodies):
 def test_steppers_of_cubic_lattices_are_on_a_grid_and_others_are_not(bodies):
     assembly = bodies("block")
     made = material(assembly)
-    on = {name: LatticeStepper(assembly, made, np.ones_like, name).grid for name in EXPLICIT}
-    assert all(grid is not None and len(grid.lanes) == widest() for grid in on.values())
-    assert LatticeStepper(assembly, made, np.ones_like, "split-volume").grid is None
+    on = {name: LatticeStepper(assembly, made, np.ones_like, name).grids for name in EXPLICIT}
+    assert all(len(grids.grids[0].lanes) == widest() for grids in on.values())
+    assert LatticeStepper(assembly, made, np.ones_like, "split-volume").grids is None
 
 
 def test_the_forces_are_those_of_the_list_of_springs(bodies):
@@ -269,7 +271,8 @@ def test_the_forces_are_those_of_the_list_of_springs(bodies):
     u = 0.05 * net.spacing * np.random.default_rng(1).standard_normal(net.load.shape)
     wanted = np.empty_like(u)
     internal_forces(made.law, net, u, wanted)
-    grid = grid_of(assembly.lattice, net)
-    set_forces(made.law, grid, u)
-    found = grid.force[:, grid.place].T
+    grids = grids_of(assembly.lattice, net)
+    set_forces(made.law, grids, u)
+    (grid,) = grids.grids
+    found = grid.force[:, grids.place].T
     assert np.abs(found - wanted).max() < 1e-14 * len(grid.offset) * np.abs(wanted).max()

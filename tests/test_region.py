@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from msm.stepper import LatticeStepper
 from study.models.region_size import places
 from study.models.table import model
 from study.problem.rigid import SPHERE, RigidTool
@@ -138,6 +139,73 @@ def test_a_graded_lattice_is_corrected(scene):
     )
     assert apart(graded, fine) < 0.5 * apart(coarse, fine)
     assert apart(coarse, fine) > 0.01
+
+
+GRAVITY = ("gravity.acceleration=9.81 m/s^2",)
+MORE = {
+    "gravity": GRAVITY,
+    "inclusions": (
+        'tissue.inclusion=[{place={fraction=[0.5,0.5,0.5]},radius="9 mm",youngs_modulus="40 kPa"}]',
+    ),
+    "fixed-surfaces": ("support.kind=clamped",),
+    "moved-tools": ("tool.shape=sphere", "tool.radius=8 mm", "tool.displacement=3 mm", *GRAVITY),
+}
+
+
+def following(what):
+    """Prepared lattices of a scene: uniform, all fine of the region, and graded."""
+    given = read_scene("block", (*BLOCK, "region.radius=12 mm", *MORE[what]))
+    assert what in given.features
+    posed = problem_of(given)
+    uniform = model(given, "tissue").varied(volume_term=True, spacing=0.005)
+    region = model(given, "region").varied(volume_term=True, spacing=0.005, levels=2)
+    graded = (region.varied(radius=radius) for radius in (1.0, 0.008))
+    return [one.prepare(posed) for one in (uniform, *graded)]
+
+
+@pytest.mark.parametrize("what", MORE)
+def test_a_region_throughout_is_what_the_plain_lattice_is(what):
+    plain, whole, _ = (one.assembly for one in following(what))
+    for name in ("mass", "load", "fixed"):
+        one, other = getattr(plain, name), getattr(whole, name)
+        assert (one is None) == (other is None)
+        if one is not None:
+            np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(whole.springs.weight, plain.springs.weight, rtol=1e-12)
+    assert (whole.burden is None) == (plain.burden is None)
+    if plain.burden is not None:
+        np.testing.assert_allclose(whole.burden.dead, plain.burden.dead, rtol=1e-12, atol=1e-18)
+        assert whole.burden.tools == plain.burden.tools
+
+
+@pytest.mark.parametrize("what", ["inclusions", "fixed-surfaces", "moved-tools"])
+def test_a_region_follows_what_its_scene_has(what):
+    """Closer to the uniform lattice than that is to one without."""
+    plain, _, graded = following(what)
+    assert graded.assembly.lattice.hanging > 0
+    truth, found = plain.moved().trajectory, graded.moved().trajectory
+    assert found.status == "finished"
+    assert apart(found.displacement, truth.displacement) < 0.2
+    if what == "moved-tools":
+        assert apart(found.tool_force, truth.tool_force) < 0.2
+
+
+@pytest.mark.parametrize("on_list", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_hanging_nodes_follow_what_a_tool_pushes(on_list):
+    graded = following("moved-tools")[-1]
+    one = LatticeStepper(
+        graded.assembly, graded.springs.material, graded.problem.factor, "symplectic-euler"
+    )
+    if on_list:
+        one.grids = None
+    one.advance(int(0.15 / one.limit_at_rest), 0.8 * one.limit_at_rest)
+    assert np.abs(one.tool_force).max() > 0.01
+    np.testing.assert_allclose(graded.assembly.masters @ one.u, one.u, rtol=1e-9, atol=1e-15)
+
+
+def test_a_tolerance_is_refused_where_more_acts_than_one_load():
+    with pytest.raises(SceneError, match=r"region\.radius: a tolerance is kept at rest under a"):
+        read_scene("block", (*BLOCK, *MORE["gravity"]))
 
 
 @pytest.mark.parametrize(

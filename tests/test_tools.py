@@ -145,10 +145,10 @@ def test_both_paths_of_the_kernels_move_alike():
     """On the grid, and over the list of springs."""
     _, prepared = posed()
     on_grid, on_list = stepper_of(prepared), stepper_of(prepared)
-    on_list.grid = None
+    on_list.grids = None
     for stepper in (on_grid, on_list):
         stepper.advance(800, 2.5e-4)
-    assert on_grid.grid is not None
+    assert on_grid.grids is not None
     assert np.abs(on_grid.u - on_list.u).max() < 1e-7 * np.abs(on_list.u).max()
     assert on_grid.tool_force == pytest.approx(on_list.tool_force, rel=1e-3)
 

@@ -245,7 +245,7 @@ class PreparedCorrected:
         """All parts at rest, stepped together; the vertices of the mesh are delivered by frames."""
         solved = self.best or self._on_level
         parts = self._remainder(solved), self._deformed(solved)
-        return Together(*parts, self.problem.factor, self.fine.model.damping).stepper()
+        return Together(*parts, self.problem.factors, self.fine.model.damping).stepper()
 
 
 @lru_cache(maxsize=1)
@@ -316,5 +316,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     any_load=False,
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    able=frozenset({"several-loads", "inclusions", "fixed-surfaces"}),
 )

@@ -40,7 +40,8 @@ class Deformed:
         # The unknowns of vertices come before those of edges.
         vertices = np.ascontiguousarray(among.vectors[: mesh.points.size])
         weights, _ = lattice.interpolation(mesh.points)
-        return cls(mesh, weights, Subspace(vertices, among.stiffness, among.load), found)
+        own = Subspace(vertices, among.stiffness, among.load, among.others)
+        return cls(mesh, weights, own, found)
 
     def state(self, sample: int, found: Remainder) -> tuple[Floats, Floats]:
         """Displacement [m] and velocity [m/s] (v, 3) at a sample."""

@@ -123,9 +123,12 @@ class LatticeModel:
         if self.graded:
             for unfit in graded.unfit(self.lattice):
                 raise ValueError(unfit)
-            found = sized(problem, self._wanted(), self._material)
-            springs = self.make(self.scene, found.assembly.lattice)
-            return PreparedLattice(self, problem, found.assembly, springs, found.assembly, found)
+            found = sized(problem, self._wanted(), self._of_tissue)
+            plain = found.assembly
+            if problem.is_burdened:
+                plain = _with_burden(problem, plain)
+            made = self.make(self.scene, plain.lattice)
+            return replace(on_lattice(self, problem, plain, made), region=found)
         plain = assembled(problem, self.lattice)
         return on_lattice(self, problem, plain, self.make(self.scene, plain.lattice))
 
@@ -135,8 +138,9 @@ class LatticeModel:
         how = region.levels, region.radius, region.tolerance, region.at
         return Wanted(self.spacing, *how, self.lattice.flexion)
 
-    def _material(self, assembly: Assembly) -> Material:
-        return self.make(self.scene, assembly.lattice).material
+    def _of_tissue(self, plain: Assembly) -> tuple[Assembly, Material]:
+        made = self.make(self.scene, plain.lattice)
+        return msm.of_tissue(plain, made.material, made.modulus)
 
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
@@ -151,7 +155,11 @@ def assembled(problem: Problem, lattice: Lattice) -> Assembly:
 @lru_cache(maxsize=1)
 def _burdened(problem: Problem, *mix: float) -> Assembly:
     """The lattice with what acts on it beside its first load, on the mesh without a mix."""
-    bare = _cubic(problem, *mix) if mix else _on_mesh(problem)
+    return _with_burden(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
+
+
+def _with_burden(problem: Problem, bare: Assembly) -> Assembly:
+    """A lattice with what acts on it beside its first load."""
     surface, times = problem.geometry.surface, problem.observation.times
     points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
     return burdened(
@@ -370,6 +378,7 @@ class PreparedLattice:
             motion.u.size,
             partial(motion.advance, dt=dt),
             motion.restart,
+            take_many=partial(motion.take_steps, dt=dt),
         )
 
     def _run(self, watch: Watch) -> Run:

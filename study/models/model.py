@@ -68,7 +68,9 @@ class Stepper:
     """A prepared model at rest, to be stepped one step at a time.
 
     `take_step()` goes one step on, as a run does it, with all that a run does between steps;
-    `take_bare_steps(count)` goes on without what is between them, None where there is nothing.
+    `take_bare_steps(count)` goes on without what is between them, None where there is nothing;
+    `take_many(count)` takes so many at once, as a run does between samples, None where that costs
+    what single ones do.
     `restart()` puts it at rest again, where what a step costs depends on the motion, or where tools
     that are moved are deepest.
     `displacement()` [m] (n, 3) of the nodes is the state that is delivered. `step` [s]; `unknowns`:
@@ -84,6 +86,15 @@ class Stepper:
     take_bare_steps: Callable[[int], None] | None = None
     restart: Callable[[], None] = lambda: None
     bound: Callable[[], Floats] | None = None
+    take_many: Callable[[int], None] | None = None
+
+    def take_steps(self, count: int) -> None:
+        """Go so many steps on, with all that a run does between them."""
+        if self.take_many is not None:
+            self.take_many(count)
+            return
+        for _ in range(count):
+            self.take_step()
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from msm.assembly import assemble_graded
 from msm.model import Assembly, Material
 from msm.octree import Grading
 from study.problem.problem import Problem
+from study.scene.graded import NO_TOLERANCE
 
 Floats = NDArray[np.float64]
 
@@ -55,23 +56,28 @@ class Wanted:
     flexion: float
 
 
-def sized(problem: Problem, wanted: Wanted, material: Callable[[Assembly], Material]) -> Sized:
+def sized(
+    problem: Problem, wanted: Wanted, of_tissue: Callable[[Assembly], tuple[Assembly, Material]]
+) -> Sized:
     """The lattice of a given radius, or the smallest that keeps the tolerance.
 
-    ValueError for a control point that there is not, or too many cells.
+    `of_tissue`: a lattice with what its cells are made of. ValueError for a control point that
+    there is not, for too many cells, and for a tolerance where more acts than one load.
     """
     where = places(problem, wanted.at)
     if wanted.radius is not None:
         return Sized(_assembled(problem, wanted, where, wanted.radius), wanted.radius, None)
+    if problem.is_burdened:
+        raise ValueError(NO_TOLERANCE)
     whole = _assembled(problem, wanted, where, None)
     probes = [problem.tool_probe, *(problem.probes.index(name) for name in wanted.at)]
-    aim = _rest(problem, whole, material(whole), probes)
+    aim = _rest(problem, *of_tissue(whole), probes)
     kept = Sized(whole, float(np.ptp(problem.surface_rule.points, axis=0).max()), 0.0)
     radii = list(_radii(problem))
     while radii:  # halved, for larger ones come closer but for the chance of how cells lie
         middle = len(radii) // 2
         found = _assembled(problem, wanted, where, radii[middle])
-        rest = _rest(problem, found, material(found), probes)
+        rest = _rest(problem, *of_tissue(found), probes)
         apart = float((_size(rest - aim) / _size(aim)).max())
         if apart <= wanted.tolerance:
             kept = Sized(found, radii[middle], apart)
@@ -113,6 +119,7 @@ def _assembled(problem: Problem, wanted: Wanted, where: Floats, radius: float | 
         problem.foundation,
         problem.tool,
         wanted.flexion,
+        problem.tissue,
     )
 
 

@@ -84,7 +84,8 @@ class PreparedRemainder:
         """The linear lattice at rest, stepped as the nonlinear one is."""
         one = self.lattice
         damping, integrator = one.springs.material.damping, one.model.lattice.integrator
-        return ReducedMotion(lattice, damping, one.problem.factor, integrator)
+        further = tuple(load.factor for load in one.problem.loads)
+        return ReducedMotion(lattice, damping, one.problem.factor, integrator, further)
 
     def run(
         self, step: Step, advance: Advance = lambda _: None, *, keep_nodes: bool = False

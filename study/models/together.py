@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.subspace import SubspaceMotion
+from fem_reference.subspace import SubspaceMotion, transitions
 from study.models.deformed import Deformed
 from study.models.finite_elements import FRAME_RATE
 from study.models.model import Stepper
@@ -15,6 +15,35 @@ from study.models.remainder import PreparedRemainder
 from study.problem.damping import RayleighDamping
 
 Floats = NDArray[np.float64]
+
+
+class Frame:
+    """So many steps of a motion in a subspace as one: the same, but for rounding.
+
+    A step takes a mode from y to A y + b f + c f', f and f' its load at either end. So a frame of n
+    takes it to A^n y and a weighted sum of its loads at the ends of all steps.
+    """
+
+    def __init__(self, motion: SubspaceMotion, damping: RayleighDamping, count: int) -> None:
+        self.motion, self.count = motion, count
+        moved = transitions(motion.squares, damping, motion.step)
+        over, slope = moved[:, :2, :2], moved[:, :2, 3] / motion.step
+        self.loads = motion.modes.T @ motion.subspace.loads
+        self.kept = np.broadcast_to(np.eye(2), over.shape)
+        self.weights = np.zeros((len(over), 2, count + 1))
+        for n in reversed(range(count)):
+            self.weights[:, :, n + 1] += np.einsum("mij,mj->mi", self.kept, slope)
+            self.weights[:, :, n] += np.einsum("mij,mj->mi", self.kept, moved[:, :2, 2] - slope)
+            self.kept = self.kept @ over
+
+    def go_on(self) -> None:
+        """Take all steps of the frame."""
+        motion, state = self.motion, self.motion.state[:, :2]
+        times = np.asarray(motion.time + motion.step * np.arange(self.count + 1))
+        factors = np.asarray(motion.factor(times)).reshape(self.count + 1, -1)
+        pushed = np.einsum("mik,mk->mi", self.weights, self.loads @ factors.T)
+        state[:] = np.einsum("mij,mj->mi", self.kept, state) + pushed
+        motion.time += motion.step * self.count
 
 
 class Together:
@@ -36,8 +65,12 @@ class Together:
         self.step = self.lattice.step
         self.reduced = remainder.linear()
         self.linear = remainder.linear_motion(self.reduced)
-        self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
         self.every, self.waiting = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
+        self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
+        self.frame = Frame(self.elements, damping, self.every)
+        below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
+        own = shape.subspace.vectors @ self.elements.modes
+        self.shapes = np.hstack([own, -below.reshape(len(own), -1)])
 
     @property
     def unknowns(self) -> int:
@@ -47,24 +80,33 @@ class Together:
 
     def take_step(self) -> None:
         """Take one step with all that a run does between steps."""
-        self.lattice.take_step()
-        self.waiting += 1
-        if self.waiting >= self.every:
-            self.displacement()
+        self.take_steps(1)
+
+    def take_steps(self, count: int) -> None:
+        """Take so many steps with all that a run does between steps."""
+        while count > 0:
+            taken = min(count, self.every - self.waiting)
+            self.lattice.take_steps(taken)
+            self.waiting += taken
+            count -= taken
+            if self.waiting >= self.every:
+                self.displacement()
 
     def _catch_up(self) -> None:
         """Bring the linear parts to where the lattice is."""
         if self.waiting:
             self.linear.advance(self.waiting, self.step)
-            self.elements.go_on(self.waiting)
+            if self.waiting == self.every:
+                self.frame.go_on()
+            else:
+                self.elements.go_on(self.waiting)
             self.waiting = 0
 
     def displacement(self) -> Floats:
         """Of the vertices of the elements' mesh [m] (v, 3), as they are now."""
         self._catch_up()
-        below = self.reduced.displacement(self.linear.coordinates)
-        beyond = self.shape.weights @ (self.lattice.displacement() - below)
-        return np.asarray(self.elements.deliver().reshape(-1, 3) + beyond)
+        linear = self.shapes @ np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
+        return np.asarray(linear.reshape(-1, 3) + self.shape.weights @ self.lattice.displacement())
 
     def restart(self) -> None:
         """Put all parts at rest again."""
@@ -76,5 +118,10 @@ class Together:
     def stepper(self) -> Stepper:
         """As a model gives it."""
         return Stepper(
-            self.take_step, self.displacement, self.step, self.unknowns, restart=self.restart
+            self.take_step,
+            self.displacement,
+            self.step,
+            self.unknowns,
+            restart=self.restart,
+            take_many=self.take_steps,
         )

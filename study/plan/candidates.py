@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from fem_reference.memory import needed
 from study.models.finite_elements import FRAME_RATE
 from study.models.tissue import FRACTION, lacks_poisson_ratio
-from study.plan.look import LatticeLook, Look
+from study.plan.look import GradedLook, LatticeLook, Look
 from study.plan.prediction import (
     CAUTION,
     COMPARED,
@@ -191,18 +191,28 @@ def corrected(
     scene: Scene, look: Look, foresight: Foresight, size: float, spacing: float
 ) -> Candidate:
     """A coarse lattice, and the difference of finite elements from its own linear motion."""
-    coarse, fine = lattice(scene, look, spacing), on_elements(scene, look, size)
-    parts = (
-        Part(REMAINDER, foresight.remainder(spacing)),
-        Part(MESH, foresight.mesh(size * _scene_size(look))),
-        Part(TRUNCATION, SUBSPACE),
-    )
+    coarse = lattice(scene, look, spacing)
+    parts = (Part(REMAINDER, foresight.remainder(spacing)),)
+    found = _sum(scene, look, foresight, size, coarse, parts)
+    chosen = replace(scene.corrected, spacing=spacing, coarse="uniform")
+    return replace(found, scene=replace(found.scene, corrected=chosen))
+
+
+def _sum(
+    scene: Scene,
+    look: Look,
+    foresight: Foresight,
+    size: float,
+    coarse: Candidate,
+    parts: tuple[Part, ...],
+) -> Candidate:
+    """A coarse lattice with these errors beside finite elements of so many times the size."""
+    fine = on_elements(scene, look, size)
+    own = (Part(MESH, foresight.mesh(size * _scene_size(look))), Part(TRUNCATION, SUBSPACE))
     return Candidate(
         name=f"{coarse.name}, corrected by finite elements of {_mm(fine.scene)}",
-        scene=replace(
-            fine.scene, models=("corrected",), corrected=replace(scene.corrected, spacing=spacing)
-        ),
-        prediction=Prediction(parts),
+        scene=replace(fine.scene, models=("corrected",)),
+        prediction=Prediction((*parts, *own)),
         step=coarse.step,
         step_wall=coarse.step_wall + 2.0 * fine.step_wall,
         setup=fine.setup,
@@ -211,9 +221,51 @@ def corrected(
     )
 
 
+# --- graded lattices, alone and corrected ---------------------------------------------------------
+
+
+def _regions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    compared = foresight.mesh(look.elements[-1].size)
+    for one in look.graded:
+        found = region(scene, look, one)
+        parts = (Part(SPACING, foresight.graded(one)), Part(COMPARED, compared / CAUTION))
+        yield replace(found, prediction=Prediction(parts))
+
+
+def region(scene: Scene, look: Look, one: GradedLook) -> Candidate:
+    """A graded lattice that was looked at, stepped explicitly, and its cost."""
+    seen = one.lattice
+    plain = lattice(scene, look, scene.lattice.spacing)
+    graded = replace(scene.region, spacing=seen.spacing, radius=one.radius)
+    return replace(
+        plain,
+        name=f"lattice of {1e3 * seen.spacing:.3g} mm to {1e3 * one.radius:.3g} mm from the tool "
+        "and coarser beyond",
+        scene=replace(plain.scene, models=("fem", "region"), region=graded),
+        step=FRACTION * seen.critical,
+        step_wall=one.step_wall,
+        memory=float(seen.nbytes),
+        leaves_out=("small cells away from the tool",),
+    )
+
+
+def _corrected_regions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
+    """All but the one that tells the others' error."""
+    for size in SIZES:
+        for one in look.graded[:-1]:
+            coarse = region(scene, look, one)
+            parts = (Part(REMAINDER, foresight.graded_remainder(one)),)
+            chosen = replace(scene.corrected, spacing=None, coarse="graded")
+            found = _sum(scene, look, foresight, size, coarse, parts)
+            given = replace(found.scene, corrected=chosen, region=coarse.scene.region)
+            yield replace(found, scene=given)
+
+
 CANDIDATES: dict[str, Kind] = {
     "superposition": _superpositions,
     "corrected": _corrected,
+    "corrected-graded": _corrected_regions,
+    "region": _regions,
     "lattice": _lattices,
 }
 

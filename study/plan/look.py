@@ -6,7 +6,8 @@ It takes seconds, and tells from solutions that are cheap what dear ones would c
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,15 @@ from study.models.table import model
 from study.models.tissue import lacks_poisson_ratio
 from study.problem.problem import Problem
 from study.scene import Scene
+from study.scene.graded import unfit
 
 Floats = NDArray[np.float64]
 
 SPACINGS = (2.0, 1.5, 1.0)
 """Of the lattices, times that of the scene."""
+FINEST, REACHES = 0.5, (0.6, 1.0, 1.5)
+"""Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
+reach from the tool, in its radii; the last is what the others are compared with."""
 LEVELS = (-1, 0, 1)
 MOST_UNKNOWNS = 30_000
 """Of a mesh that is looked at, which takes a few seconds; one is, however large."""
@@ -67,6 +72,15 @@ class LatticeLook:
 
 
 @dataclass(frozen=True)
+class GradedLook:
+    """A graded lattice at rest, its finest cells within a radius [m]; what its step takes [s]."""
+
+    radius: float
+    lattice: LatticeLook
+    step_wall: float
+
+
+@dataclass(frozen=True)
 class ElementsLook:
     """Finite elements of a `size` [m] at rest, and what the solution took [s]."""
 
@@ -89,6 +103,7 @@ class Look:
     elements: tuple[ElementsLook, ...]
     strain: float
     wall_per_spring: float
+    graded: tuple[GradedLook, ...] = ()
 
 
 def look(scene: Scene, problem: Problem) -> Look:
@@ -100,8 +115,25 @@ def look(scene: Scene, problem: Problem) -> Look:
         tuple(lattice_at_rest(one) for one in lattices),
         elements,
         strain,
-        _wall_per_spring(lattices[-1]),
+        _step_wall(lattices[-1]) / len(lattices[-1].assembly.springs.weight),
+        tuple(_graded_at_rest(scene, problem)),
     )
+
+
+def _graded_at_rest(scene: Scene, problem: Problem) -> Iterator[GradedLook]:
+    """From where the fewest cells are fine to the most; none for settings that they have not."""
+    if any(unfit(scene.lattice)):
+        return
+    region = model(scene, "region")
+    assert isinstance(region, LatticeModel)  # noqa: S101 - it is one by its kind
+    finest = FINEST * scene.lattice.spacing
+    for reach in REACHES:
+        radius = reach * scene.tool.radius
+        prepared = region.varied(
+            spacing=finest, radius=radius, volume_term=lacks_poisson_ratio(scene)
+        ).prepare(problem)
+        seen = replace(lattice_at_rest(prepared), spacing=finest)
+        yield GradedLook(radius, seen, _step_wall(prepared))
 
 
 def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...], float]:
@@ -161,8 +193,8 @@ def _seen(prepared: PreparedLattice, nodal: Floats) -> Rest:
     return Rest(*(np.asarray(lattice.interpolation(points)[0] @ nodal) for points in places))
 
 
-def _wall_per_spring(prepared: PreparedLattice) -> float:
-    """Wall of a step of a run [s], over the number of springs."""
+def _step_wall(prepared: PreparedLattice) -> float:
+    """Wall of a step of a run [s]."""
     stepper = prepared.stepper()
     walls = []
     for _ in range(TURNS):
@@ -170,4 +202,4 @@ def _wall_per_spring(prepared: PreparedLattice) -> float:
         for _ in range(STEPS):
             stepper.take_step()
         walls.append(time.perf_counter() - started)
-    return min(walls) / STEPS / len(prepared.assembly.springs.weight)
+    return min(walls) / STEPS

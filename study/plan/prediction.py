@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.error_estimate import ASSUMED_ORDER
-from study.plan.look import LatticeLook, Look, Rest
+from study.plan.look import GradedLook, LatticeLook, Look, Rest
 from study.similarity.fields import norm
 
 Floats = NDArray[np.float64]
@@ -81,10 +81,15 @@ class Foresight:
 
     @cached_property
     def whole(self) -> Rest:
-        """The best displacement known: finest elements, and what large displacements change."""
-        large = _nonlinear(self.look.lattices[-1])
-        linear = self.look.elements[-1].rest
-        return linear if large is None else linear.plus(large)
+        """The best displacement known: finest elements, and what large displacements change.
+
+        That on the graded lattice that is fine farthest from the tool, else on the finest uniform.
+        """
+        linear, lattices = self.look.elements[-1].rest, [self.look.lattices[-1]]
+        if self.look.graded:
+            lattices.insert(0, self.look.graded[-1].lattice)
+        known = [part for part in map(_nonlinear, lattices) if part is not None]
+        return linear.plus(known[0]) if known else linear
 
     @cached_property
     def geometry(self) -> float:
@@ -110,6 +115,35 @@ class Foresight:
         gain = (first.spacing**NONLINEAR_ORDER - last.spacing**NONLINEAR_ORDER) ** -1.0
         change = self._size(parts[1].plus(parts[0], -1.0))
         return float(CAUTION * change * gain * spacing**NONLINEAR_ORDER)
+
+    def graded_remainder(self, one: GradedLook) -> float:
+        """What large displacements still leave, told on a graded lattice.
+
+        By how far its finest cells reach, from the one that reaches farthest, and by their size.
+        """
+        own, far = map(_nonlinear, (one.lattice, self.look.graded[-1].lattice))
+        if own is None or far is None:
+            return math.inf
+        return CAUTION * (self._size(own.plus(far, -1.0)) + self._by_finest_cells)
+
+    def graded(self, one: GradedLook) -> float:
+        """Error of a graded lattice, against the best displacement known and with its own error."""
+        apart = self._size(self._of(one.lattice).plus(self.whole, -1.0))
+        return apart + self._by_finest_cells
+
+    @cached_property
+    def _by_finest_cells(self) -> float:
+        """What the size of the finest cells leaves of large displacements.
+
+        From the graded lattice that reaches farthest and the finest uniform one, by the order
+        observed.
+        """
+        fine, coarse = self.look.graded[-1].lattice, self.look.lattices[-1]
+        parts = _nonlinear(fine), _nonlinear(coarse)
+        if parts[0] is None or parts[1] is None:
+            return math.inf
+        gain = (coarse.spacing / fine.spacing) ** NONLINEAR_ORDER - 1.0
+        return float(self._size(parts[0].plus(parts[1], -1.0)) / gain)
 
     def mesh(self, size: float) -> float:
         """Discretisation error of elements of a size [m]; infinite where one mesh is all there is.

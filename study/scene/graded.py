@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study.problem.features import FEATURES
+from study.problem.features import BESIDE_ONE_LOAD
 from study.scene.schema import Lattice, Scene
+
+NO_TOLERANCE = (
+    "region.radius: a tolerance is kept at rest under a single load of a given force, and the "
+    "scene has more; give how far the finest cells reach"
+)
 
 
 def has_graded(scene: Scene) -> bool:
@@ -22,9 +27,9 @@ def contradictions(scene: Scene) -> Iterator[str]:
     if not has_graded(scene):
         return
     yield from unfit(scene.lattice)
-    if scene.features:
-        what = " and ".join(FEATURES[name] for name in scene.features)
-        yield f"models: a graded lattice cannot follow {what}; leave it out, or name tissue instead"
+    sized = "region" in scene.models and scene.region.radius is None
+    if sized and set(scene.features) & set(BESIDE_ONE_LOAD):
+        yield NO_TOLERANCE
     for name in scene.region.at:
         if name not in (scene.control_points or ("tool",)):
             yield (

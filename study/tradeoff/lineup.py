@@ -176,10 +176,8 @@ CONTENDERS: dict[str, Contender] = {
     ),
     "superposition": Contender("superposition", _superposition),
     "corrected": Contender("corrected", _corrected),
-    "region": Contender("region", _region, unable=frozenset(FEATURES)),
-    "corrected-graded": Contender(
-        "corrected", _graded, {"coarse": "graded"}, unable=frozenset(FEATURES)
-    ),
+    "region": Contender("region", _region, unable=frozenset({"moved-tools"})),
+    "corrected-graded": Contender("corrected", _graded, {"coarse": "graded"}),
 }
 
 

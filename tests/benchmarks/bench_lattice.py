@@ -39,7 +39,7 @@ from msm.assembly import Assembly, Material, arrays
 from msm.calibration import reference_stiffness
 from msm.damping import NodalDamping
 from msm.explicit import symplectic_euler
-from msm.grid import grid_of
+from msm.grid import grids_of
 from msm.grid_explicit import symplectic_euler as symplectic_euler_on_grid
 from msm.lattice import CORNERS, CellLattice, node_volumes
 from msm.laws import Hooke, Law
@@ -193,7 +193,7 @@ def stepping(
     factors = np.ones((count, 1))
     if lattice is None:
         return lambda: symplectic_euler(law, net, factors, dt, u, v)
-    grid = grid_of(lattice, net)
+    grid = grids_of(lattice, net)
     return lambda: symplectic_euler_on_grid(law, grid, factors, dt, u, v)
 
 
@@ -261,7 +261,7 @@ def on_list(law: Law, net: Network, dt: float) -> Candidate:
 def on_grid(law: Law, net: Network, dt: float, lattice: CellLattice, lanes: int) -> Candidate:
     """Over the grid."""
     u, v = np.zeros((2, *net.load.shape))
-    grid = grid_of(lattice, net, lanes)
+    grid = grids_of(lattice, net, lanes)
 
     def advance(count: int) -> None:
         symplectic_euler_on_grid(law, grid, np.ones((count, 1)), dt, u, v)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from msm.damping import NodalDamping
-from msm.grid import grid_of
+from msm.grid import grids_of
 from msm.grid_explicit import symplectic_euler
 from msm.integrators import INTEGRATORS
 from msm.lattice import CellLattice
@@ -84,7 +84,7 @@ def block(case: field_error.Case, spacing: float, nu: float, *, with_volume: boo
 
 def lattice(body: Block) -> Contender:
     """The lattice under symplectic Euler, over the grid as in a run."""
-    grid, limit = grid_of(body.lattice, body.net), body.limit
+    grid, limit = grids_of(body.lattice, body.net), body.limit
 
     def run(dt: float, count: int) -> Floats:
         u, v = np.zeros((2, *body.net.load.shape))

@@ -2,8 +2,9 @@
 
     python -m tests.benchmarks.corrected_places DIR [PLACES]
 
-writes reports/data/corrected_places.csv, a row per place, and corrected_cost.csv, what each lattice
-costs. Runs are kept in DIR as soon as they end: started again, only what is missing is run.
+writes reports/data/corrected_places.csv, a row per place; runs are kept in DIR as soon as they end:
+started again, only what is missing is run. Without DIR it writes corrected_cost.csv alone, what
+each lattice costs.
 
 Errors are relative L2 differences of the displacement of the control point under the tool. What a
 corrected lattice of a spacing adds to the linear elements is compared with what the finest lattice
@@ -25,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from study.models.finite_elements import FRAME_RATE
 from study.models.model import Model, Prepared, Stepper
 from study.models.remainder import ORDER
 from study.models.table import model
@@ -37,7 +39,7 @@ from study.sweep.runner import Outcome, run
 from study.sweep.store import Store
 from study.sweep.tally import on_stderr
 from study.sweep.task import Task
-from study.tradeoff.timing import Timing, in_turns
+from study.tradeoff.timing import in_turns
 from tests.benchmarks.corrected_runs import FUNCTION, LEVEL, SAMPLES, SPACINGS, scene
 
 Floats = NDArray[np.float64]
@@ -51,6 +53,8 @@ SMALL, LARGE = (0.01, 0.05), (0.05, 0.2)
 FINEST = SPACINGS[-1]
 UNIFORM = (0.02, 0.015, 0.01, 0.008, 0.02 / 3, 0.005)
 CORRECTED = (0.02, 0.015, 0.01, 0.008)
+REACHES, LARGER = (0.6, 1.0), 1.5
+"""How far the finest cells of graded lattices reach, in radii of the tool; the last one alone."""
 TRUE_LEVEL = LEVEL + 1
 TOLERANCE = 0.02
 TURNS = 5
@@ -101,16 +105,21 @@ class Row(NamedTuple):
 class Cost(NamedTuple):
     """A lattice alone or corrected at the built-in place: processor time of its steps, and errors.
 
-    `per_second` [s]: of a simulated second; `field_error` over the organ at the peak, `tool_error`
-    of the curve at the tool, relative L2, against linear elements on a finer mesh and what the
-    finest lattice adds to them.
+    `spacing_m`: of the finest cells, which reach `radius_m` from the tool, 0 where they are all.
+    Steps are taken as a run takes them, by frames of 1/60 s with the displacement after each:
+    `per_second` [s] of a simulated second, `step_us` of a step; `single_us` of one that is taken by
+    itself. `field_error` over the organ at the
+    peak, `tool_error` of the curve at the tool, relative L2, against linear elements on a finer
+    mesh and what the finest lattice adds to them.
     """
 
     model: str
     spacing_m: float
+    radius_m: float
     unknowns: int
     step_s: float
     step_us: float
+    single_us: float
     per_second: float
     field_error: float
     tool_error: float
@@ -217,11 +226,15 @@ def costs() -> list[Cost]:
     problem = problem_of(scene())
     ready = dict(lattices(problem))
     steppers = [one.stepper() for one in ready.values()]
-    timings = in_turns(steppers, TURNS, time.process_time)
+    count = len(steppers)
+    timings = in_turns([*map(by_frames, steppers), *steppers], TURNS, time.process_time)
     truth = both(FINEST, TRUE_LEVEL).prepare(problem).simulate().trajectory
+    walls = [float(timing.walls.mean(axis=1).min()) for timing in timings]
     return [
-        cost(*named, one, timing, truth, problem.volume_rule.weights)
-        for named, one, timing in zip(ready.items(), steppers, timings, strict=True)
+        cost(*named, one, wall, single, truth, problem.volume_rule.weights)
+        for named, one, wall, single in zip(
+            ready.items(), steppers, walls[:count], walls[count:], strict=True
+        )
     ]
 
 
@@ -231,31 +244,62 @@ def both(spacing: float, level: int) -> Model:
     return given.varied(spacing=spacing, level=level, step_fraction=0.8)
 
 
-def lattices(problem: Problem) -> Iterator[tuple[tuple[str, float], Prepared]]:
-    """By model and spacing."""
-    alone = model(scene(), "tissue")
+def in_frame(one: Stepper) -> int:
+    """Steps in a frame."""
+    return max(1, round(1.0 / (FRAME_RATE * one.step)))
+
+
+def by_frames(one: Stepper) -> Stepper:
+    """The same, of which a step is a frame with its displacement delivered."""
+    count = in_frame(one)
+
+    def take_frame() -> None:
+        one.take_steps(count)
+        one.displacement()
+
+    return Stepper(
+        take_frame, one.displacement, count * one.step, one.unknowns, restart=one.restart
+    )
+
+
+def lattices(problem: Problem) -> Iterator[tuple[tuple[str, float, float], Prepared]]:
+    """By model, spacing and, of graded ones, radius."""
+    given = scene()
+    alone, region = model(given, "tissue"), model(given, "region")
+    same = {"volume_term": True, "step_fraction": 0.8}
     for h in UNIFORM:
-        found = alone.varied(spacing=h, volume_term=True, step_fraction=0.8)
-        yield ("uniform", h), found.prepare(problem)
+        yield ("uniform", h, 0.0), alone.varied(spacing=h, **same).prepare(problem)
+    for times in (*REACHES, LARGER):
+        radius = times * given.tool.radius
+        found = region.varied(spacing=FINEST, radius=radius, **same)
+        yield ("graded", FINEST, radius), found.prepare(problem)
     for h in CORRECTED:
-        yield ("corrected", h), both(h, LEVEL).prepare(problem)
+        yield ("corrected", h, 0.0), both(h, LEVEL).prepare(problem)
+    for times in REACHES:
+        radius = times * given.tool.radius
+        found = both(FINEST, LEVEL).varied(coarse="graded", spacing=FINEST, radius=radius)
+        yield ("corrected graded", FINEST, radius), found.prepare(problem)
+    elements = model(given, "superposition").varied(level=LEVEL, certificate=0)
+    yield ("superposition", 0.0, 0.0), elements.prepare(problem)
 
 
 def cost(
-    named: tuple[str, float],
+    named: tuple[str, float, float],
     ready: Prepared,
     one: Stepper,
-    timing: Timing,
+    frame: float,
+    single: float,
     truth: Trajectory,
     volumes: Floats,
 ) -> Cost:
-    """Per step and per simulated second, the best of the turns: others share the machine."""
-    step = float(timing.walls.mean(axis=1).min())
+    """Of a frame and of a single step [s], the best of the turns: others share the machine."""
+    step = frame / in_frame(one)
     found = ready.simulate().trajectory
     weights = np.ones(len(found.displacement))
     field = relative_l2(found.volume_field[0], truth.volume_field[0], volumes)
     tool = relative_l2(found.displacement[:, 0], truth.displacement[:, 0], weights)
-    return Cost(*named, one.unknowns, one.step, 1e6 * step, step / one.step, field, tool)
+    walls = 1e6 * step, 1e6 * single, step / one.step
+    return Cost(*named, one.unknowns, one.step, *walls, field, tool)
 
 
 def written(path: Path, rows: Sequence[NamedTuple]) -> None:
@@ -270,16 +314,8 @@ def _printed(value: object) -> object:
     return f"{value:.4g}" if isinstance(value, float) else value
 
 
-def cheapest(errors: Sequence[float], found: Sequence[Cost]) -> float:
-    """Cost of the cheapest of these that meets the tolerance, infinite if none does."""
-    pairs = zip(errors, found, strict=True)
-    return min((one.per_second for e, one in pairs if e <= TOLERANCE), default=np.inf)
-
-
-def summary(rows: Sequence[Row], found: Sequence[Cost]) -> Iterator[str]:
-    """What the tables say, in lines."""
-    for one in found:
-        yield f"{one.model} {1e3 * one.spacing_m:.3g} mm: {one.per_second:.3g} s per second"
+def summary(rows: Sequence[Row]) -> Iterator[str]:
+    """What the table says, in lines; `docs.figures` holds it against the costs."""
     for name, of in groups(rows):
         ratios = np.array([r.error_20 / r.estimate_20 for r in of])
         yield f"{name}: {len(of)} places, {(ratios <= 2.0).sum()} within twice the estimate"
@@ -295,34 +331,6 @@ def summary(rows: Sequence[Row], found: Sequence[Cost]) -> Iterator[str]:
             values = np.array([getattr(r, kind) for r in of])
             met = int((values <= TOLERANCE).sum())
             yield f"  {kind}: median {np.median(values):.2%}, worst {values.max():.2%}, {met} met"
-        for words, each in zip(
-            ("elements", "finest"), zip(*(gains(r, found) for r in of), strict=True), strict=True
-        ):
-            yield f"  cost of the cheapest uniform one over it, {words}: {quantiles(each)}"
-
-
-def gain(errors: Sequence[float], corrected: Sequence[float], found: Sequence[Cost]) -> float:
-    """How many times the cheapest uniform lattice costs of the cheapest corrected one.
-
-    The finest is taken where no other meets the tolerance: a lower bound then. Zero where no
-    corrected one meets it.
-    """
-    uniform = [one for one in found if one.model == "uniform"]
-    both = [one for one in found if one.model == "corrected"]
-    return cheapest([*errors[:-1], 0.0], uniform) / cheapest(corrected, both)
-
-
-def gains(one: Row, found: Sequence[Cost]) -> tuple[float, float]:
-    """Against elements and what the finest lattice adds, and against the finest lattice."""
-    corrected = one.error_20, one.error_15, one.error_10, one.error_8
-    sums = (one.uniform_20, one.uniform_15, one.uniform_10, one.uniform_8, one.uniform_7)
-    own = (one.own_20, one.own_15, one.own_10, one.own_8, one.own_7)
-    return tuple(gain([*errors, 0.0], corrected, found) for errors in (sums, own))
-
-
-def quantiles(values: Sequence[float]) -> str:
-    """A few of them."""
-    return ", ".join(f"{q} % {np.percentile(values, q):.3g}" for q in (0, 5, 50, 95))
 
 
 def groups(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
@@ -337,15 +345,19 @@ def observed(outcomes: Sequence[Outcome]) -> list[At]:
     return [At(one.task.arguments, one.value) for one in outcomes if one.value is not None]
 
 
-def main(folder: str, places: str = str(PLACES)) -> None:
-    """Run what is missing, write both tables and print what they say."""
+def main(folder: str | None = None, places: str = str(PLACES)) -> None:
+    """Run what is missing and write its table, or that of costs, and print what it says."""
+    if folder is None:
+        priced = costs()
+        written(COSTS, priced)
+        for cost in priced:
+            sys.stdout.write(f"{cost}\n")
+        return
     with on_stderr("places") as tell:
         outcomes = run(tasks(int(places)), Store(Path(folder)), None, tell)
-    found = observed(outcomes)
-    rows, priced = [row(at) for at in found], costs()
+    rows = [row(at) for at in observed(outcomes)]
     written(TABLE, rows)
-    written(COSTS, priced)
-    for line in summary(rows, priced):
+    for line in summary(rows):
         sys.stdout.write(line + "\n")
 
 

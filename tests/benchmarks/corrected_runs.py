@@ -128,19 +128,19 @@ def under_tool(at: list[float], radius: float, force: float) -> Problem:
     )
 
 
-@lru_cache(maxsize=1)
-def elements() -> tuple[Body, Any]:
-    """The body on its level, whatever the load, and scikit-fem's basis on its facets."""
+@lru_cache(maxsize=3)
+def elements(level: int = LEVEL) -> tuple[Body, Any]:
+    """The body on a level, whatever the load, and scikit-fem's basis on its facets."""
     found = base()
-    level = found.geometry.level(LEVEL)
-    assert level is not None
-    where = (level.mesh, found.tissue, found.foundation, found.tool, AUTO, found.geometry.project)
+    on = found.geometry.level(level)
+    assert on is not None
+    where = (on.mesh, found.tissue, found.foundation, found.tool, AUTO, found.geometry.project)
     return discretise(*where), loaded_surface(*where)[1]
 
 
-def pressed(problem: Problem) -> Body:
+def pressed(problem: Problem, level: int = LEVEL) -> Body:
     """The body under the tool of a problem."""
-    body, surface = elements()
+    body, surface = elements(level)
     tool = problem.tool
     form = skfem.LinearForm(lambda v, w: tool.profile(rows(w.x), rows(w.n)) * v)
     nodal = np.asarray(form.assemble(surface))

@@ -3,8 +3,8 @@
     python -m tests.benchmarks.graded_places [PLACES]
 
 writes reports/data/graded_places.csv, a row per place of `corrected_places.csv`, which has uniform
-and corrected lattices there, and graded_cost.csv, what each lattice costs in processor time at the
-built-in place. Places that are in the table are kept.
+and corrected lattices there. Places that are in the table are kept. What corrected ones cost, which
+is nearly the same everywhere, is in `corrected_cost.csv`.
 
 Errors are relative L2 differences of the curve of the control point under the tool, as there: of a
 region of interest against the uniform lattice of 5 mm, of a graded corrected lattice of what it
@@ -16,7 +16,6 @@ from __future__ import annotations
 import csv
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -31,20 +30,17 @@ from study.scene import Place, Scene
 from study.scene.problem import problem_of
 from study.tradeoff.timing import in_turns
 from tests.benchmarks import corrected_places
-from tests.benchmarks.corrected_places import written
+from tests.benchmarks.corrected_places import REACHES, by_frames, written
 from tests.benchmarks.corrected_runs import VECTORS, scene
 
 Floats = NDArray[np.float64]
 
 TABLE = corrected_places.TABLE.with_name("graded_places.csv")
-COSTS = TABLE.with_name("graded_cost.csv")
 PLACES = 20
 EVERY = 5
 """Of the places of the other table."""
 FINEST = 0.005
 TOLERANCE = 0.02
-REACHES = (1.0, 0.6)
-"""How far the finest cells of a corrected lattice reach, in radii of the tool."""
 TURNS = 5
 
 
@@ -52,7 +48,8 @@ class Row(NamedTuple):
     """A place as in the other table; lengths [m], relative errors, nodes that do not hang.
 
     `region_apart`: what the region's rest is off, linear, by which its radius was chosen;
-    `region_error` of its motion. `graded_*`: of corrected lattices whose finest cells reach REACHES
+    `region_error` of its motion; `region_gain`: processor time of the finest cells throughout over
+    its own. `graded_*`: of corrected lattices whose finest cells reach REACHES
     radii of the tool. `uniform_10` and `uniform_8`, of lattices of one size, and `corrected_20`
     and `corrected_10` are those of the other table.
     """
@@ -66,6 +63,7 @@ class Row(NamedTuple):
     region_nodes: int
     region_apart: float
     region_error: float
+    region_gain: float
     graded_nodes: int
     graded_error: float
     graded_near_nodes: int
@@ -76,26 +74,11 @@ class Row(NamedTuple):
     corrected_10: float
 
 
-class Cost(NamedTuple):
-    """Processor time of a lattice's steps at the built-in place, the least of the turns.
-
-    `spacing_m`: of the finest cells; `nodes` that do not hang; `per_second` [s]: of a simulated
-    second. Of a corrected lattice it is the coarse part alone.
-    """
-
-    model: str
-    spacing_m: float
-    nodes: int
-    step_s: float
-    step_us: float
-    per_second: float
-
-
-def known() -> list[dict[str, float]]:
+def known(every: int = EVERY) -> list[dict[str, float]]:
     """Places of the other table, every so many."""
     with corrected_places.TABLE.open(encoding="utf-8") as file:
         rows = [{k: _number(v) for k, v in one.items()} for one in csv.DictReader(file)]
-    return rows[::EVERY]
+    return rows[::every]
 
 
 def _number(text: str) -> float:
@@ -121,13 +104,14 @@ def row(one: dict[str, float]) -> Row:
     added = truth - at_tool(problem, linear.simulate().trajectory.displacement)
     region = lattice(given, "region", spacing=FINEST, tolerance=TOLERANCE).prepare(problem)
     found = at_tool(problem, region.simulate().trajectory.displacement)
-    graded = [corrected(given, problem, reach, added, truth) for reach in REACHES]
+    graded = [corrected(given, problem, reach, added, truth) for reach in reversed(REACHES)]
     return Row(
         *(one[key] for key in ("at_x", "at_z", "radius_m", "strain", "force_n")),
         region.region.radius,
         free(region),
         region.region.apart,
         size(found - truth, truth),
+        ratio(region, whole),
         *(value for pair in graded for value in pair),
         *(one[key] for key in ("own_10", "own_8", "error_20", "error_10")),
     )
@@ -163,31 +147,15 @@ def size(difference: Floats, whole: Floats) -> float:
     return float(np.linalg.norm(difference) / np.linalg.norm(whole))
 
 
-def costs() -> list[Cost]:
-    """Of all lattices in turns at the built-in place."""
-    given = scene()
-    problem = problem_of(given)
-    ready = dict(lattices(given, problem))
-    steppers = [one.stepper() for one in ready.values()]
+def ratio(one: PreparedLattice, whole: PreparedLattice) -> float:
+    """Processor time of a simulated second of the finest cells throughout, over one's."""
+    steppers = [by_frames(each.stepper()) for each in (one, whole)]
     timings = in_turns(steppers, TURNS, time.process_time)
-    found = []
-    for (name, one), stepper, timing in zip(ready.items(), steppers, timings, strict=True):
-        step = float(timing.walls.mean(axis=1).min())
-        cost = 1e6 * step, step / stepper.step
-        found.append(Cost(name, one.model.spacing, free(one), stepper.step, *cost))
-    return found
-
-
-def lattices(given: Scene, problem: Problem) -> Iterator[tuple[str, PreparedLattice]]:
-    """By name."""
-    for h in (0.01, 0.008, FINEST):
-        yield f"uniform {1e3 * h:.3g} mm", lattice(given, "tissue", spacing=h).prepare(problem)
-    one = lattice(given, "region", spacing=FINEST, tolerance=TOLERANCE)
-    yield f"region for {100 * TOLERANCE:.3g} %", one.prepare(problem)
-    for reach in REACHES:
-        radius = reach * given.tool.radius
-        one = lattice(given, "region", spacing=FINEST, radius=radius)
-        yield f"graded to {1e3 * radius:.3g} mm", one.prepare(problem)
+    cost, most = (
+        timing.walls.mean(axis=1).min() / stepper.step
+        for timing, stepper in zip(timings, steppers, strict=True)
+    )
+    return float(most / cost)
 
 
 def kept() -> dict[tuple[float, float], Row]:
@@ -204,14 +172,13 @@ def kept() -> dict[tuple[float, float], Row]:
 
 
 def main(places: int = PLACES) -> None:
-    """Write both tables, the first after each place."""
+    """Write the table, after each place."""
     rows = kept()
     for one in known()[:places]:
         key = one["at_x"], one["at_z"]
         if key not in rows:
             rows[key] = row(one)
             written(TABLE, list(rows.values()))
-    written(COSTS, costs())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,205 @@
+"""What grids are made of: the nodes, springs and support of the cells of one size, in their box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from msm.graded import GradedLattice
+from msm.grid_joints import Joints
+from msm.lattice import CellLattice
+from msm.network import Network
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+WHOLE = 1e-6
+"""How far from a whole number of edges a rest vector may be, of an edge."""
+
+
+class Pairs(NamedTuple):
+    """Pairs of nodes by direction: the first node, which direction, a value; offsets of those."""
+
+    node: Ints
+    which: Ints
+    value: Floats
+    offset: Ints
+
+
+NOTHING = np.zeros(0, dtype=np.int64)
+NO_PAIRS = Pairs(NOTHING, NOTHING, np.zeros(0), NOTHING)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Cells of one size: their nodes, springs and support.
+
+    `node` (k,): number of each in the network; `numbers` (k,): in the box, which has `count`;
+    `strides` (3,): how far the next one is along each axis. `springs` and `held` from the nodes of
+    lower number, and those of the foundation, in numbers of the part; `rest` [m] (s, 3) of each
+    direction. `cells` (c,), of the network, and their lowest corner (c,). `owned` (k,): whether
+    mass and load of a node are here.
+    """
+
+    spacing: float
+    node: Ints
+    numbers: Ints
+    strides: Ints
+    count: int
+    springs: Pairs
+    rest: Floats
+    held: Pairs
+    cells: Ints
+    lowest: Ints
+    owned: NDArray[np.bool_]
+
+    @property
+    def reach(self) -> int:
+        """How far from a node of its own anything that it is told to read may stand."""
+        offsets = (self.springs.offset, self.held.offset)
+        return int(max(*(np.abs(found).max(initial=0) for found in offsets), self.strides.sum()))
+
+
+def whole(lattice: CellLattice, net: Network) -> Part:
+    """A lattice of one size of cells."""
+    every = np.arange(len(net.mass))
+    index = _index(lattice, every)
+    strides, count = _numbering(index)
+    springs, rest = _springs(net, np.arange(len(net.ends)), index, strides, lattice.spacing)
+    return Part(
+        lattice.spacing,
+        every,
+        index @ strides,
+        strides,
+        count,
+        springs,
+        rest,
+        _couplings(net, index @ strides),
+        np.arange(len(net.cells)),
+        net.cells[:, 0].astype(np.int64),
+        np.ones(len(every), dtype=np.bool_),
+    )
+
+
+def by_size(lattice: GradedLattice, net: Network) -> list[Part]:
+    """Cells of each size, the finest first; the support of several is left to the joints.
+
+    A spring is one of the largest cells between whose nodes it runs: so rows have the directions of
+    their cells alone. A node is owned by the smallest cells that have it.
+    """
+    levels = [one for one in lattice.levels if len(one.cells)]
+    if len(levels) == 1:
+        return [whole(levels[0], net)]
+    left = np.ones(len(net.ends), dtype=np.bool_)
+    taken: dict[int, Ints] = {}
+    for n, one in reversed(list(enumerate(levels))):
+        corner = np.zeros(len(net.mass), dtype=np.bool_)
+        corner[one.cells] = True
+        steps = net.rest / one.spacing
+        fits = (np.abs(steps - np.rint(steps)) < WHOLE).all(axis=1)
+        taken[n] = np.flatnonzero(left & fits & corner[net.ends].all(axis=1))
+        left[taken[n]] = False
+    parts, owned = [], np.zeros(len(net.mass), dtype=np.bool_)
+    owned[net.hanging] = True  # by none
+    for n, one in enumerate(levels):
+        parts.append(_size(one, net, taken[n], owned))
+        owned[parts[-1].node] = True
+    return parts
+
+
+def _size(level: CellLattice, net: Network, chosen: Ints, owned: NDArray[np.bool_]) -> Part:
+    """Cells of one size with the chosen springs; they own what is not owned yet."""
+    node = np.unique(level.cells)
+    index = _index(level, node)
+    strides, count = _numbering(index)
+    local = np.zeros(len(net.mass), dtype=np.int64)
+    local[node] = np.arange(len(node))
+    at = np.zeros((len(net.mass), 3), dtype=np.int64)
+    at[node] = index
+    springs, rest = _springs(net, chosen, at, strides, level.spacing)
+    cells = np.flatnonzero(np.abs(net.edges / level.spacing - 1.0) < WHOLE)
+    return Part(
+        level.spacing,
+        node,
+        index @ strides,
+        strides,
+        count,
+        springs._replace(node=local[springs.node]),
+        rest,
+        NO_PAIRS,
+        cells,
+        local[net.cells[cells, 0].astype(np.int64)],
+        ~owned[node],
+    )
+
+
+def _index(lattice: CellLattice, node: Ints) -> Ints:
+    """Where nodes of a lattice stand in their own box (k, 3), in edges of a cell."""
+    index = np.rint((lattice.nodes[node] - lattice.origin) / lattice.spacing).astype(np.int64)
+    return np.asarray(index - index.min(axis=0))
+
+
+def _numbering(index: Ints) -> tuple[Ints, int]:
+    """How far the next place of a box is along each axis, and how many there are."""
+    counts = index.max(axis=0) + 1
+    strides = np.ones(3, dtype=np.int64)
+    first, second, third = np.argsort(-counts, kind="stable")
+    strides[second] = counts[first]
+    strides[third] = counts[first] * counts[second]
+    return strides, int(counts.prod())
+
+
+def _springs(
+    net: Network, chosen: Ints, index: Ints, strides: Ints, spacing: float
+) -> tuple[Pairs, Floats]:
+    """The chosen springs from their ends of lower number, and the rest vector [m] by direction."""
+    ends = net.ends[chosen].astype(np.int64)
+    apart = index[ends[:, 1]] - index[ends[:, 0]]
+    ahead = apart @ strides > 0
+    node = np.where(ahead, ends[:, 0], ends[:, 1])
+    steps, which = np.unique(np.where(ahead, 1, -1)[:, None] * apart, axis=0, return_inverse=True)
+    weight = net.scale[chosen] / net.length[chosen]
+    return Pairs(node, which.ravel(), weight, steps @ strides), spacing * steps
+
+
+def _couplings(net: Network, number: Ints) -> Pairs:
+    """The entries of the foundation, by how far ahead of the row's node the column's stands."""
+    counts = net.row[1:].astype(np.int64) - net.row[:-1].astype(np.int64)
+    node = np.repeat(np.arange(len(number)), counts)
+    ahead = number[net.column.astype(np.int64)] - number[node]
+    offset, which = np.unique(ahead, return_inverse=True)
+    return Pairs(node, which, net.value, offset)
+
+
+def joined(parts: list[Part], place: list[Ints], primary: Ints, net: Network) -> Joints:
+    """Places that follow others, with the places and shares of what moves them, and the support."""
+    count = len(net.mass)
+    hangs = np.zeros(count, dtype=np.bool_)
+    hangs[net.hanging] = True
+    free = np.flatnonzero(~hangs)
+    first = net.first_master.astype(np.int64)
+    rows = np.concatenate([free, np.repeat(net.hanging.astype(np.int64), first[1:] - first[:-1])])
+    columns = np.concatenate([free, net.master.astype(np.int64)])
+    shares = np.concatenate([np.ones(len(free)), net.part])
+    moved = csr_array((shares, (rows, columns)), shape=(count, count))
+    copies = [
+        (part.node[~part.owned], at[~part.owned]) for part, at in zip(parts, place, strict=True)
+    ]
+    node, copy = (np.concatenate([pair[k] for pair in copies]) for k in (0, 1))
+    of_copies = csr_array(moved[node])
+    held = np.flatnonzero(np.diff(net.row.astype(np.int64)))
+    value, column, row = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
+    return Joints(
+        copy.astype(np.int64),
+        of_copies.indptr.astype(np.int64),
+        primary[of_copies.indices],
+        of_copies.data,
+        primary[held],
+        row[np.append(held, len(row) - 1)],
+        primary[column],
+        value,
+    )
