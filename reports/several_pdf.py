@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 TEMPLATE = "several.typ"
 COLUMNS = 3
+LOOKS_FROM = 4
+"""The first of the looks of runs, whose colours are told apart best."""
 MOST_PANELS, MOST_ROWS = 9, 30
 PANEL_HEIGHT, LEGEND_HEIGHT = 1.8, 0.35
 
@@ -38,7 +40,7 @@ def several_pdf(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Co
         "rows": [[words(cell) for cell in row] for row in table[:MOST_ROWS]],
         "left_out": max(0, len(table) - MOST_ROWS),
         "said": several.verdict(rows),
-        "alternative": _alternative(names, runs),
+        "alternative": alternative(names, runs),
     }
     figure = curves_figure(names, runs)
     return compile_pdf(content, {"curves": [] if figure is None else [figure]}, TEMPLATE)
@@ -46,11 +48,11 @@ def several_pdf(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Co
 
 def shared_models(runs: Sequence[Results]) -> list[str]:
     """Labels of the models that two runs have moved, in order."""
-    found = [label for run in runs for label in _moved(run)]
+    found = [label for run in runs for label in moved(run)]
     return [label for label in dict.fromkeys(found) if found.count(label) > 1]
 
 
-def _moved(run: Results) -> dict[str, str]:
+def moved(run: Results) -> dict[str, str]:
     """Name of each model with a curve at the tool, by its label."""
     probe = tool_probe(run)
     return {
@@ -73,8 +75,8 @@ def curves_figure(names: Sequence[str], runs: Sequence[Results]) -> bytes | None
         lines = {}
         for axes, label in zip(grid, labels, strict=False):
             for k, (name, run) in enumerate(zip(names, runs, strict=True)):
-                if label in _moved(run):
-                    lines[k] = _draw(axes, run, _moved(run)[label], k, name)
+                if label in moved(run):
+                    lines[k] = _draw(axes, run, moved(run)[label], k, name)
             axes.set_title(label, loc="left", fontweight="bold")
             axes.set(xlabel="time [s]", ylabel="displacement [mm]")
         for axes in grid[len(labels) :]:
@@ -88,7 +90,7 @@ def curves_figure(names: Sequence[str], runs: Sequence[Results]) -> bytes | None
 
 def _draw(axes: Axes, run: Results, model: str, k: int, name: str) -> object:
     """A run's curve at its tool, with the error of its peak."""
-    probe, look = tool_probe(run), other_look(k + 4)
+    probe, look = tool_probe(run), other_look(k + LOOKS_FROM)
     curve = run.curve(model, probe)
     style = look.line | {"linewidth": 1.4}
     (line,) = axes.plot(curve.time, MILLI * curve.displacement, label=name, **style)
@@ -101,12 +103,13 @@ def _draw(axes: Axes, run: Results, model: str, k: int, name: str) -> object:
     return line
 
 
-def _alternative(names: Sequence[str], runs: Sequence[Results]) -> str:
+def alternative(names: Sequence[str], runs: Sequence[Results]) -> str:
+    """The largest displacement of each model in each run, for whoever does not see the curves."""
     parts = []
     for label in shared_models(runs):
         told = []
         for name, run in zip(names, runs, strict=True):
-            model = _moved(run).get(label)
+            model = moved(run).get(label)
             largest = None if model is None else peak(run, model, tool_probe(run))
             if largest is not None:
                 told.append(f"{name} {significant(MILLI * largest)} mm")

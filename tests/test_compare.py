@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -217,8 +219,27 @@ def test_every_run_is_a_line_at_its_own_scale(monkeypatch):
     assert len(heights["Finite elements"]) == 2
 
 
+def test_a_page_of_several_runs_asks_for_nothing_and_draws_each(tmp_path, capsys):
+    pytest.importorskip("plotly")
+    runs = {"a": whole(), "b": scaled(whole(), 1.2)}
+    for name, run in runs.items():
+        (tmp_path / name).mkdir()
+        write(run, tmp_path / name)
+    command(*(tmp_path / name for name in runs), errors=True, out=tmp_path / "a.html")
+    assert capsys.readouterr().out.endswith(f"page in {tmp_path / 'a.html'}\n")
+    text = (tmp_path / "a.html").read_text()
+    own = text[: text.index("<noscript>")]
+    assert "default-src 'none'" in own
+    assert not re.search(r"https?://|url\(", own)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
+    ends = {(one["name"], one["xaxis"]): max(one["y"]) for one in data["traces"]}
+    assert ends["b", "x2"] == pytest.approx(1.2 * ends["a", "x2"], rel=1e-5)
+    assert ends["b", "x1"] == ends["a", "x1"]
+    assert sum(one["showlegend"] for one in data["traces"]) == 2
+
+
 def test_out_has_an_ending_that_says_what_it_is(tmp_path):
-    with pytest.raises(ValueError, match=r"end it with \.csv for the table, or \.pdf"):
+    with pytest.raises(ValueError, match=r"end it with \.csv for the table, \.pdf or \.html"):
         command(tmp_path, tmp_path, errors=True, out=tmp_path / "table.txt")
 
 

@@ -380,11 +380,11 @@ def test_a_point_has_no_organ_and_the_page_still_works(tmp_path):
 @needs_browser
 def test_a_defect_of_the_page_is_seen(tmp_path, monkeypatch):
     """Negative control: a program that throws and asks the network."""
-    part = write._part
+    part = write.part
     planted = 'new Image().src = "https://example.invalid/x"; undefinedName();'
     monkeypatch.setattr(
         write,
-        "_part",
+        "part",
         lambda name: (
             part(name).replace(
                 "function startPage() {",

@@ -51,7 +51,7 @@ def make_page(folder: Path) -> None:
 
 def page_of(results: Results) -> bytes:
     """The page of results in memory; the same results and plotly give the same bytes."""
-    parts = {name: _part(name) for name in PARTS}
+    parts = {name: part(name) for name in PARTS}
     title = words(results.record.title or "Untitled scene")
     text = Template(parts["page.html"]).substitute(
         _written(results),
@@ -60,24 +60,30 @@ def page_of(results: Results) -> bytes:
         organ=parts["organ.js"],
         program=parts["page.js"],
         data=_data(results),
-        plotly=_plotly(),
+        plotly=plotly(),
     )
     return text.encode()
 
 
-def _part(name: str) -> str:
+def part(name: str) -> str:
+    """Text of a file of the page's own."""
     return resources.files("reports.page").joinpath(name).read_text(encoding="utf-8")
 
 
-def _plotly() -> str:
+def plotly() -> str:
     """Plotly's whole program as its package ships it; no smaller bundle of it is on PyPI."""
     file = resources.files("plotly").joinpath("package_data", "plotly.min.js")
     return file.read_text(encoding="utf-8").replace("</script", "<\\/script")
 
 
 def _data(results: Results) -> str:
-    """What is drawn as JSON that closes no element of the page."""
-    text = json.dumps(asdict(page(results)), allow_nan=False, separators=(",", ":"))
+    """What is drawn, as JSON."""
+    return inert(asdict(page(results)))
+
+
+def inert(content: object) -> str:
+    """Content as JSON that closes no element of a page."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
@@ -95,7 +101,7 @@ def _written(results: Results) -> Mapping[str, str]:
         "glance": _glance(results),
         "summary": _items(summary.sentences(results)),
         "scene": markup.escape(write_scene(results.scene)),
-        "provenance": _table(("what", "which"), provenance_rows(results), "What made this run"),
+        "provenance": table(("what", "which"), provenance_rows(results), "What made this run"),
         "notes": _items(words(text) for text in results.record.notes),
         "assumptions": _items(words(text) for text in results.record.assumptions),
     }
@@ -103,7 +109,7 @@ def _written(results: Results) -> Mapping[str, str]:
 
 def _glance(results: Results) -> str:
     header, rows = summary.glance_table(results)
-    return _table(header, rows, "Every model at a glance")
+    return table(header, rows, "Every model at a glance")
 
 
 def _paragraphs(lines: Iterable[str]) -> str:
@@ -131,7 +137,7 @@ def _warnings(results: Results) -> str:
     return f'<div class="warnings" role="note">{_items(lines)}</div>'
 
 
-def _table(header: Iterable[str], rows: Table, caption: str) -> str:
+def table(header: Iterable[str], rows: Table, caption: str) -> str:
     """A table whose first column names its rows."""
     head = "".join(f'<th scope="col">{markup.escape(cell)}</th>' for cell in header)
     body = "\n".join(f"<tr>{_row(row)}</tr>" for row in rows)

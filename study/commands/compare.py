@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from study.compare import Difference
 
 
-CSV, PDF = ".csv", ".pdf"
+CSV, PDF, HTML = ".csv", ".pdf", ".html"
 """Kinds of file that a comparison is written to."""
 
 
@@ -47,7 +47,7 @@ def compare(
         Compare by the errors of the numbers, and not by a tolerance.
     out
         File to write the table to as well, all of it as .csv, or with the curves over each other as
-        .pdf.
+        .pdf or as a page, .html.
     """
     if others or errors:
         _by_errors([first, second, *others], out)
@@ -63,8 +63,10 @@ def _by_errors(folders: list[Path], out: Path | None) -> None:
     from study.results.folder import read
 
     if out is not None:
-        if out.suffix.lower() not in (CSV, PDF):
-            raise ValueError(f"--out {out}: end it with {CSV} for the table, or {PDF} for a report")
+        if out.suffix.lower() not in (CSV, PDF, HTML):
+            raise ValueError(
+                f"--out {out}: end it with {CSV} for the table, {PDF} or {HTML} for both"
+            )
         check_file(out)
     names = several.short_names([str(folder) for folder in folders])
     runs = [read(folder) for folder in folders]
@@ -77,6 +79,14 @@ def _by_errors(folders: list[Path], out: Path | None) -> None:
 
         write_bytes(out, several_pdf(names, runs, rows))
         print(f"report in {out}")
+    elif out.suffix.lower() == HTML:
+        from reports.page.several import several_page
+        from reports.page.write import MISSING, is_drawable
+
+        if not is_drawable():
+            raise ValueError(MISSING)
+        write_bytes(out, several_page(names, runs, rows))
+        print(f"page in {out}")
     else:
         write_text(out, several.text(names, rows))
         print(f"table in {out}")

@@ -1,0 +1,80 @@
+"""Several runs beside each other as one page, which asks no network for anything."""
+
+from __future__ import annotations
+
+import html as markup
+from collections.abc import Iterator, Sequence
+from string import Template
+
+from reports import several
+from reports.appearance import other_look
+from reports.digits import short, words
+from reports.page.data import DASHES, OTHER_DASHES
+from reports.page.write import inert, part, plotly, table
+from reports.ranking import tool_probe
+from reports.several import Compared
+from reports.several_pdf import LOOKS_FROM, alternative, moved, shared_models
+from study.results.folder import Results
+
+MILLI = 1e3
+COLUMNS = 3
+ROW = 20
+"""Height of a row of panels [rem]."""
+DIGITS = 6
+
+
+def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Compared]) -> bytes:
+    """The page; the same runs and plotly give the same bytes."""
+    names = [words(short(name, 24)) for name in names]
+    labels = shared_models(runs)
+    text = Template(part("several.html")).substitute(
+        title=markup.escape(f"Several runs: {', '.join(names)}"),
+        style=part("page.css"),
+        said=markup.escape(several.verdict(rows)),
+        height=f"{ROW * -(-len(labels) // COLUMNS)}rem",
+        words=markup.escape(alternative(names, runs), quote=True),
+        table=table(
+            [*several.HEADER, *names, "verdict"], several.cells(rows), "What differs first"
+        ),
+        data=inert({"traces": list(_traces(names, runs, labels)), "layout": _layout(labels)}),
+        plotly=plotly(),
+    )
+    return text.encode()
+
+
+def _traces(
+    names: Sequence[str], runs: Sequence[Results], labels: Sequence[str]
+) -> Iterator[dict[str, object]]:
+    """A line for each run in the panel of each model."""
+    dashes = [*DASHES.values(), *OTHER_DASHES]
+    seen = set()
+    for panel, label in enumerate(labels, 1):
+        for k, (name, run) in enumerate(zip(names, runs, strict=True)):
+            if label not in moved(run):
+                continue
+            curve = run.curve(moved(run)[label], tool_probe(run))
+            colour, dash = other_look(k + LOOKS_FROM).colour, dashes[k % len(dashes)]
+            yield {
+                "x": [float(f"{t:.{DIGITS}g}") for t in curve.time],
+                "y": [float(f"{MILLI * u:.{DIGITS}g}") for u in curve.displacement],
+                "xaxis": f"x{panel}",
+                "yaxis": f"y{panel}",
+                "name": name,
+                "legendgroup": name,
+                "showlegend": name not in seen,
+                "mode": "lines",
+                "line": {"color": colour, "dash": dash, "width": 2},
+            }
+            seen.add(name)
+
+
+def _layout(labels: Sequence[str]) -> dict[str, object]:
+    rows = max(1, -(-len(labels) // COLUMNS))
+    axes: dict[str, object] = {}
+    for panel, label in enumerate(labels, 1):
+        axes[f"xaxis{panel}"] = {"title": {"text": f"time [s]<br><b>{markup.escape(label)}</b>"}}
+        axes[f"yaxis{panel}"] = {"title": {"text": "displacement [mm]"}}
+    grid = {"rows": rows, "columns": COLUMNS, "pattern": "independent", "ygap": 0.35}
+    legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom"}
+    margin = {"l": 60, "r": 15, "t": 40, "b": 70}
+    return {**axes, "grid": grid, "legend": legend, "hovermode": "x", "margin": margin}
