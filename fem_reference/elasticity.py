@@ -44,6 +44,8 @@ Booleans = NDArray[np.bool_]
 CURVED_ORDER = 4
 MASS_ORDER = 4
 FACET_ORDER = 10
+ENTRIES = 2**16
+"""Of a matrix that are made at once."""
 ROUNDING = 1e-9
 """Of lambda over mu, the difference of two moduli."""
 
@@ -412,7 +414,10 @@ def _isotropic(
     """
     D = integrals.values
     blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
-    blocks += lame * (integrals if by_lame is None else by_lame).values
+    with_lame = (integrals if by_lame is None else by_lame).values
+    for start in range(0, len(blocks), ENTRIES):  # a whole product would be as large as the matrix
+        part = slice(start, start + ENTRIES)
+        blocks[part] += lame * with_lame[part]
     diagonal = np.einsum("nii->ni", blocks)
     diagonal += mu * np.einsum("nii->n", D)[:, None]
     if not np.isfinite(blocks).all():

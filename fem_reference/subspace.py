@@ -109,11 +109,13 @@ class Guesses:
         for k, vector in enumerate(self.vectors.T):
             self._pushed[:, k] = body.stiffness @ vector
         self._stiffness = self.vectors.T @ self._pushed
+        self._mixed = np.zeros((self.vectors.shape[1], 0))
 
     def start(self, found: Subspace, load: Floats) -> Floats:
-        """Displacement (n,) that nears the one under a load most."""
+        """Displacement (n,) that nears the one under a load most; `found` only grows."""
         W, V = self.vectors, found.vectors
-        mixed = self._pushed.T @ V
+        known = self._mixed.shape[1]
+        self._mixed = mixed = np.hstack([self._mixed, self._pushed.T @ V[:, known:]])
         energy = np.block([[found.stiffness, mixed.T], [mixed, self._stiffness]])
         sizes = np.sqrt(np.diag(energy))
         forces = np.concatenate([V.T @ load, W.T @ load]) / sizes

@@ -468,8 +468,9 @@ def test_the_reading_as_it_is_needs_a_reading():
 
 def test_a_scene_without_readings_says_which_key_is_missing():
     table = {"organ": {"shape": "point"}, "models": ["basafa", "msm"]}
-    scene = validate(table, "own.toml")
+    scene = validate(table | {"fuzzy": {"systems": ["sugeno"]}}, "own.toml")
     with pytest.raises(ValueError, match=r"patient: no reading .* patient\.hcv"):
         run_study(scene)
-    normal = dataclasses.replace(scene, fuzzy=dataclasses.replace(scene.fuzzy, absent="normal"))
+    fuzzy = dataclasses.replace(scene.fuzzy, absent="normal", sensitivity_readings=0)
+    normal = dataclasses.replace(scene, fuzzy=fuzzy)
     assert run_study(normal).record.fuzzy.systems.keys() == set(scene.fuzzy.systems)

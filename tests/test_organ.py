@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from study.mesh import locate as locating
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import over_surface, over_volume
@@ -100,6 +101,17 @@ def test_locate_reproduces_linear_fields(liver_mesh, rng):
     again = np.einsum("qv,qvd->qd", weight, liver_mesh.points[liver_mesh.tetrahedra[cell]])
     assert weight.min() > -1e-12
     assert np.abs(again - points).max() < 1e-15
+
+
+def test_few_tetrahedra_find_what_many_do(liver_mesh, rng, monkeypatch):
+    points = liver_mesh.points.mean(axis=0) + rng.uniform(-0.15, 0.15, (2000, 3))  # outside too
+    found = locate(liver_mesh, points)
+    monkeypatch.setattr(locating, "FEW", locating.CANDIDATES)
+    every = locate(liver_mesh, points)
+    assert all(np.array_equal(*pair) for pair in zip(found, every, strict=True))
+    monkeypatch.setattr(locating, "FEW", 1)
+    monkeypatch.setattr(locating, "INSIDE", -np.inf)  # negative control: the first will do
+    assert not np.array_equal(locate(liver_mesh, points)[0], found[0])
 
 
 def test_mesh_and_implicit_bodies_agree_but_for_the_facets():

@@ -8,9 +8,11 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+STATEMENTS = ("body", "orelse", "handlers", "finalbody", "cases")
+"""Where a statement holds others."""
 DYNAMIC = ("import_module", "__import__", "iter_modules", "walk_packages", "run_module")
 """A source with one of these words may load modules by a name that no source states."""
-TABLED = re.compile(r"([a-z]\w*(?:\.\w+)*):[A-Z]\w*")
+TABLED = re.compile(r"""(["'])([a-z]\w*(?:\.\w+)*):[A-Z]\w*\1""")
 """A text such as "msm.integrators:INTEGRATORS", whose module is loaded when it is resolved."""
 
 
@@ -24,14 +26,15 @@ def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
     waiting = {module}
     while waiting:
         name = waiting.pop()
-        path = _file(name, roots)
+        path = _file(name, tuple(roots))
         if path is not None and name not in found:
             found[name] = path
             waiting |= set(_parents(name)) | _named(name, path)
     return found
 
 
-def _file(name: str, roots: Sequence[Path]) -> Path | None:
+@functools.cache
+def _file(name: str, roots: tuple[Path, ...]) -> Path | None:
     """Source of a module; None for what is elsewhere, and for names that are no modules."""
     places = [root.joinpath(*name.split(".")) for root in roots]
     candidates = [(place / "__init__.py", place.with_name(f"{place.name}.py")) for place in places]
@@ -49,17 +52,24 @@ def _named(name: str, path: Path) -> frozenset[str]:
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     text = path.read_text(encoding="utf-8")
     tree = ast.parse(text, filename=str(path))
-    names = {found for node in ast.walk(tree) for found in _imported(node, package)}
+    names = {found for node in _statements(tree) for found in _imported(node, package)}
+    names |= {found[2] for found in TABLED.finditer(text)}
     if any(word in text for word in DYNAMIC):
         names |= set(_members(package, path.parent))
     return frozenset(names)
 
 
-def _imported(node: ast.AST, package: str) -> Iterator[str]:
-    """Absolute names in an import; of `from a import b` both a and a.b, as b may be a module.
+def _statements(node: ast.AST) -> Iterator[ast.stmt]:
+    """All that are within it, without the expressions, which are most of a source."""
+    for part in STATEMENTS:
+        for below in getattr(node, part, ()):
+            if isinstance(below, ast.stmt):
+                yield below
+            yield from _statements(below)
 
-    Of a text "a:NAME" it is a.
-    """
+
+def _imported(node: ast.stmt, package: str) -> Iterator[str]:
+    """Absolute names in an import; of `from a import b` both a and a.b, as b may be a module."""
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
@@ -67,9 +77,6 @@ def _imported(node: ast.AST, package: str) -> Iterator[str]:
         base = ".".join(filter(None, (above, node.module)))
         yield base
         yield from (f"{base}.{alias.name}" for alias in node.names)
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-        named = TABLED.fullmatch(node.value)
-        yield from [] if named is None else [named[1]]
 
 
 def _members(package: str, folder: Path) -> Iterator[str]:

@@ -42,7 +42,7 @@ def program(module: str) -> str:
     such module.
     """
     sources = reached(module, (_root(module), ROOT))
-    files = {name: _sha256(path) for name, path in sources.items()}
+    files = {name: _sha256_once(path) for name, path in sources.items()}
     return digest([files, _data(), _versions()])
 
 
@@ -72,6 +72,7 @@ def _root(module: str) -> Path:
     return origin.parents[module.count(".") + (origin.name == "__init__.py")]
 
 
+@functools.cache
 def _data() -> dict[str, str]:
     """SHA-256 of each data file of the packages."""
     paths = [path for package in PACKAGES for path in (ROOT / package).rglob("*")]
@@ -84,6 +85,12 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+@functools.cache
+def _sha256_once(path: Path) -> str:
+    return _sha256(path)
+
+
+@functools.cache
 def _versions() -> dict[str, str | None]:
     return {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
 

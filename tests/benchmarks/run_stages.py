@@ -5,7 +5,8 @@
 takes some five minutes on two quiet cores for the built-in liver. Each case is a process of its own
 with its report, on a store that is empty at first. A stage has the wall time that its record has; a
 whole run also the processor time of all its processes, which other work on the machine touches
-least, and the largest memory of any. `load` is what the machine had to do as the case ended.
+least, and the largest memory of all together at one time, what they share counted once. `load` is
+what the machine had to do as the case ended.
 """
 
 from __future__ import annotations
@@ -18,7 +19,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Event, Thread
+
+import psutil
 
 CASES = {
     "side by side": ("--fresh", "--workers", "2"),
@@ -30,6 +35,8 @@ CASES = {
     "one after another": ("--fresh", "--workers", "1"),
 }
 """Flags by case; those between are of the first, whose stages are kept, or change it."""
+PAUSE = 0.5
+"""Seconds between two looks at the memory."""
 COLUMNS = ("case", "stage", "kept", "wall_s", "processor_s", "memory_mb", "load")
 
 
@@ -54,9 +61,10 @@ def measured(
     process = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    said = process.stderr.read() if process.stderr else ""
-    _, status, used = os.wait4(process.pid, 0)
-    wall = time.perf_counter() - started
+    with watched(process.pid) as sizes:
+        said = process.stderr.read() if process.stderr else ""
+        _, status, used = os.wait4(process.pid, 0)
+        wall = time.perf_counter() - started
     if status:
         sys.exit(said)
     spent, load = used.ru_utime + used.ru_stime, os.getloadavg()[0]
@@ -66,7 +74,7 @@ def measured(
         "",
         f"{wall:.2f}",
         f"{spent:.2f}",
-        f"{used.ru_maxrss / 1e3:.0f}",
+        f"{max(sizes) / 1e6:.0f}",
         f"{load:.1f}",
     )
     if "nothing to compute" in said:
@@ -78,6 +86,34 @@ def measured(
         name, _, seconds = line.partition(": ")
         if name in {"similarity", "results", "report"}:
             yield case, name, False, seconds.removesuffix(" s"), "", "", ""
+
+
+@contextmanager
+def watched(process: int) -> Iterator[list[float]]:
+    """Memory [bytes] of a process and all that it has started, every half second of the block."""
+    sizes, ended = [0.0], Event()
+
+    def watch() -> None:
+        while not ended.wait(PAUSE):
+            with suppress(psutil.Error):
+                top = psutil.Process(process)
+                sizes.append(sum(map(share_of_memory, [top, *top.children(recursive=True)])))
+
+    thread = Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield sizes
+    finally:
+        ended.set()
+        thread.join()
+
+
+def share_of_memory(process: psutil.Process) -> float:
+    """What it uses [bytes], its part of what it shares; none once it has ended."""
+    try:
+        return float(process.memory_full_info().pss)
+    except psutil.Error:
+        return 0.0
 
 
 if __name__ == "__main__":
