@@ -70,7 +70,9 @@ class Together:
         self.frame = Frame(self.elements, damping, self.every)
         below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
         own = shape.subspace.vectors @ self.elements.modes
-        self.shapes = np.hstack([own, -below.reshape(len(own), -1)])
+        shapes = np.hstack([own, -below.reshape(len(own), -1)])
+        # In single precision: they are read once a frame, and drive all else out of the cache.
+        self.shapes = np.asfortranarray(shapes, dtype=np.float32)
 
     @property
     def unknowns(self) -> int:
@@ -105,7 +107,8 @@ class Together:
     def displacement(self) -> Floats:
         """Of the vertices of the elements' mesh [m] (v, 3), as they are now."""
         self._catch_up()
-        linear = self.shapes @ np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
+        coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
+        linear = self.shapes @ coordinates.astype(np.float32)
         return np.asarray(linear.reshape(-1, 3) + self.shape.weights @ self.lattice.displacement())
 
     def restart(self) -> None:
