@@ -27,7 +27,7 @@ GIVEN_BACK = 1e-2
 BEYOND = 0.0
 LOST_FROM = 10.0
 """Times g under which springs without a volume term fall through their own support."""
-FAMILY = Family("rigid tools", __name__)
+FAMILY = Family("lattices in contact", __name__)
 BLOCK = (
     'organ.size=["60 mm", "60 mm", "40 mm"]',
     'models=["tissue"]',

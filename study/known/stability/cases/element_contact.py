@@ -29,7 +29,7 @@ TOP = np.array([0.03, 0.03, 0.03])
 RADIUS = 0.015
 FOUNDATION = 1e7
 ROUNDING, SOLVED = 1e-9, 1e-6
-FAMILY = Family("moved tools", __name__)
+FAMILY = Family("elements in contact", __name__)
 
 
 def cases() -> Iterator[Case]:
