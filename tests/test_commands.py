@@ -375,10 +375,10 @@ def test_a_page_is_not_opened_that_is_not_made(typed):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (["recommend", "press", "--rate", "60 Hz"], "recommend: is of a single load"),
-        (["robustness", "press", "--size", "16"], "robustness: is of a single load"),
-        (["export", "press", "--to", "vtu"], "holds no rigid tools that are moved and gravity"),
-        (["run", "press", "--set", "require.error=2 %"], "require: is of a single load"),
+        (["recommend", "press", "--error", "1 mm"], "that of their force; give a share"),
+        (["robustness", "press", "--size", "16"], "place and force of a blunt tool"),
+        (["export", "press", "--to", "vtu"], "holds no rigid tools that are moved (their force"),
+        (["run", "press", "--set", 'require.quantities=["rest"]'], "rest: is of a single load"),
     ],
 )
 def test_a_study_of_a_single_load_refuses_more(typed, command, said):

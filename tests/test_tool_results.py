@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reports.digits import with_error
 from reports.report import pdf
 from reports.tool_force import force_figure, force_rows
 from study.results.content import check
@@ -81,7 +82,11 @@ def test_what_does_not_belong_is_refused(results, planted):
 
 def test_the_report_shows_force_and_table(results):
     assert force_figure(results).startswith(b"<?xml")
-    assert len(force_rows(results)) == 2
+    rows = force_rows(results)
+    assert len(rows) == 2
+    for row, one in zip(rows, results.record.tools, strict=True):
+        error = one.peak_n * (one.relative_error + one.spacing_error)
+        assert row[2] == with_error(one.peak_n, error)
     assert pdf(results).startswith(b"%PDF")
 
 

@@ -17,13 +17,15 @@ from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import study as study_module
 from study.tradeoff import table
-from study.tradeoff.errors import errors
+from study.tradeoff.errors import Errors, errors
 from study.tradeoff.judge import FINEST, is_finest, lattices, truth_of
 from study.tradeoff.lineup import Configuration, configurations
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import plain, sampled
-from study.tradeoff.recommend import _promises
+from study.tradeoff.recommend import Candidate, Promise, Recommended, _promises, lines
 from study.tradeoff.reference import Truth
+from study.tradeoff.table import Cost
+from study.tradeoff.timing import Timing
 from tests.test_tradeoff import command  # noqa: F401 - a fixture
 
 PRESSED = (
@@ -187,6 +189,22 @@ def test_the_reference_judges_where_the_scene_names_it(given):
     assert found.discretisation == pytest.approx(0.1 / 1.1)
     assert isinstance(judge.truth(of(1.0)), Truth)
     assert judge.words == "the scene's finite elements"
+
+
+def test_what_is_recommended_says_what_its_errors_are_of_and_against():
+    cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))
+    measured = Errors(
+        "resolved", field=0.1, force=0.2, peak_force=0.3, discretisation=0.2, of_force=True
+    )
+    chosen = Candidate(of(1.0), Promise(0.2, 0.05), cost, None)
+    found = Recommended(chosen, True, measured, None, 0.01, (chosen,), "a finer one")
+    text = "\n".join(lines(found))
+    assert "force error promised 20.0 +- 5.0 %, measured 20.0 %, as promised" in text
+    assert "errors are against a finer one" in text
+    assert "measured beside it: of the largest force 30.0 %, of the displacement over" in text
+    assert "finest lattice" not in text
+    other = replace(found, measured=replace(measured, discretisation=0.4))
+    assert "the finest lattice of the same springs 40.0 %" in "\n".join(lines(other))
 
 
 @pytest.mark.parametrize(

@@ -437,8 +437,9 @@ def _beside_force(measured: Errors) -> Iterator[str]:
         "the largest force": measured.peak_force,
         "the displacement at the control points": measured.worst,
         "the displacement over the organ": measured.field,
-        "the force against the finest lattice of the same springs": measured.discretisation,
     }
+    if measured.discretisation != measured.force:  # against a reference, and not the same again
+        told["the force against the finest lattice of the same springs"] = measured.discretisation
     parts = [f"of {of} {100 * error:.1f} %" for of, error in told.items() if error is not None]
     if parts:
         yield f"measured beside it: {', '.join(parts)}"
