@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 from itertools import islice, pairwise
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, expm
@@ -235,10 +236,7 @@ def superposition(
     forced = np.stack([held[:-1], np.diff(held, axis=0) / step], axis=-1)
     count, size = forced.shape[:2]
     starts, y = np.zeros((count + 1, size, 2)), np.zeros((count, inside, size, 2))
-    moved = transitions(squares, damping, step)[:, :2]
-    added = np.einsum("mij,nmj->nmi", moved[..., 2:], forced)
-    for n in range(count):
-        starts[n + 1] = (moved[..., :2] @ starts[n, ..., None])[..., 0] + added[n]
+    _take_steps(transitions(squares, damping, step), forced, starts)
     y[:, -1] = starts[1:]
     whole = np.concatenate([starts[:-1], forced], axis=-1)
     for part in range(1, inside):
@@ -246,6 +244,19 @@ def superposition(
         y[:, part - 1] = np.einsum("mij,nmj->nmi", moved, whole)
     y = np.concatenate([np.zeros((1, size, 2)), y.reshape(-1, size, 2)])
     return y[..., 0] @ modes.T, y[..., 1] @ modes.T
+
+
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator] # numba has no types
+def _take_steps(moved: Floats, forced: Floats, states: Floats) -> None:
+    """Displacement and velocity (steps + 1, m, 2) by transitions (m, 4, 4) under loads."""
+    for n in range(len(forced)):
+        for m in range(len(moved)):
+            for i in range(2):
+                total = 0.0
+                for j in range(2):
+                    total += moved[m, i, j] * states[n, m, j]
+                    total += moved[m, i, 2 + j] * forced[n, m, j]
+                states[n + 1, m, i] = total
 
 
 def transitions(squares: Floats, damping: RayleighDamping, step: float) -> Floats:
