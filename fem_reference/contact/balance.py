@@ -38,7 +38,8 @@ SLOW = 0.5
 """Share of the residual left by an iteration for which it is worth while to factor anew."""
 SAME = 1e-6
 """Of steps whose length differs by rounding."""
-MOST_ITERATIONS = 40
+MOST_FACTORED = 6
+"""Tangents for one state, which halves of a step find sooner than more of them would."""
 SHORTEST_STEP = 1 / 64
 SLACK = 1e-3
 """Of the body's size, how near a vertex is whose answer is found before it touches."""
@@ -149,8 +150,8 @@ class Balance:
 
         UnbalancedError where none is found.
         """
-        state, before = guess, np.inf
-        for _ in range(MOST_ITERATIONS):
+        state, before, begun = guess, np.inf, self.factored
+        while self.factored - begun <= MOST_FACTORED:
             u = self.body.given(state.w)
             gaps = self.body.contact.gaps(u, demand.time)
             pushed = self.body.contact.derivative(u, demand.time)
@@ -160,10 +161,16 @@ class Balance:
                 break
             if size <= 1.0:
                 return state
-            if self._worn(demand, size, before):
+            fresh = self._worn(demand, size, before)
+            if fresh:
                 self._answers = self._factor(state, demand, pushed)
             before = size
-            state = self._next(state, off, gaps, pushed)
+            try:
+                state = self._next(state, off, gaps, pushed)
+            except UnbalancedError:
+                if fresh:
+                    break
+                before = 0.0  # with the factors of this state
             self.iterations += 1
         self._answers = None
         raise UnbalancedError("no balance of forces")
