@@ -420,6 +420,7 @@ def _cost(line: Line) -> list[str]:
 
 STRAINS = (("1 to 5 %", 0.0, 0.05), ("5 to 20 %", 0.05, 1.0))
 """Largest strain of the linear elements: words, above, up to."""
+SMALL = STRAINS[0][2]
 
 
 def corrected() -> Iterator[tuple[str, str]]:
@@ -445,7 +446,7 @@ GRADED_HEAD = (
 
 def graded() -> Iterator[tuple[str, str]]:
     """Regions of interest and graded corrected lattices at places of the tool, and their cost."""
-    places, costs = measured("graded_places"), measured("graded_cost")
+    places, costs = measured("graded_places"), measured("corrected_cost")
     errors = [float(one["region_error"]) for one in places]
     yield "graded-count", str(len(places))
     yield "graded-kept", str(sum(error <= TOLERANCE for error in errors))
@@ -455,7 +456,89 @@ def graded() -> Iterator[tuple[str, str]]:
     near = [float(one["graded_near_nodes"]) for one in places]
     yield "graded-near-nodes", span(near, "{:.0f}".format)
     yield "graded-places", table(GRADED_HEAD, [_graded(places, *one) for one in STRAINS])
-    yield "graded-cost", table(GRADED_COST_HEAD, map(_graded_cost, costs))
+    gains = [float(one["region_gain"]) for one in places]
+    yield "region-gain", span(gains, "{:.2g}".format)
+    yield "region-gain-median", f"{median(gains):.2g}"
+    yield from _graded_gains(places, costs)
+    yield "multirate", table(RATES_HEAD, map(_rates, measured("multirate")))
+
+
+def _graded_gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, str]]:
+    """As `_gains`, with graded corrected lattices, at the places where there are any."""
+    found = {(one["at_x"], one["at_z"]): one for one in places}
+    both = [found[at] | one for one in measured("corrected_places") if (at := _at(one)) in found]
+    price = _prices(costs)
+    for words, (_, above, up_to) in zip(("small", "large"), STRAINS, strict=True):
+        chosen = [one for one in both if above < float(one["strain"]) <= up_to]
+        for kind in ("uniform", "own"):
+            gains = [gain for one in chosen if (gain := _gain(one, price, kind)) is not None]
+            yield f"graded-gain-{words}-{kind}", f"{min(gains):.0f}"
+            yield f"graded-gain-{words}-{kind}-median", f"{median(gains):.0f}"
+        yield f"graded-gain-{words}-met", str(len(gains))
+
+
+FORETOLD = {
+    "geometry": ("large displacements left out", "nonlinear"),
+    "remainder_20": ("the same on a corrected lattice of 20 mm", "error_20"),
+    "remainder_15": ("15 mm", "error_15"),
+    "remainder_10": ("10 mm", "error_10"),
+    "near": ("graded, 5 mm to 0.6 radii", "graded_near_error"),
+    "far": ("graded, 5 mm to 1 radius", "graded_error"),
+    "alone_10": ("a lattice of 10 mm alone", "uniform_10"),
+    "alone_5": ("5 mm alone", "uniform_5"),
+    "mesh": ("elements' mesh, at rest", "mesh_found"),
+}
+"""By columns of `planned_places`: words, and the column of what was found."""
+FORETOLD_HEAD = ("foretold of", "places", "within twice", "found over foretold, median and largest")
+CONTROL = ("static_20", "remainder_20")
+
+
+def planned() -> Iterator[tuple[str, str]]:
+    """What a plan foretells at random places of the tool, against what was found there."""
+    others = {_at(one): one for one in measured("corrected_places")}
+    graded_ones = {_at(one): one for one in measured("graded_places")}
+    lines = [
+        graded_ones.get(_at(one), {}) | others[_at(one)] | one for one in measured("planned_places")
+    ]
+    yield "planned-count", str(len(lines))
+    rows = [_foretold(lines, told, *known) for told, known in FORETOLD.items()]
+    yield "planned-places", table(FORETOLD_HEAD, rows)
+    ratios = [float(one[CONTROL[0]]) / float(one[CONTROL[1]]) for one in lines]
+    yield "planned-control", str(sum(one <= 2.0 for one in ratios))
+    sums = [(_found(one, "nonlinear"), _found(one, "mesh_found")) for one in lines]
+    told = [float(one["geometry"]) + float(one["mesh"]) for one in lines]
+    kept = sum(sum(a) <= 2.0 * b for a, b in zip(sums, told, strict=True))
+    yield "planned-elements", str(kept)
+
+
+def _foretold(lines: list[Line], told: str, words: str, found: str) -> list[str]:
+    """How often what was found is within twice what was foretold."""
+    ratios = [_found(one, found) / float(one[told]) for one in lines if found in one]
+    within = sum(one <= 2.0 for one in ratios)
+    return [words, str(len(ratios)), str(within), f"{median(ratios):.2g}, {max(ratios):.2g}"]
+
+
+def _found(line: Line, column: str) -> float:
+    return float(line[column])
+
+
+def _at(line: Line) -> tuple[str, str]:
+    return line["at_x"], line["at_z"]
+
+
+RATES_HEAD = (
+    *("finest cells to", "steps of 5, 10 and 20 mm cells", "longest step", "gain"),
+    "were all that passes between sizes free",
+)
+
+
+def _rates(line: Line) -> list[str]:
+    numbers = (f"{float(line[name]):.2f}" for name in ("limit", "gain", "bound"))
+    return [_mm(line["radius_m"]), line["rates"].replace("-", " : "), *numbers]
+
+
+def _mm(length: str) -> str:
+    return f"{1e3 * float(length):.2g} mm"
 
 
 def _graded(lines: list[Line], words: str, above: float, up_to: float) -> list[str]:
@@ -466,14 +549,6 @@ def _graded(lines: list[Line], words: str, above: float, up_to: float) -> list[s
         *("graded_near_error", "graded_error"),
     )
     return [words, str(len(found)), *(_median_and_worst(found, name) for name in columns)]
-
-
-GRADED_COST_HEAD = ("lattice", "free nodes", "processor time of a simulated second", "of a step")
-
-
-def _graded_cost(line: Line) -> list[str]:
-    step = f"{float(line['step_us']):.0f} µs of {1e3 * float(line['step_s']):.2g} ms"
-    return [line["model"], line["nodes"], f"{float(line['per_second']):.2g} s", step]
 
 
 PLACES_HEAD = (
@@ -513,7 +588,7 @@ ALONE = {"20": 0.02, "15": 0.015, "10": 0.01, "8": 0.008, "7": 0.00667, "5": 0.0
 
 def _gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, str]]:
     """What a lattice alone costs that is within the tolerance, over a corrected one that is."""
-    price = {(one["model"], _rounded(one["spacing_m"])): float(one["per_second"]) for one in costs}
+    price = _prices(costs)
     for words, (_, above, up_to) in zip(("small", "large"), STRAINS, strict=True):
         found = [one for one in places if above < float(one["strain"]) <= up_to]
         gains, own = (
@@ -527,18 +602,50 @@ def _gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, str]]:
         yield f"corrected-own-gain-{words}-median", f"{median(own):.0f}"
     missed = sum(float(one["uniform_5"]) > TOLERANCE for one in places)
     yield "corrected-alone-missed", str(missed)
+    linear = [one for one in places if float(one["nonlinear"]) <= TOLERANCE]
+    yield "linear-met-small", str(sum(float(one["strain"]) <= SMALL for one in linear))
+    yield "linear-met-large", str(sum(float(one["strain"]) > SMALL for one in linear))
+    cheap = price["superposition", 0.0, 0.0]
+    yield "linear-gain", f"{price['uniform', ALONE['5'], 0.0] / cheap:.0f}"
 
 
-def _gain(line: Line, price: dict[tuple[str, float], float], kind: str) -> float | None:
-    """None where no corrected lattice is; at least so much where no lattice alone is."""
+def _prices(costs: list[Line]) -> dict[tuple[str, float, float], float]:
+    """Of a simulated second [s], by model, spacing and radius."""
+    names = ("spacing_m", "radius_m")
+    return {
+        (one["model"], *(_rounded(one[n]) for n in names)): float(one["per_second"])
+        for one in costs
+    }
+
+
+GRADED = {"graded_near_error": 0.6, "graded_error": 1.0}
+"""How far their finest cells reach, in radii of the tool, by the columns of their errors."""
+GRADED_PRICED = (0.015, 0.025)
+"""Radii [m] of those whose cost is known; a smaller one counts as the next larger."""
+
+
+def _gain(line: Line, price: dict[tuple[str, float, float], float], kind: str) -> float | None:
+    """None where no corrected lattice is; at least so much where no lattice alone is.
+
+    Graded ones count where their error was measured.
+    """
     errors = {name: float(line.get(f"{kind}_{name}", 0.0)) for name in ALONE} | {"5": 0.0}
-    alone = [price["uniform", ALONE[name]] for name, e in errors.items() if e <= TOLERANCE]
+    alone = [price["uniform", ALONE[name], 0.0] for name, e in errors.items() if e <= TOLERANCE]
     both = [
-        price["corrected", ALONE[name]]
+        price["corrected", ALONE[name], 0.0]
         for name in ("20", "15", "10", "8")
         if float(line[f"error_{name}"]) <= TOLERANCE
     ]
+    both += [
+        price["corrected graded", 0.005, _priced(reach * float(line["radius_m"]))]
+        for name, reach in GRADED.items()
+        if name in line and float(line[name]) <= TOLERANCE
+    ]
     return min(alone) / min(both) if both else None
+
+
+def _priced(radius: float) -> float:
+    return min(one for one in GRADED_PRICED if radius < one * (1.0 + 1e-9))
 
 
 def _rounded(spacing: str) -> float:
@@ -549,7 +656,11 @@ COST_HEAD = ("lattice", "field", "at the tool", "processor time of a simulated s
 
 
 def _corrected_cost(line: Line) -> list[str]:
-    named = f"{line['model']}, {1e3 * float(line['spacing_m']):.2g} mm"
+    radius = float(line["radius_m"])
+    sizes = f" to {_mm(line['radius_m'])}" if radius else ""
+    named = line["model"]
+    if float(line["spacing_m"]):
+        named += f", {_mm(line['spacing_m'])}{sizes}"
     errors = (percent(line[name]) for name in ("field_error", "tool_error"))
     step = f"{float(line['step_us']):.0f} µs of {1e3 * float(line['step_s']):.2g} ms"
     return [named, *errors, f"{float(line['per_second']):.2g} s", step]
@@ -567,7 +678,7 @@ def _at_1_khz(lines: list[Line]) -> Iterator[tuple[str, str]]:
 
 def _millisecond(line: Line) -> float:
     """Processor time [s] of the steps in a millisecond, which are shortened to divide it."""
-    return math.ceil(1e-3 / float(line["step_s"])) * 1e-6 * float(line["step_us"])
+    return math.ceil(1e-3 / float(line["step_s"])) * 1e-6 * float(line["single_us"])
 
 
 def verification() -> Iterator[tuple[str, str]]:
@@ -725,7 +836,7 @@ def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
-    models = (error_bar_livers, certified, tradeoff, corrected, graded)
+    models = (error_bar_livers, certified, tradeoff, corrected, graded, planned)
     groups = (*fuzzy, *lattice, *models, verification, validation, stability, ranking, organ)
     return {name: text for group in groups for name, text in group()}
 

@@ -31,6 +31,7 @@ from study.run.rest import rest_of
 from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
+from tests.benchmarks import planned_places
 from tests.conftest import SMALL
 
 AT_TOOL = ('require.at=["tool"]',)
@@ -427,3 +428,41 @@ def test_the_largest_force_is_checked_by_spacing_and_steps(small_scene, small_re
     assert not any(
         one.passed for one in checked(small_scene, small_results, lost, error=0.5, quantities=both)
     )
+
+
+# --- at random places of the tool on the liver ----------------------------------------------------
+
+
+def at_places(told, found):
+    """Errors found over those foretold, at the places of both tables, which are committed."""
+    others = {(one["at_x"], one["at_z"]): one[found] for one in planned_places.known(1)}
+    rows = planned_places.kept().values()
+    return np.array([others[one.at_x, one.at_z] / getattr(one, told) for one in rows])
+
+
+@pytest.mark.parametrize(
+    ("told", "found"),
+    [
+        ("geometry", "nonlinear"),
+        ("remainder_20", "error_20"),
+        ("remainder_15", "error_15"),
+        ("remainder_10", "error_10"),
+        ("alone_10", "uniform_10"),
+        ("alone_5", "uniform_5"),
+    ],
+)
+def test_foretold_errors_held_at_places_on_the_liver(told, found):
+    ratios = at_places(told, found)
+    assert len(ratios) >= 15
+    assert (ratios <= 2.0).mean() >= 0.95
+    assert np.median(ratios) > 0.1  # or it foretells nothing
+
+
+def test_foretold_errors_of_meshes_held_at_places_on_the_liver():
+    ratios = np.array([one.mesh_found / one.mesh for one in planned_places.kept().values()])
+    assert (ratios <= 2.0).mean() >= 0.95
+
+
+def test_a_correction_at_rest_alone_does_not_keep_what_is_foretold():
+    """Negative control."""
+    assert (at_places("remainder_20", "static_20") <= 2.0).mean() < 0.9
