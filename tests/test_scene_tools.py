@@ -78,26 +78,6 @@ def test_a_model_that_cannot_follow_is_refused_with_those_that_can(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('models = ["region"]\n' + BLOCK + SPHERE_DOWN, "rigid tools that are moved"),
-        ('models = ["region"]\n' + BLOCK + GRAVITY, "gravity"),
-        (
-            'models = ["corrected"]\n' + BLOCK + '[corrected]\ncoarse = "graded"\n'
-            '[[tissue.inclusion]]\nradius = "5 mm"\nplace = { fraction = [0.5, 0.5, 0.5] }\n'
-            'youngs_modulus = "40 kPa"\n',
-            "tissue that differs from place to place",
-        ),
-    ],
-)
-def test_a_graded_lattice_refuses_what_it_would_leave_out(text, said, tmp_path):
-    path = tmp_path / "own.toml"
-    path.write_text(text)
-    with pytest.raises(SceneError, match=f"a graded lattice cannot follow {said}"):
-        read_scene(str(path))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
         ('[[tool]]\nshape = "sphere"\n', "tool.displacement: give either it or tool.path"),
         ('[[tool]]\ndisplacement = "1 mm"\n', "tool.displacement: moves a rigid tool"),
         ("[[tool]]\nfriction = 0.3\n", "tool.contact: a blunt tool is a pressure"),
