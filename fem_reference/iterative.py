@@ -49,7 +49,7 @@ class Solver(Protocol):
 
 def preconditioner(body: Body) -> Solve:
     """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
-    matrix = body.stiffness.matrix
+    matrix = body.stiffness.matrix.tobsr(blocksize=(3, 3))
     if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
     prolong = _from_vertices(body.nodes.mesh, body.node_count)
@@ -104,7 +104,7 @@ def iterative(body: Body, tolerance: float) -> Solver:
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        matrix = symmetric(body.stiffness.matrix)
+        matrix = symmetric(body.stiffness.matrix.tobsr(blocksize=(3, 3)))
         return _solver(cg, matrix, inner, tolerance, guide=matrix.single)
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
