@@ -151,9 +151,10 @@ def _refined(
     """
     found = np.zeros_like(load) if start is None else start
     left, scale = load - matrix @ found, float(np.linalg.norm(load))
+    rough = matrix if guide is None else guide
     for _ in range(REFINEMENTS):
         size = float(np.linalg.norm(left))
-        if size <= tolerance * scale or size <= _rounding(matrix, found, size, scale):
+        if size <= tolerance * scale or size <= _rounding(rough, found, size, scale):
             return found
         least = ROUNDING if guide is None else GUIDED
         wanted = max(STRICTER[method] * tolerance * scale / size, least)
