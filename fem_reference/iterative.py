@@ -49,7 +49,7 @@ class Solver(Protocol):
 
 def preconditioner(body: Body) -> Solve:
     """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
-    matrix = body.stiffness.matrix
+    matrix = body.stiffness.matrix.tobsr(blocksize=(3, 3))
     if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
     prolong = _from_vertices(body.nodes.mesh, body.node_count)
@@ -104,7 +104,7 @@ def iterative(body: Body, tolerance: float) -> Solver:
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        matrix = symmetric(body.stiffness.matrix)
+        matrix = symmetric(body.stiffness.matrix.tobsr(blocksize=(3, 3)))
         return _solver(cg, matrix, inner, tolerance, guide=matrix.single)
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
@@ -151,9 +151,10 @@ def _refined(
     """
     found = np.zeros_like(load) if start is None else start
     left, scale = load - matrix @ found, float(np.linalg.norm(load))
+    rough = matrix if guide is None else guide
     for _ in range(REFINEMENTS):
         size = float(np.linalg.norm(left))
-        if size <= tolerance * scale or size <= _rounding(matrix, found, size, scale):
+        if size <= tolerance * scale or size <= _rounding(rough, found, size, scale):
             return found
         least = ROUNDING if guide is None else GUIDED
         wanted = max(STRICTER[method] * tolerance * scale / size, least)

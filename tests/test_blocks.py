@@ -1,13 +1,16 @@
 """Compiled products of block matrices, and the cycle of multigrid made of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csc_array
 
 from fem_reference.blocks import blocks_of, symmetric
 from fem_reference.elasticity import discretise
-from fem_reference.iterative import _from_vertices, _on_vertices
+from fem_reference.iterative import _from_vertices, _on_vertices, iterative
 from fem_reference.multigrid import multigrid
+from fem_reference.stiffness import Stiffness
 from study.problem.tissue import Tissue
 
 
@@ -43,6 +46,12 @@ def test_half_of_a_symmetric_matrix_is_enough(body, rng):
     skew.data[symmetric(matrix).upper.first[1] - 1] *= 2.0  # negative control, below the diagonal
     assert near(symmetric(skew) @ x, matrix @ x)
     assert not near(symmetric(skew) @ x, skew @ x)
+
+
+def test_a_stiffness_of_another_format_is_solved_alike(body):
+    other = replace(body, stiffness=Stiffness(csc_array(body.stiffness.matrix)))
+    found, same = (iterative(one, 1e-10)(one.load) for one in (body, other))
+    assert np.linalg.norm(found - same) < 1e-9 * np.linalg.norm(found)
 
 
 def test_a_cycle_is_symmetric_and_takes_most_of_an_error(body, rng):
