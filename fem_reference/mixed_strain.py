@@ -55,7 +55,8 @@ class MixedSolid:
     a shape functions of tetrahedron t at its integration points q, whose `weights` [m^3] are
     (t, q); `unknowns` (t, a, 3) and `corners` (t, 4): places of displacements and pressures in w;
     `shares` (q, 4): shape functions of the pressure. `lame`, `shear` [Pa], or those of each cell
-    (t, 1); `support` [N/m] (n, n).
+    (t, 1); `support` [N/m] (n, n). `pointwise` [Pa]: of `lame`, what acts at each point on ln J
+    there; the pressure carries the rest. Only in the mean would a volume be kept from collapse.
     """
 
     nodes: Any
@@ -67,6 +68,7 @@ class MixedSolid:
     corners: Ints
     shares: Floats
     support: csc_array
+    pointwise: Any = 0.0
 
     @property
     def size(self) -> int:
@@ -106,7 +108,9 @@ class MixedSolid:
         """Energy [J] stored in the tissue and the support; p^2 / (2 lambda) is that of volume."""
         F, u = self.deformation(w), w[: self.size]
         density = 0.5 * self.shear * ((F**2).sum(axis=(-2, -1)) - 3.0)
-        density += -self.shear * np.log(np.linalg.det(F)) + 0.5 * self._pressure(w) ** 2 / self.lame
+        log_volume = np.log(np.linalg.det(F))
+        density += (0.5 * self.pointwise * log_volume - self.shear) * log_volume
+        density += 0.5 * self._pressure(w) ** 2 / self._carried
         return float((density * self.weights).sum() + 0.5 * u @ (self.support @ u))
 
     def gradient(self, w: Floats) -> Floats:
@@ -114,10 +118,11 @@ class MixedSolid:
         found = kinematics(self.deformation(w))
         p, slopes = self._pressure(w), self._spatial(found)
         nodal = self._stretching @ w[self.unknowns] + self._unstretched
-        push = ((p - self.shear) * self.weights)[:, None, :]
+        stress = p + self.pointwise * np.log(found.volume) - self.shear
+        push = (stress * self.weights)[:, None, :]
         nodal += (push @ slopes).reshape(len(nodal), 3, -1).mT
         force = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(w))
-        missed = ((np.log(found.volume) - p / self.lame) * self.weights) @ self.shares
+        missed = ((np.log(found.volume) - p / self._carried) * self.weights) @ self.shares
         force += np.bincount(self.corners.ravel(), missed.ravel(), minlength=len(w))
         force[: self.size] += self.support @ w[: self.size]
         return np.asarray(force, dtype=np.float64)
@@ -128,14 +133,19 @@ class MixedSolid:
         With h_a = F^-T dN_a/dX, of displacements mu dN_a . dN_b delta_ik + (mu - p) h_ak h_bi, and
         of a displacement and a pressure h_ai N.
         """
-        slopes, p = self._spatial(kinematics(self.deformation(w))), self._pressure(w)
+        found = kinematics(self.deformation(w))
+        slopes = self._spatial(found)
+        stress = self._pressure(w) + self.pointwise * np.log(found.volume) - self.shear
         cells, nodes = self.unknowns.shape[:2]
         count = 3 * nodes
-        pairs = slopes.mT @ (slopes * ((self.shear - p) * self.weights)[..., None])
+        pairs = slopes.mT @ (slopes * (-stress * self.weights)[..., None])
         pairs = pairs.reshape(cells, 3, nodes, 3, nodes)  # (k, a, i, b)
         own = pairs.transpose(0, 2, 3, 4, 1).copy()  # (a, i, b, k)
         for i in range(3):
             own[:, :, i, :, i] += self._stretching
+        if np.any(self.pointwise):
+            bulk = slopes.mT @ (slopes * (self.pointwise * self.weights)[..., None])
+            own += bulk.reshape(cells, 3, nodes, 3, nodes).transpose(0, 2, 1, 4, 3)
         coupling = (self.shares * self.weights[..., None]).mT @ slopes
         coupling = coupling.reshape(cells, 4, 3, nodes).swapaxes(-2, -1).reshape(cells, 4, count)
         whole = np.empty((cells, count + 4, count + 4))
@@ -148,6 +158,11 @@ class MixedSolid:
     def linear(self) -> csc_array:
         """The tangent without deformation: that of linear elasticity."""
         return self.tangent(np.zeros(self.size + self.pressures))
+
+    @property
+    def _carried(self) -> Any:
+        """Of lambda [Pa], what goes by the pressure."""
+        return self.lame - self.pointwise
 
     def _pressure(self, w: Floats) -> Floats:
         """Pressure [Pa] at the integration points, (t, q)."""
@@ -173,7 +188,7 @@ class MixedSolid:
     def _pressure_mass(self) -> Floats:
         """What each tetrahedron adds to the pressures' mass over lambda, (t, 4, 4)."""
         pairs = self.shares[:, :, None] * self.shares[:, None, :]
-        return np.asarray(np.einsum("tq,qab->tab", self.weights / self.lame, pairs))
+        return np.asarray(np.einsum("tq,qab->tab", self.weights / self._carried, pairs))
 
     @cached_property
     def _sparsity(self) -> Sparsity:

@@ -41,6 +41,9 @@ Factors = Callable[[Floats], Floats]
 Advance = Callable[[float], None]
 
 GAMMA = 1.0 - np.sqrt(0.5)
+POINTWISE = 4.0
+"""Of the shear modulus, the part of lambda [Pa] that keeps each point from collapse: too little to
+lock, as that of a Poisson ratio of 0.4."""
 HALVINGS = 6
 """How often a step, or an increment of a way, may be halved."""
 MARGIN = 0.5
@@ -59,7 +62,8 @@ def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Float
     ValueError for a tool that meets nothing or cannot be followed, or a Poisson ratio at which no
     pressure carries the volume.
     """
-    solid = on_nodes(body.nodes, tissue, body.support, body.composition)
+    mixed = on_nodes(body.nodes, tissue, body.support, body.composition)
+    solid = replace(mixed, pointwise=np.minimum(POINTWISE * mixed.shear, 0.5 * mixed.lame))
     patches = [patch(body, one, _looked(one, times), _margin(one, times)) for one in tools]
     FiniteContact.refuse(tools)
     free = np.ones(solid.size + solid.pressures, dtype=np.bool_)
