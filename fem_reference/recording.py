@@ -37,13 +37,14 @@ class Recorder:
         self.trajectory.velocity[sample] = velocity
 
     def field(self, sample: int, u: Floats) -> None:
-        """Keep the field if the sample is one of the frames."""
+        """Keep the field if the sample is one of the frames, and look at the first and the last."""
         for i, frame in enumerate(self.observation.frames):  # the peak may be the last sample too
             if frame == sample:
                 there = self.start + u
                 self.trajectory.volume_field[i] = at_points(self.in_volume, there)
                 self.trajectory.surface_field[i] = at_points(self.on_surface, there)
-                self.look(u)
+        if sample in self.observation.ends:
+            self.look(u)
 
     def look(self, u: Floats) -> None:
         """Take note of how far a state is from small displacements."""

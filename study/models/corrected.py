@@ -141,7 +141,7 @@ class PreparedCorrected:
             found.lattice.smallest_step,
             found.lattice.margin,
             shape.inverted_cells(found),
-            shape.largest_strain(found, self.problem.observation.frames),
+            shape.largest_strain(found, self.problem.observation.ends),
         )
 
     def _deformed(self, solved: MeshSolution) -> Deformed:
@@ -227,7 +227,7 @@ class PreparedCorrected:
             label=self.model.label,
             nodes=solved.found.nodes,
             wall_s=solved.found.wall + found.lattice.wall,
-            largest_strain=shape.largest_strain(found, self.problem.observation.frames),
+            largest_strain=shape.largest_strain(found, self.problem.observation.ends),
             lattice=replace(record.lattice, inverted_cells=inverted),
         )
 

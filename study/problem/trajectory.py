@@ -16,8 +16,9 @@ class Observation:
     """When and where a model is looked at.
 
     `times` [s] (samples,), equally spaced from zero;
-    `probes` [m] (probes, 3); `frames`: samples at which the whole field is kept; `volume_points`
-    [m] (q, 3) and `surface_points` [m] (s, 3): where it is kept.
+    `probes` [m] (probes, 3); `frames`: samples at which the whole field is kept, the first and last
+    of which are what strains are looked for at; `volume_points` [m] (q, 3) and `surface_points` [m]
+    (s, 3): where it is kept.
     """
 
     times: Floats
@@ -25,6 +26,11 @@ class Observation:
     frames: tuple[int, ...]
     volume_points: Floats
     surface_points: Floats
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """First and last of the frames; none without frames."""
+        return self.frames[:1] + self.frames[-1:]
 
 
 @dataclass(frozen=True)

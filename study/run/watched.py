@@ -16,7 +16,7 @@ from study.results.arrays import Arrays
 Floats = NDArray[np.float64]
 
 FRAMES = 9
-"""Samples at which the surface is kept; finite elements look for their largest strain at each."""
+"""Samples at which the surface is kept."""
 STRAIGHT = 0.05
 """Share of a load's largest value by which it may leave a straight line between two frames."""
 
