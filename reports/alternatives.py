@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from reports import budget
 from reports.appearance import labels
-from reports.differences import field_errors
+from reports.differences import elements, field_errors
 from reports.digits import percent, short, significant, words
 from reports.motion_figures import peak, probe_groups
 from reports.ranking import tool_probe
@@ -56,9 +56,9 @@ def _peaks(results: Results, probes: Sequence[str]) -> str:
 
 
 def _differences(results: Results) -> str:
-    named, found = labels(results), field_errors(results)
+    named, found, reference = labels(results), field_errors(results), elements(results)
     shares: Mapping[str, float] = {
-        named[model]: values[PEAK] for (model, of), values in found.items() if of == "fem"
+        named[model]: values[PEAK] for (model, of), values in found.items() if of == reference
     }
     told = ", ".join(f"{name} {percent(share)}" for name, share in shares.items())
     return f"Relative L2 differences of the whole field: {told}." if told else ""

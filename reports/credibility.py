@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from reports import summary
 from reports.appearance import labels, system_name
 from reports.benchmarks import read
-from reports.differences import finite_elements, own_error
+from reports.differences import elements, finite_elements, own_error
 from reports.digits import PA_PER_KPA, fixed, percent, quantity, significant
 from reports.page.answer import answer, curve_error, question
 from reports.ranking import tool_probe
@@ -106,7 +106,7 @@ def _validation(results: Results) -> Iterator[str]:
     rows = [
         row
         for row in results.field_differences
-        if (row.reference, row.quantity) == ("fem", "field-relative-l2-peak")
+        if (row.reference, row.quantity) == (elements(results), "field-relative-l2-peak")
     ]
     for row in sorted(rows, key=lambda row: row.value):
         yield (
@@ -140,7 +140,8 @@ def _uncertainty(results: Results) -> Iterator[str]:
 
 def _applicability(results: Results) -> Iterator[str]:
     model, limit = finite_elements(results), results.record.strain_limit
-    if model is not None and model.largest_strain is not None:
+    is_linear = model is not None and model.elements is not None and model.elements.law is None
+    if model is not None and is_linear and model.largest_strain is not None:
         side = "below" if model.largest_strain < limit else "not below"
         yield (
             f"Largest strain of the finite elements: {percent(model.largest_strain)}, {side} the "

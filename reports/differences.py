@@ -6,10 +6,20 @@ from reports.digits import percent
 from study.results.folder import Results
 from study.results.records import ModelRecord
 
+ELEMENTS = ("fem", "hyperelastic")
+"""References of finite elements, of which a run compares with the first that it has."""
+
 
 def finite_elements(results: Results) -> ModelRecord | None:
-    """Record of the finite-element reference, None for a run without it."""
-    return next((model for model in results.record.models if model.name == "fem"), None)
+    """Record of the finite-element reference, None for a run without one."""
+    found = {model.name: model for model in results.record.models}
+    return next((found[name] for name in ELEMENTS if name in found), None)
+
+
+def elements(results: Results) -> str:
+    """Name of the finite-element reference, of the linear one in a run without any."""
+    model = finite_elements(results)
+    return ELEMENTS[0] if model is None else model.name
 
 
 def field_errors(results: Results) -> dict[tuple[str, str], dict[str, float]]:
@@ -20,13 +30,13 @@ def field_errors(results: Results) -> dict[tuple[str, str], dict[str, float]]:
     return found
 
 
-def own_error(results: Results, reference: str = "fem") -> float | None:
+def own_error(results: Results, reference: str | None = None) -> float | None:
     """Estimated error by its mesh of a reference's field at the peak, relative L2.
 
-    None where it has none or none was estimated.
+    Of the finite elements by default; None where it has none or none was estimated.
     """
     errors = {model.name: model.mesh_error for model in results.record.models}
-    found = errors.get(reference)
+    found = errors.get(reference or elements(results))
     return None if found is None else found.field_peak
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from reports import canvas
 from reports.appearance import Style, labels
 from reports.camera import Camera, facing_tool
+from reports.differences import elements
 from reports.digits import fixed, short, significant
 from reports.renders import Job, Pictures
 from study.results.folder import Results
@@ -110,8 +111,9 @@ def views(results: Results) -> Views | None:
     first = names[0]
     panel = Panel(named[first], rest + factor * peak[first], lengths[0])
     sheets = [Sheet([panel], float(lengths[0].max()) or 1.0, "displacement [mm]", "YlGnBu", True)]
-    if "fem" in peak and len(peak) > 1:
-        sheets.append(_differences(rest, peak, named))
+    reference = elements(results)
+    if reference in peak and len(peak) > 1:
+        sheets.append(_differences(rest, peak, named, reference))
     centre, push = fields["tool"]
     everything = np.concatenate([rest, panel.points])
     none = np.zeros(len(triangles))
@@ -140,10 +142,13 @@ def exaggeration(rest: Floats, lengths: list[Floats]) -> float:
     return _round_down(SHOWN_DEFORMATION * extent / colour_limit(lengths))
 
 
-def _differences(rest: Floats, peak: dict[str, Floats], named: dict[str, str]) -> Sheet:
-    others = {name: _length(u - peak["fem"]) for name, u in peak.items() if name != "fem"}
+def _differences(
+    rest: Floats, peak: dict[str, Floats], named: dict[str, str], reference: str
+) -> Sheet:
+    truth = peak[reference]
+    others = {name: _length(u - truth) for name, u in peak.items() if name != reference}
     panels = [Panel(f"{named[n]} − finite elements", rest, d) for n, d in others.items()]
-    limit = min(max(float(d.max()) for d in others.values()), _reach(peak["fem"]))
+    limit = min(max(float(d.max()) for d in others.values()), _reach(truth))
     return Sheet(panels, limit, "difference [mm]", "magma_r")
 
 

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from reports.differences import field_errors, own_error
+from reports.differences import elements, field_errors, own_error
 from reports.digits import DASH, PA_PER_KPA, significant, with_error
 from reports.motion_figures import peak
 from reports.page.answer import curve_error
@@ -82,7 +82,7 @@ def _numbers(run: Results) -> Iterator[tuple[Key, Measured]]:
             error = None if share is None else 1e3 * largest * share
             key = (f"largest displacement at {probe}", model.label, "mm")
             yield key, Measured(1e3 * largest, error)
-        share_off = errors.get((model.name, "fem"), {}).get(PEAK)
+        share_off = errors.get((model.name, elements(run)), {}).get(PEAK)
         if share_off is not None:
             key = ("field off the finite elements at the peak", model.label, "%")
             yield key, Measured(100.0 * share_off, None if own is None else 100.0 * own)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from reports import budget
 from reports.appearance import labels, reference_name, system_name
-from reports.differences import field_errors, finite_elements, own_error, resolved
+from reports.differences import elements, field_errors, finite_elements, own_error, resolved
 from reports.digits import (
     DASH,
     PA_PER_KPA,
@@ -67,7 +67,7 @@ def glance_table(results: Results) -> tuple[list[str], Table]:
 
 def _glance_row(results: Results, model: ModelRecord) -> list[str]:
     modulus, reference = young_modulus(results, model), results.scene.tissue.youngs_modulus
-    errors = field_errors(results).get((model.name, "fem"), {})
+    errors = field_errors(results).get((model.name, elements(results)), {})
     own = own_error(results)
     return [
         model.label,
@@ -75,7 +75,7 @@ def _glance_row(results: Results, model: ModelRecord) -> list[str]:
         DASH if modulus is None else fixed(modulus / reference, 2),
         _peak_at_tool(results, model),
         _own(own)
-        if model.name == "fem"
+        if model.name == elements(results)
         else _difference(errors.get("field-relative-l2-peak"), own),
         _difference(errors.get("field-relative-l2-peak-at-best-factor"), own),
         real_time_factor(model),
@@ -170,7 +170,7 @@ def _fields(results: Results) -> Iterator[str]:
     found = {
         model: values["field-relative-l2-peak"]
         for (model, reference), values in field_errors(results).items()
-        if reference == "fem"
+        if reference == elements(results)
     }
     if found:
         error, named = own_error(results), labels(results)
@@ -317,7 +317,10 @@ def _reference(results: Results) -> Iterator[str]:
             f"{percent(there.velocity)} at control point {words(probe)})."
         )
     strain, limit = model.largest_strain, results.record.strain_limit
-    if strain is not None:
+    if strain is not None and model.elements.law is not None:
+        law = LAWS.get(model.elements.law, model.elements.law)
+        yield f"Its largest logarithmic strain is {percent(strain)}, by the {law} law."
+    elif strain is not None:
         beyond = _large_strain(model.elements.large_strain) if strain > limit else ""
         side = "below" if strain < limit else "not below"
         yield (

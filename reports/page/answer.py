@@ -9,7 +9,7 @@ import numpy as np
 
 from reports import budget
 from reports.appearance import labels, reference_name
-from reports.differences import field_errors, finite_elements, own_error
+from reports.differences import ELEMENTS, elements, field_errors, finite_elements, own_error
 from reports.digits import DASH, percent, significant, spread, with_error, words
 from reports.motion_figures import peak
 from reports.ranking import references, tool_probe
@@ -85,7 +85,7 @@ def answer(results: Results) -> Answer:
 
 def nearest(results: Results) -> Nearest | None:
     """The finished model nearest to the finite elements, or else to the first reference."""
-    for reference in dict.fromkeys(["fem", *references(results)]):
+    for reference in dict.fromkeys([elements(results), *references(results)]):
         found = _shares(results, reference)
         if found:
             error = own_error(results, reference)
@@ -181,7 +181,7 @@ def _which(results: Results, found: Nearest) -> str:
     )
     caution = (
         ""
-        if found.reference == "fem"
+        if found.reference in ELEMENTS
         else " That is a difference of two models: without finite elements it is no error."
     )
     return (
