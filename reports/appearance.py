@@ -53,7 +53,7 @@ SYSTEM_LOOKS = {
 }
 LOOKS = {
     "fem": Look("#000000", "-", 1.3, 3.0),
-    "hyperelastic": Look("#0072B2", "-", 1.3, 3.0),
+    "hyperelastic": Look("#5D3A9B", "-", 1.3, 3.0),
     "basafa": Look("#D55E00", (0, (7, 1.6)), 1.3, 3.1),
     "reading": Look("#B8860B", (0, (1, 1)), 1.4, 3.05),
     **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},

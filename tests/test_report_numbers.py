@@ -10,6 +10,7 @@ import pytest
 
 from reports.appearance import LOOKS, looks
 from reports.content import document
+from reports.differences import finite_elements, own_error
 from reports.digits import (
     count,
     fixed,
@@ -368,3 +369,40 @@ def test_leads_that_another_window_or_other_axes_may_turn_are_counted():
     assert "None are no larger than their spread over windows" in said(window=0.0, normalised=0.0)
     assert " 7 are no larger than their spread over windows" in said(window=1.0, normalised=0.0)
     assert " 7 are no larger than their spread over windows" in said(window=0.0, normalised=1.0)
+
+
+def hyperelastic(results):
+    """Results whose finite elements have another name and law."""
+    of = {"fem": "hyperelastic"}
+    models = tuple(
+        replace(
+            one,
+            name=of.get(one.name, one.name),
+            elements=one.elements and replace(one.elements, law="neo-hookean"),
+        )
+        for one in results.record.models
+    )
+
+    def renamed(rows):
+        return tuple(row._replace(reference=of.get(row.reference, row.reference)) for row in rows)
+
+    return replace(
+        results,
+        record=replace(results.record, models=models),
+        field_differences=renamed(results.field_differences),
+        scores=renamed(results.scores),
+        score_differences=renamed(results.score_differences),
+    )
+
+
+def test_hyperelastic_elements_are_what_fields_differ_from(small_results):
+    linear, renamed = small_results, hyperelastic(small_results)
+    assert finite_elements(renamed).name == "hyperelastic"
+    assert own_error(renamed) == own_error(linear) > 0.0
+    column = glance(linear)["header"].index("field differs from FE")
+    assert [row[column] for row in glance(renamed)["rows"]] == [
+        row[column] for row in glance(linear)["rows"]
+    ]
+    said = " ".join(sentences(renamed))
+    assert "largest logarithmic strain" in said
+    assert "linear strain is trusted" not in said
