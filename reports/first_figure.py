@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BESIDE, WHOLE = 4.1, canvas.TEXT_WIDTH
 """Width beside a picture of the organ, and without one [inch]."""
 HEIGHT = 2.5
+COLUMNS, SHORT = 3, 18
+"""Of the legend, where no label has more letters; else one less."""
 
 
 def first_figure(results: Results) -> bytes | None:
@@ -40,7 +42,8 @@ def first_figure(results: Results) -> bytes | None:
             panels[1].set_title(looks(results)[budget.model].label, fontweight="bold")
             panels[1].set_xlabel("relative L2 difference [%]")
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, handlelength=2.6)
+        columns = COLUMNS if max(map(len, labels), default=0) <= SHORT else COLUMNS - 1
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=2.6)
         return figure
 
     return canvas.picture(draw)

@@ -7,7 +7,7 @@ from functools import partial
 
 from reports.differences import finite_elements
 from reports.digits import DASH, count, fixed, percent, significant, words
-from reports.summary import printed_peak
+from reports.summary import LAWS, printed_peak
 from study.results.folder import Results
 from study.results.records import ElementsRecord, MeshLevel, ModelRecord
 from study.scene.schema import Scene
@@ -17,7 +17,7 @@ ELEMENTS = {
     "p2": "quadratic tetrahedra",
     "taylor-hood": "Taylor-Hood tetrahedra, quadratic in displacement and linear in pressure",
 }
-STEPPING = {"tr-bdf2": "TR-BDF2", "hht-alpha": "HHT-α"}
+STEPPING = {"tr-bdf2": "TR-BDF2", "hht-alpha": "HHT-α", "sdirk2": "SDIRK2"}
 # What the estimate rests on; the run makes it, and a test holds these to those of the run.
 SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
@@ -61,7 +61,9 @@ def _how(scene: Scene, model: ModelRecord, found: ElementsRecord) -> str:
     """Element and method in a sentence."""
     curved = found.element != "p1" and is_built_in_liver(scene)
     surface = ", curved along the organ's surface" if curved else ""
-    return f"Linear elasticity on {ELEMENTS[found.element]}{surface}; {_motion(model, found)}."
+    law = "linear" if found.law is None else LAWS[found.law]
+    made_of = f"{law} elasticity on {ELEMENTS[found.element]}{surface}"
+    return f"{made_of[0].upper()}{made_of[1:]}; {_motion(model, found)}."
 
 
 def _motion(model: ModelRecord, found: ElementsRecord) -> str:

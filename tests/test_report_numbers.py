@@ -26,6 +26,7 @@ from reports.fuzzy_figures import SET_LOOKS
 from reports.motion_figures import motions, peak
 from reports.paper import TABLE_III, TABLE_III_SPREAD
 from reports.ranking import leads, tool_probe
+from reports.reference import reference
 from reports.summary import glance, sentences
 from reports.tables import (
     balanced,
@@ -35,6 +36,7 @@ from reports.tables import (
     paper_rows,
     similarity_tables,
 )
+from study.models.hyperelastic import LAW, METHOD
 from study.results.records import CurveErrors
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
@@ -378,7 +380,8 @@ def hyperelastic(results):
         replace(
             one,
             name=of.get(one.name, one.name),
-            elements=one.elements and replace(one.elements, law="neo-hookean"),
+            elements=one.elements
+            and replace(one.elements, law=LAW, method=METHOD, subspace_vectors=None),
         )
         for one in results.record.models
     )
@@ -406,3 +409,7 @@ def test_hyperelastic_elements_are_what_fields_differ_from(small_results):
     said = " ".join(sentences(renamed))
     assert "largest logarithmic strain" in said
     assert "linear strain is trusted" not in said
+    how = reference(renamed)["how"]
+    assert how.startswith("Neo-Hookean elasticity on")
+    assert "implicit steps of SDIRK2" in how
+    assert reference(linear)["how"].startswith("Linear elasticity on")
