@@ -377,7 +377,7 @@ def test_a_page_is_not_opened_that_is_not_made(typed):
     [
         (["recommend", "press", "--error", "1 mm"], "that of their force; give a share"),
         (["robustness", "press", "--size", "16"], "place and force of a blunt tool"),
-        (["export", "press", "--to", "vtu"], "holds no rigid tools that are moved (their force"),
+        (["export", "press", "--to", "vtu"], "holds no rigid tools that are moved and tissue"),
         (["run", "press", "--set", 'require.quantities=["rest"]'], "rest: is of a single load"),
     ],
 )

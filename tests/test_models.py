@@ -64,7 +64,7 @@ def test_all_models_of_a_scene_have_names_of_their_own(small_scene):
     assert len({one.name for one in found}) == len({one.label for one in found}) == len(found)
     assert len(found) == len(UNTUNED) + len(every.fuzzy.systems)
     assert [one.name for one in found if one.name in MODELS] == UNTUNED  # in the table's order
-    assert references(every) == ["fem", "basafa"]
+    assert references(every) == ["fem", "hyperelastic", "basafa"]
 
 
 def test_a_point_takes_any_kind_that_has_a_form_for_it(monkeypatch):
@@ -77,7 +77,7 @@ def test_a_model_that_no_code_runs_is_refused_with_those_there_are():
     with pytest.raises(SceneError, match=r"models.*'rods'") as refusal:
         read_scene("block", ['models=["fem", "rods"]'])
     assert all(repr(name) in str(refusal.value) for name in MODELS)
-    with pytest.raises(ValueError, match="there are fem, basafa"):
+    with pytest.raises(ValueError, match="there are fem, hyperelastic, basafa"):
         kind("rods")
 
 
@@ -355,7 +355,9 @@ def test_the_motion_that_is_tried_is_that_of_the_scene_s_law_geometry_and_integr
 
 def test_models_of_a_scene_are_tried_but_the_reference_and_those_of_estimates(small_scene):
     every = dataclasses.replace(small_scene, models=tuple(MODELS))
-    assert own_scene.tried(every) == ["tissue", "basafa", "region", "superposition", "corrected"]
+    assert own_scene.tried(every) == [
+        *("tissue", "hyperelastic", "basafa", "region", "superposition", "corrected")
+    ]
     lattices = {
         name for name in own_scene.tried(every) if isinstance(model(every, name), LatticeModel)
     }

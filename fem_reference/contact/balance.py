@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 TOLERANCE = 1e-5
 """Of the unbalanced forces relative to those of tools and loads."""
-LEAST = 1e-3
+LEAST = 1e-5
 """Of the shear modulus times the body's size squared, a force below which none counts."""
 CLOSED = 1e-7
 """Of the body's size, how far a vertex may be off the tool that pushes it."""

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from fem_reference.contact.balance import (
     Balance,
@@ -26,6 +27,7 @@ from fem_reference.contact.balance import (
 )
 from fem_reference.contact.finite import FiniteContact
 from fem_reference.contact.patch import patch
+from fem_reference.direct import symmetric_factors
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
@@ -84,6 +86,23 @@ def _margin(tool: RigidTool, times: Floats) -> float:
     if tool.shape != PLATE:
         return MARGIN * tool.radius
     return MARGIN * float(np.linalg.norm(tool.travel(times), axis=1).max())
+
+
+def linear_rest(body: Body, tissue: Tissue) -> Floats:
+    """Displacement [m] (n,) at rest under all loads in full, if it were small and no tool there.
+
+    ValueError if nothing holds the body.
+    """
+    bare = touched(body, tissue, (), np.zeros(1))
+    load, w = np.zeros(len(bare.free)), np.zeros(len(bare.free))
+    load[: bare.solid.size] = body.loads.sum(axis=1)
+    if body.dead is not None:
+        load[: bare.solid.size] += body.dead
+    factors = symmetric_factors(csc_array(bare.solid.linear()[bare.free][:, bare.free]))
+    if factors is None:
+        raise ValueError("the stiffness is singular: the support does not hold the body")
+    w[bare.free] = factors.solve(load[bare.free])
+    return w[: bare.solid.size]
 
 
 class Moving(NamedTuple):

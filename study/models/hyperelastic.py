@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from fem_reference import model as fem
 from fem_reference.contact import large_motion
 from fem_reference.contact.finite import FiniteContact
-from fem_reference.contact.large_motion import LargeSolution, Pressed, Steps
+from fem_reference.contact.large_motion import LargeSolution, Pressed, Steps, linear_rest
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.elasticity import Body, without_fixed
 from fem_reference.memory import refuse_too_large
+from fem_reference.observation import at_points, evaluation
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors, tool_force_errors
 from study.models.finite_elements import ABLE, FRAME_RATE, FiniteElements, PreparedElements
-from study.models.in_contact import contact_record
+from study.models.in_contact import contact_record, rest_in_contact
 from study.models.keeping import recorded
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
@@ -152,7 +153,10 @@ class PreparedHyperelastic:
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field, linearised."""
-        return self._linear.rest()
+        problem, body = self.problem, self.body(self.level())
+        tools = bool(problem.rigid_tools)
+        u = rest_in_contact(problem, body) if tools else linear_rest(body, problem.tissue)
+        return at_points(evaluation(body, problem.observation.volume_points), u)
 
     def stepper(self) -> Stepper:
         """Steps at the rate, each to a balance of forces."""
