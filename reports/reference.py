@@ -36,16 +36,17 @@ def reference(results: Results) -> dict[str, object] | None:
     if model is None or model.elements is None or not model.elements.levels:
         return None
     found, error = model.elements, model.elements.mesh_error
-    by_three = len(found.levels) > 2
+    by_three, graded = len(found.levels) > 2, results.scene.is_graded
+    assumed = error.formal_order if error and graded else ASSUMED_ORDER
     return {
         "how": _how(results.scene, model, found),
         "levels": [_level_row(level) for level in found.levels],
         "errors": list(_error_rows(results, model, found)),
         "formal_order": f"{error.formal_order:g}" if error and by_three else "",
-        "graded": results.scene.is_graded,
+        "graded": graded,
         "safety_graded": f"{SAFETY_GRADED:g}",
         "least_order": f"{LEAST_ORDER:g}",
-        "assumed_order": f"{ASSUMED_ORDER:g}",
+        "assumed_order": f"{assumed:g}",
         "safety": f"{SAFETY:g}",
         "safety_assumed": f"{SAFETY_ASSUMED:g}",
         "beyond": f"{BEYOND:g}",

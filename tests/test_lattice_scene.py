@@ -169,6 +169,22 @@ def test_the_report_states_the_slopes_of_a_law_at_rest():
 # Rayleigh damping
 
 
+@pytest.mark.parametrize(
+    ("gravity", "said"),
+    [
+        ((), "There is no gravity"),
+        (("gravity.acceleration=9.81 m/s^2",), "that without load, from which the organ sags"),
+        (
+            ("gravity.acceleration=9.81 m/s^2", "gravity.given=loaded"),
+            ": the shape given is that at rest under it",
+        ),
+    ],
+)
+def test_what_shape_is_given_is_said_as_the_scene_has_gravity(gravity, said):
+    (sentence,) = (one for one in assumptions(read_scene("block", gravity), None) if said in one)
+    assert sentence.endswith(".")
+
+
 def test_rayleigh_reaches_springs_and_reference_alike_and_leaves_the_benchmark():
     scene, _, assembly = posed_with(*RAYLEIGH)
     found = tuned(scene, assembly.lattice, E).material.damping

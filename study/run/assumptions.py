@@ -36,8 +36,22 @@ def _organ(scene: Scene) -> list[str]:
         "none.",
         *(_held(one) for one in scene.supports),
         *_tissue(scene),
-        "There is no gravity: the shape given is the shape at rest.",
+        _given(scene),
     ]
+
+
+def _given(scene: Scene) -> str:
+    """On the shape that a scene gives."""
+    if not scene.gravity.acceleration:
+        return "There is no gravity: the shape given is the shape at rest."
+    weight = f"Gravity is {scene.gravity.acceleration:g} m/s^2 towards {scene.gravity.towards}"
+    if scene.gravity.given == "loaded":
+        return (
+            f"{weight}: the shape given is that at rest under it. Small displacements from there "
+            "are those of a weightless organ; models of large ones first find the shape without "
+            "load."
+        )
+    return f"{weight}: the shape given is that without load, from which the organ sags first."
 
 
 def _held(support: Support) -> str:
