@@ -14,8 +14,8 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
 from reports.cut_figure import cut_figure  # noqa: E402 - once the path leads there
-from reports.page.answer import answer  # noqa: E402
-from study.results import Results  # noqa: E402
+from reports.page.answer import answer  # noqa: E402 - as above
+from study.results import Results  # noqa: E402 - as above
 
 PROJECT = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 FACES = {

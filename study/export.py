@@ -290,6 +290,16 @@ COMPARE = r"""same() {
 INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration points"}
 
 
+def _files_at_rest(given: NodalProblem) -> str:
+    return f"""\
+mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
+foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
+                are negative, which is meant: their sum is the matrix
+load.inp        nodal forces [N] of the tool at full load
+static.inp      at rest under full load
+static.csv      what we get for it: displacement [m] of each node"""
+
+
 def _about_calculix(
     scene: Scene, given: NodalProblem, motion: Transient, differences: tuple[float, float]
 ) -> str:
@@ -299,12 +309,7 @@ def _about_calculix(
 {scene.title or "A scene"}
 Its finite-element problem for CalculiX, SI units throughout.
 
-mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
-foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
-                are negative, which is meant: their sum is the matrix
-load.inp        nodal forces [N] of the tool at full load
-static.inp      at rest under full load
-static.csv      what we get for it: displacement [m] of each node
+{_files_at_rest(given)}
 dynamic.inp     {motion.count} steps of {motion.step:g} s by HHT, alpha {motion.alpha:g}
 dynamic.csv     what we get for it, after every {motion.kept} steps and at the end
 
@@ -330,12 +335,7 @@ def _about_rest(scene: Scene, given: NodalProblem, at_rest: float) -> str:
 {scene.title or "A scene"}
 Its finite-element problem at rest for CalculiX, SI units throughout.
 
-mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
-foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
-                are negative, which is meant: their sum is the matrix
-load.inp        nodal forces [N] of the tool at full load
-static.inp      at rest under full load
-static.csv      what we get for it: displacement [m] of each node
+{_files_at_rest(given)}
 
 There is no motion: how another code damps the masses of attached weights was not checked.
 
