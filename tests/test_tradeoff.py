@@ -518,6 +518,9 @@ def test_only_what_none_is_cheaper_and_better_than_stands_in_the_table():
     lines = list(advice.table_of([MIDDLE, COARSE, candidate(0.21, 0.5)]))
     assert len(lines) == 3
     assert lines[1].startswith("     0.1 s   20.0")
+    same = candidate(0.08, 0.2, single=True)
+    marked = list(advice.table_of([MIDDLE, same], "field", MIDDLE))
+    assert [line.endswith("<- taken") for line in marked[1:]] == [False, True]
     assert list(advice.table_of([])) == []
 
 

@@ -424,7 +424,7 @@ def lines(found: Recommended) -> list[str]:
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
         "fuzzy estimate have its error on top."
     )
-    return [*text, *table_of(found.others, _quantity(measured))]
+    return [*text, *table_of(found.others, _quantity(measured), one)]
 
 
 def _quantity(measured: Errors) -> str:
@@ -445,10 +445,20 @@ def _beside_force(measured: Errors) -> Iterator[str]:
         yield f"measured beside it: {', '.join(parts)}"
 
 
-def table_of(candidates: Sequence[Candidate], quantity: str = "field") -> Iterator[str]:
-    """Those that none is both cheaper and more accurate than, the cheapest first."""
+def table_of(
+    candidates: Sequence[Candidate], quantity: str = "field", taken: Candidate | None = None
+) -> Iterator[str]:
+    """Those that none is both cheaper and more accurate than, and that taken; the cheapest first.
+
+    For a rate alone a lattice in double precision is taken where it keeps up, though the same in
+    single is cheaper and promises the same but for its rounding.
+    """
     places = [(one.promise.error, one.wall_per_second) for one in candidates]
-    front = [one for one, at in zip(candidates, places, strict=True) if not is_beaten(at, places)]
+    front = [
+        one
+        for one, at in zip(candidates, places, strict=True)
+        if one is taken or not is_beaten(at, places)
+    ]
     if not front:
         return
     yield f"chosen from (wall per simulated second, expected error of the {quantity}, memory):"
@@ -457,4 +467,5 @@ def table_of(candidates: Sequence[Candidate], quantity: str = "field") -> Iterat
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
             f"{100 * one.promise.bar:.1f} %  {memory:>7}  {in_words(one.configuration)}"
+            + (" <- taken" if one is taken else "")
         )
