@@ -469,14 +469,14 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
 @pytest.mark.slow
 def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     """On this block no lattice down to half the scene's spacing promises as much."""
-    words = ("recommend", "block", *OVERRIDES, "--error", "12 %")
+    words = ("recommend", "block", *OVERRIDES, "--error", "10 %")
     code, said = command(*words)
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
     assert "this place of the load only" in said
     assert "MB kept while it steps" in said
-    scene = read_scene(str(tmp_path / "block-12percent.toml"))
+    scene = read_scene(str(tmp_path / "block-10percent.toml"))
     assert scene.models[-1] in {"superposition", "corrected", "region"}
 
 

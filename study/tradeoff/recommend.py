@@ -52,8 +52,12 @@ from study.tradeoff.timing import QUICK_REPEATS
 FITTED = (2.5, 2.0, 1.75, 1.5, 1.25, 1.0)
 FINER = (0.9, 0.8, 0.7, 0.6, 0.5)
 """Spacings, times that of the scene: those whose errors are fitted, and those left to the fit."""
-ELEMENTS = 0.75
-"""Element size of the reference chosen by, times that of the scene, in place of its accuracy."""
+ELEMENTS = 0.5
+"""Element size of the reference chosen by, times that of the scene, in place of its accuracy.
+
+On the built-in liver 0.75 has an error of the field of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61
+and 71 s of processor time for all of `recommend`.
+"""
 SPREAD = 2.8
 """Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
 FEWEST = 3
@@ -157,7 +161,7 @@ def recommend(
 
 
 def judged_by(scene: Scene) -> Scene:
-    """The scene with a reference that takes seconds and states a larger error."""
+    """The scene with a reference of elements half as large, whatever accuracy it asks for."""
     chosen = scene.reference
     size = tidy(ELEMENTS * chosen.element_size)
     return replace(scene, reference=replace(chosen, element_size=size, accuracy=None))
