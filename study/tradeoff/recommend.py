@@ -418,7 +418,7 @@ def lines(found: Recommended) -> list[str]:
         )
     text.append(f"{found.wall_per_second:.3g} s of wall per simulated second on this machine")
     if one.cost.memory is not None:
-        text.append(f"{one.cost.memory / 1e6:.0f} MB kept while it steps, on top of the program's")
+        text.append(f"{_in_mb(one.cost.memory)} kept while it steps, on top of the program's")
     if not one.configuration.any_load:
         text.append(
             "It follows this place of the load only. The error is that against linear elements "
@@ -429,6 +429,12 @@ def lines(found: Recommended) -> list[str]:
         "fuzzy estimate have its error on top."
     )
     return [*text, *table_of(found.others, _quantity(measured), one)]
+
+
+def _in_mb(count: float) -> str:
+    """Bytes in MB, to a tenth below ten."""
+    found = count / 1e6
+    return f"{found:.0f} MB" if found >= 10.0 else f"{found:.1f} MB"
 
 
 def _quantity(measured: Errors) -> str:
@@ -467,7 +473,7 @@ def table_of(
         return
     yield f"chosen from (wall per simulated second, expected error of the {quantity}, memory):"
     for one in sorted(front, key=lambda one: one.wall_per_second):
-        memory = "" if one.cost.memory is None else f"{one.cost.memory / 1e6:.0f} MB"
+        memory = "" if one.cost.memory is None else _in_mb(one.cost.memory)
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
             f"{100 * one.promise.bar:.1f} %  {memory:>7}  {in_words(one.configuration)}"
