@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import LinearOperator, cg, minres
 
-from fem_reference.blocks import Blocks, blocks_of, diagonal_of, symmetric
+from fem_reference.blocks import Blocks, SymmetricBlocks, blocks_of, diagonal_of, symmetric
 from fem_reference.direct import IMBALANCE, Solve, factorised
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
@@ -104,8 +104,8 @@ def iterative(body: Body, tolerance: float) -> Solver:
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        matrix = symmetric(body.stiffness.matrix.tobsr(blocksize=(3, 3)))
-        return _solver(cg, matrix, inner, tolerance, guide=matrix.single)
+        matrix = blocks_of(body.stiffness.matrix.tobsr(blocksize=(3, 3)))
+        return _solver(cg, matrix, inner, tolerance, guide=symmetric(matrix))
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
 
@@ -189,5 +189,7 @@ def _rounding(matrix: Any, found: Floats, size: float, scale: float) -> float:
     excuse anything.
     """
     if size > IMBALANCE * scale:
-        return 0.0  # without the magnitudes, which are a copy of the matrix
-    return ROUNDING * float(np.linalg.norm(abs(matrix) @ np.abs(found)))
+        return 0.0
+    by_blocks = isinstance(matrix, Blocks | SymmetricBlocks)
+    whole = matrix.magnitudes(found) if by_blocks else abs(matrix) @ np.abs(found)
+    return ROUNDING * float(np.linalg.norm(whole))

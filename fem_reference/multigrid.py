@@ -13,30 +13,28 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, bsr_matrix
 
-from fem_reference.blocks import Blocks, Floats, blocks_of, diagonal_of, sweep
+from fem_reference.blocks import Blocks, Floats, Sweep, blocks_of, diagonal_of, sweep
 from fem_reference.direct import Solve
 
 
 @dataclass(frozen=True)
 class Level:
-    """A matrix [N/m] below, above and beside its diagonal, and the way to a coarser level.
+    """Sweeps through a matrix [N/m], what is above its diagonal, and the way to a coarser level.
 
-    `inverses` (rows, r, r): of its diagonal blocks.
+    `forward` goes by what is below the diagonal alone, as what is above meets zeros.
     """
 
-    below: Blocks
+    forward: Sweep
     above: Blocks
-    beside: Blocks
-    inverses: NDArray[np.float64]
+    backward: Sweep
     restrict: Blocks
     prolong: Blocks
 
     def from_rest(self, right: Floats) -> Floats:
         """What a sweep forward makes of zero."""
-        return self._swept(self.below, right, np.zeros_like(right), backward=False)
+        return self._swept(self.forward, right, np.zeros_like(right))
 
     def left_after(self, found: Floats) -> Floats:
         """The residual of such a sweep: what is below and on the diagonal is met."""
@@ -44,11 +42,10 @@ class Level:
 
     def back(self, right: Floats, found: Floats) -> Floats:
         """After a sweep backward."""
-        return self._swept(self.beside, right, found, backward=True)
+        return self._swept(self.backward, right, found)
 
-    def _swept(self, part: Blocks, right: Floats, found: Floats, *, backward: bool) -> Floats:
-        entries = part.first, part.last, part.indices, part.data
-        sweep(*entries, self.inverses, right, found, backward)
+    def _swept(self, part: Sweep, right: Floats, found: Floats) -> Floats:
+        part(right, found)
         return found
 
 
@@ -71,11 +68,11 @@ def multigrid(matrix: bsr_array, points: Floats) -> Solve:
 def _level(built: Any) -> Level:
     matrix = blocks_of(built.A, np.float32)
     diagonal = diagonal_of(matrix)
+    inverses = np.linalg.inv(built.A.data[diagonal])
     return Level(
-        replace(matrix, last=diagonal),
+        sweep(replace(matrix, last=diagonal), inverses),
         replace(matrix, first=diagonal + 1),
-        matrix,
-        np.linalg.inv(built.A.data[diagonal]),
+        sweep(matrix, inverses, backward=True),
         blocks_of(built.R, np.float32),
         blocks_of(built.P, np.float32),
     )

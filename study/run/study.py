@@ -54,6 +54,7 @@ from study.scene.file import validate, write_scene
 from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.lanes import lanes
+from study.stages.threads import threads
 
 if TYPE_CHECKING:
     from study.run.moving import Moving
@@ -88,7 +89,7 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
     """
     started = time.perf_counter()
     workers = 1 if scene.is_point else means.workers  # a point is moved before a process is there
-    with lanes(workers, watch.progress) as side_by_side:
+    with lanes(workers, watch.progress) as side_by_side, threads(workers):
         stages = Stages(means, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.
