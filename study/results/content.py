@@ -118,7 +118,7 @@ def _check_tools(results: Results, times: Floats) -> None:
 
 def _check_record(scene: Scene, record: StudyRecord) -> None:
     _agree("title", record.title, scene.title)
-    probes = ("control-point",) if scene.is_point else tuple(scene.control_points) or ("tool",)
+    probes = ("control-point",) if scene.is_point else scene.probes
     _agree("probes", record.probes, probes)
     systems = tuple(record.fuzzy.systems)
     if systems:
