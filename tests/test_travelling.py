@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from fem_reference.subspace import ritz_subspace
+from reports import field_figures
+from reports.renders import FLAT
 from study.models.table import model
 from study.plan.plan import plan
 from study.problem import way
 from study.problem.way import Turn, stations, turns
 from study.progress import Silent
+from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
@@ -220,7 +223,7 @@ def test_after_its_way_the_tissue_settles_as_under_a_tool_that_was_always_there(
 
 @pytest.fixture(scope="module")
 def results(scene):
-    return run_study(replace(scene, renders=False, tool=replace(scene.tool, force=0.3)))
+    return run_study(replace(scene, tool=replace(scene.tool, force=0.3)))
 
 
 def test_a_run_compares_all_that_follow(results):
@@ -231,6 +234,21 @@ def test_a_run_compares_all_that_follow(results):
     assert results.record.probes == ("tool", "tool-end")
     start, end = (results.curve("corrected", name) for name in results.record.probes)
     assert np.abs(start.displacement).argmax() < np.abs(end.displacement).argmax()
+
+
+def test_results_keep_the_way_and_a_picture_draws_it(results, tmp_path):
+    write(results, tmp_path)
+    fields = read(tmp_path).fields
+    ((start, *_, end),) = fields["ways"]
+    np.testing.assert_allclose(end - start, [0.025, 0.0, 0.0], atol=1e-9)
+    drawn = field_figures.views(results)
+    assert field_figures.explain(drawn)["travels"] == "1"
+    picture = field_figures._scene(drawn, drawn.sheets[0], FLAT)
+    dashed = [line for line in picture.axes[0].lines if line.get_linestyle() == "--"]
+    assert len(dashed) == 1
+    still = replace(drawn, ways=drawn.ways[:0])
+    picture = field_figures._scene(still, still.sheets[0], FLAT)
+    assert not [line for line in picture.axes[0].lines if line.get_linestyle() == "--"]
 
 
 def test_a_small_load_that_travels_moves_the_corrected_lattice_as_the_elements(scene):

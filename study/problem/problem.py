@@ -17,7 +17,7 @@ from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 from study.problem.varied import OUTLINE, VariedTissue, notes_of
-from study.problem.way import full_share
+from study.problem.way import full_share, ways
 
 Floats = NDArray[np.float64]
 
@@ -81,6 +81,13 @@ class Problem:
         peak = float(times[frames[0] if frames else -1])
         histories = (self.factor, *(load.factor for load in self.loads))
         return np.array([full_share(one, peak) for one in histories])
+
+    @property
+    def ways(self) -> Floats:
+        """Places [m] (tools, places, 3), equally spaced in time, of each tool that travels."""
+        first = (self.tool, self.factor)
+        loads = [first, *((load.tool, load.factor) for load in self.loads)]
+        return ways([(tool.name, tool.centre, factor) for tool, factor in loads])
 
     @property
     def notes(self) -> tuple[str, ...]:

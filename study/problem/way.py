@@ -11,7 +11,7 @@ force at the distance in use.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,8 @@ MEASURED = 0.002
 DEGREE = 3
 MOST = 200
 """Stations: each is a load of its own, which every step of a lattice adds up."""
+OUTLINE = 33
+"""Places by which a way is drawn."""
 SAME = 1e-6
 """Distance, in radii, below which two stations are one that the tool passes twice."""
 
@@ -134,6 +136,26 @@ def turns(
         at = [n for n in left if np.linalg.norm(places[n] - here) < same]
         left = [n for n in left if n not in at]
         yield here, Turn(times, marks, tuple(one for n in at for one in shares[n]), history)
+
+
+def ways(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
+    """Places [m] (tools, OUTLINE, 3), equally spaced in time, of each tool that travels.
+
+    `loads`: name of the tool, place [m] (3,) and factor of each load.
+    """
+    stations: dict[str, list[tuple[Floats, Turn]]] = {}
+    for name, place, factor in loads:
+        if isinstance(factor, Turn):
+            stations.setdefault(name, []).append((place, factor))
+    found = [_outline(one) for one in stations.values()]
+    return np.stack(found) if found else np.zeros((0, OUTLINE, 3))
+
+
+def _outline(stations: Sequence[tuple[Floats, Turn]]) -> Floats:
+    times = stations[0][1].times
+    at = np.linspace(times[0], times[-1], OUTLINE)
+    shares = np.column_stack([turn.share(at) for _, turn in stations])
+    return np.asarray(shares @ np.array([place for place, _ in stations]))
 
 
 def full_share(history: Callable[[Floats], Floats], time: float) -> float:
