@@ -30,19 +30,22 @@ class Burden:
     """Further `loads`, attached `weights`, and `gravity` [m/s^2] (3,) on these and on the tissue.
 
     `given_loaded`: whether the given shape is that at rest under gravity. Small displacements from
-    there are those of a weightless body, so that gravity leaves no trace in them.
+    there are those of a weightless body, so that gravity leaves no trace in them. `full` (loads,):
+    share of each load, the first tool's too, in the rest under all of them; None for all of each.
     """
 
     loads: tuple[ToolPatch, ...] = ()
     weights: tuple[Weight, ...] = ()
     gravity: Floats = field(default_factory=lambda: np.zeros(3))
     given_loaded: bool = False
+    full: Floats | None = None
 
 
 def burden_of(problem: Problem) -> Burden:
     """That of a problem."""
     loads = tuple(load.tool for load in problem.loads)
-    return Burden(loads, problem.weights, problem.gravity, problem.given_loaded)
+    given = problem.weights, problem.gravity, problem.given_loaded
+    return Burden(loads, *given, problem.full)
 
 
 def laden(body: Body, burden: Burden) -> Body:
@@ -55,17 +58,14 @@ def laden(body: Body, burden: Burden) -> Body:
     if burden.loads or burden.weights:
         nodes = body.nodes
         surface = skfem.FacetBasis(nodes.mesh, nodes.elem, nodes.mapping, intorder=FACET_ORDER)
-        others = tuple(
-            without_fixed(_placed(surface, patch, f"tool.{n}"), body.fixed)
-            for n, patch in enumerate(burden.loads, 2)
-        )
+        others = tuple(without_fixed(_placed(surface, patch), body.fixed) for patch in burden.loads)
         for attached in _all_attached(surface, burden.weights):
             mass = csc_array(mass + decoupled(attached, body.fixed))
             nodal = nodal + attached.sum(axis=1)
     dead: Floats | None = None
     if burden.gravity.any() and not burden.given_loaded:
         dead = without_fixed(nodal * np.tile(burden.gravity, body.node_count), body.fixed)
-    return replace(body, mass=mass, nodal_mass=nodal, others=others, dead=dead)
+    return replace(body, mass=mass, nodal_mass=nodal, others=others, dead=dead, full=burden.full)
 
 
 def hanging(body: Body, burden: Burden) -> Floats:
@@ -82,10 +82,10 @@ def _all_attached(surface: Any, weights: tuple[Weight, ...]) -> list[csc_array]:
     return [_attached(surface, one, f"weight.{n}") for n, one in enumerate(weights, 1)]
 
 
-def _placed(surface: Any, patch: ToolPatch, name: str) -> Floats:
+def _placed(surface: Any, patch: ToolPatch) -> Floats:
     """Nodal forces [N] (n,) of a load."""
     if not patch.profile(rows(surface.global_coordinates()), rows(surface.normals)).any():
-        raise _untouched(surface, name)
+        raise _untouched(surface, patch.name)
     return patch_load(surface, patch)
 
 

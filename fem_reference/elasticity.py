@@ -74,7 +74,8 @@ class Body:
     do; they are coupled to nothing and without load, but keep a stiffness and a mass of their own.
     `nodal_mass` [kg] (n,): the mass at each unknown, with what is coupled to fixed ones. `others`:
     [N] (n,) each, of further loads; `dead` [N] (n,): what acts at all times, and has taken the body
-    to where its motion starts.
+    to where its motion starts. `full` (loads,): share of each load in the rest under all of them,
+    None for all of each.
     """
 
     mesh: TetrahedralMesh
@@ -90,6 +91,7 @@ class Body:
     fixed: Booleans | None = None
     others: tuple[Floats, ...] = ()
     dead: Floats | None = None
+    full: Floats | None = None
 
     @property
     def loads(self) -> Floats:
@@ -97,9 +99,15 @@ class Body:
         return np.column_stack([self.load, *self.others])
 
     @property
+    def full_load(self) -> Floats:
+        """Nodal forces [N] (n,) of all loads in full: of one that travels, at one place."""
+        loads = self.loads
+        return np.asarray(loads.sum(axis=1) if self.full is None else loads @ self.full)
+
+    @property
     def whole_load(self) -> Floats:
         """Nodal forces [N] (n,) of all loads in full and of what acts at all times."""
-        whole = self.loads.sum(axis=1)
+        whole = self.full_load
         return np.asarray(whole if self.dead is None else whole + self.dead)
 
     @property

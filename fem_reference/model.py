@@ -120,7 +120,7 @@ class Solution:
             return self.contact.at_rest
         if self.superposed is None:
             return solve_static(body)
-        moved = self.superposed.subspace.rest()
+        moved = self.superposed.subspace.rest(body.full)
         return moved if self.start is None else moved + self.start
 
 

@@ -55,9 +55,14 @@ class Subspace:
         """All loads (m, loads), in full."""
         return np.column_stack([self.load, *self.others])
 
-    def rest(self) -> Floats:
-        """Displacement [m] (n,) at rest under all loads, exact where it lies in the subspace."""
-        return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, self.loads.sum(axis=1)))
+    def rest(self, full: Floats | None = None) -> Floats:
+        """Displacement [m] (n,) at rest under all loads, exact where it lies in the subspace.
+
+        `full` (loads,): the share of each; all of each by default.
+        """
+        loads = self.loads
+        whole = loads.sum(axis=1) if full is None else loads @ full
+        return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, whole))
 
     def leading(self, size: int) -> Subspace:
         """The subspace of the first vectors."""

@@ -220,18 +220,18 @@ def burdened(
     """
     at_points, _ = assembly.lattice.interpolation(surface.points)
 
-    def nodal(patch: ToolPatch, what: str) -> Floats:
+    def nodal(patch: ToolPatch) -> Floats:
         """The patch's force, shared out among the nodes (n,)."""
         pushed = patch.profile(surface.points, surface.normals) * surface.weights
         if not pushed.any():
-            raise ValueError(f"{what} touches no surface that faces it; move or enlarge it")
+            raise ValueError(f"{patch.name}: touches no surface that faces it; move or enlarge it")
         return np.asarray(at_points.T @ (pushed * patch.force / pushed.sum()))
 
     attached = np.zeros_like(assembly.mass)
-    for number, one in enumerate(weights, 1):
-        attached += one.mass * nodal(one.patch, f"weight.{number}")
+    for one in weights:
+        attached += one.mass * nodal(one.patch)
     mass = assembly.mass + attached
-    pushes = [np.outer(nodal(one.tool, "tool: a further one"), one.tool.direction) for one in loads]
+    pushes = [np.outer(nodal(one.tool), one.tool.direction) for one in loads]
     moves = 1.0 if assembly.fixed is None else ~assembly.fixed
     burden = Burden(
         np.outer(mass, gravity) * moves,

@@ -72,9 +72,9 @@ class Views:
     """What is drawn of the organ: its surfaces, on sheets, as a camera sees them.
 
     `anchors` (probes + 1,): vertices at the tool and at the control points; `hidden`: whether they
-    lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest; `held`
-    and `loaded` (m,): share of the area of each triangle; `radius` [m] of the tool; `shown`: label
-    of the model that is deformed.
+    lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest; `ways`
+    [m] (k, m, 3): places of each tool that travels, at rest; `held` and `loaded` (m,): share of the
+    area of each triangle; `radius` [m] of the tool; `shown`: label of the model that is deformed.
     """
 
     camera: Camera
@@ -86,6 +86,7 @@ class Views:
     probes: tuple[str, ...]
     sheets: list[Sheet]
     inclusions: Floats
+    ways: Floats
     held: Floats
     loaded: Floats
     radius: float
@@ -129,6 +130,7 @@ def views(results: Results) -> Views | None:
         probes=results.record.probes,
         sheets=sheets,
         inclusions=fields.get("inclusions", np.zeros((0, 0, 3))),
+        ways=fields.get("ways", np.zeros((0, 0, 3))),
         held=fields.get("held", none),
         loaded=fields.get("loaded", none),
         radius=results.scene.tool.radius,
@@ -298,6 +300,8 @@ def _mark(axes: Axes, views: Views, places: Floats) -> None:
     camera = views.camera
     for outline in views.inclusions:
         _mark_inclusion(axes, camera.project(outline))
+    for way in views.ways:
+        _mark_way(axes, camera.project(way))
     length = ARROW_SHARE * 2.0 * camera.half_width
     shaft = camera.project(np.stack([places[0] - length * views.push, places[0]]))
     arrow = {"arrowstyle": "-|>", "color": RED, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
@@ -306,6 +310,13 @@ def _mark(axes: Axes, views: Views, places: Floats) -> None:
     axes.plot(ring[:, 0], ring[:, 1], color=RED, lw=1.0)
     for i, place in enumerate(camera.project(places[1:])):
         _mark_point(axes, place, str(i + 1), bool(views.hidden[i + 1]))
+
+
+def _mark_way(axes: Axes, seen: Floats) -> None:
+    """The way of a tool over the organ at rest, with a head where it ends."""
+    axes.plot(seen[:, 0], seen[:, 1], "--", color=RED, lw=1.1)
+    arrow = {"arrowstyle": "-|>", "color": RED, "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", tuple(seen[-1]), tuple(seen[-2]), arrowprops=arrow)
 
 
 def _ring(centre: Floats, axis: Floats, radius: float) -> Floats:
@@ -341,6 +352,7 @@ def _draw_key(axes: Axes, views: Views, sheet: Sheet) -> None:
     names = [f"{i}  {short(name, 20)}" for i, name in enumerate(views.probes[:6], 1)]
     names += ["…"] if len(views.probes) > len(names) else []
     names += ["⋯  inclusion, at rest"] if len(views.inclusions) else []
+    names += ["⇢  its way, at rest"] if len(views.ways) else []
     text = "\n".join(["→  tool", *names])
     axes.text(0.5, 0.52, text, transform=axes.transAxes, va="top", linespacing=1.25)
 
@@ -414,8 +426,12 @@ def _normals(points: Floats, triangles: NDArray[np.int64]) -> Floats:
 
 
 def explain(views: Views) -> dict[str, str]:
-    """Exaggeration and direction of the push, as the caption of the pictures says them."""
+    """Exaggeration and direction of the push, as the caption of the pictures says them.
+
+    `travels`: how many tools do so, empty for none.
+    """
     return {
+        "travels": str(len(views.ways) or ""),
         "factor": fixed(views.factor, 0),
         "push": _direction(views.push),
         "of": views.shown,

@@ -29,8 +29,10 @@ from study.mesh.kinds import TetrahedralMesh
 from study.mesh.save import save
 from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
+from study.problem.contact import Load
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
+from study.problem.way import Turn
 from study.progress import Progress
 from study.results import folder as results
 from study.run.suiting import read_suited
@@ -47,18 +49,19 @@ MESHES = {
 """File of the mesh alone by the program that reads it, and meshio's name of its format."""
 LATTICE = "lattice"
 FORMATS = ("calculix", "vtu", LATTICE, *MESHES)
-HELD = frozenset({"several-loads", "gravity", "weights"})
+HELD = frozenset({"several-loads", "travelling-loads", "gravity", "weights"})
 """What nodal forces and a field of gravity say of a scene beside its first load."""
 MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
 """Of HHT: CalculiX's own default."""
 # Also what CalculiX leaves beside its decks.
-FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", calculix.WEIGHTS, "spooles.out"} | {
+FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     f"{deck}.{end}"
     for deck in ("static", "dynamic")
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
+FILES |= {calculix.WEIGHTS, calculix.HISTORIES}
 FILES |= {file for file, _ in MESHES.values()} | handover.FILES
 FURTHER_LOAD = re.compile(r"load\.\d+\.inp")
 FRAMES = 4
@@ -178,7 +181,7 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
         pairs = zip(moved, own_moved, strict=True)
         differences = (at_rest, max(_difference(u, v) for (_, u), (_, v) in pairs))
         about = _about_calculix(scene, given, motion, differences)
-    about += _burdened(problem, given) + _noted(scene, problem)
+    about += _burdened(problem, given, merged=given.is_merged) + _noted(scene, problem)
     _write(folder, files | {MARK: about})
 
 
@@ -350,12 +353,20 @@ displacement differs by {at_rest:.1e}, relative L2 over the nodes.
 """
 
 
-def _burdened(problem: Problem, given: NodalProblem) -> str:
-    """What acts beside the first load, and in which parts of the files; nothing where nothing."""
+def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
+    """What acts beside the first load, and in which parts of the files; nothing where nothing.
+
+    `merged`: whether the files have all loads as one.
+    """
     said = [
-        f"load {n} (load.{n}.inp, load_{n}): of a further tool, with a history of its own"
-        for n in range(2, len(given.loads) + 1)
+        f"load {n} (load.{n}.inp, load_{n}): {_of_load(load)}, with a history of its own"
+        for n, load in enumerate(problem.loads, 2)
     ]
+    if merged:
+        said = [
+            "loads that meet at nodes are one: histories.inp has the force [N] at each node over "
+            "time, load.inp that at rest in full, of a tool that travels where it is at the peak"
+        ]
     if given.gravity is not None:
         told = ", ".join(f"{part:g}" for part in given.gravity)
         said.append(f"gravity ({told}) m/s^2 acts on the tissue at rest (*DLOAD, GRAV)")
@@ -369,6 +380,12 @@ def _burdened(problem: Problem, given: NodalProblem) -> str:
     return (
         "".join(["\nBeside the first load:\n", *(f"- {line}\n" for line in said)]) if said else ""
     )
+
+
+def _of_load(load: Load) -> str:
+    """Whose it is."""
+    travels = isinstance(load.factor, Turn)
+    return f"of {load.tool.name}" + (" at a station of its path" if travels else "")
 
 
 def _about_vtu(scene: Scene, given: NodalProblem) -> str:

@@ -388,20 +388,41 @@ def test_a_vtu_file_has_every_load_and_the_weights(tmp_path):
     assert np.linalg.norm(grid.point_data["weights"].sum(axis=0)) == pytest.approx(0.02 * 9.81)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (("tool.shape=sphere", "tool.displacement=2 mm"), "their force follows from contact"),
-        (
-            (*HUNG, SECOND.replace("at=[0.8", "at=[0.3")),
-            "tool.2: meets another load at a node",
-        ),
-    ],
-)
-def test_what_a_deck_cannot_hold_is_refused_with_the_reason(overrides, message, tmp_path):
-    request = ExportRequest(
-        target="block", to="calculix", out=tmp_path / "out", overrides=overrides
-    )
-    with pytest.raises(ValueError, match=message):
+def test_what_a_deck_cannot_hold_is_refused_with_the_reason(tmp_path):
+    moved = ("tool.shape=sphere", "tool.displacement=2 mm")
+    request = ExportRequest(target="block", to="calculix", out=tmp_path / "out", overrides=moved)
+    with pytest.raises(ValueError, match="their force follows from contact"):
         export(request, Silent())
     assert not list(tmp_path.iterdir())
+
+
+TRAVELS = (
+    *HUNG[:6],
+    'tool.place={side="superior", at=[0.3, 0.5]}',
+    "tool.radius=12 mm",
+    "tool.force=0.05 N",
+    'tool.path=[{time="0 s", offset=[0,0,0]}, {time="0.4 s", offset=["15 mm",0,0]}]',
+)
+MEET = (*HUNG[:6], SECOND.replace("at=[0.8", "at=[0.3"))
+
+
+@pytest.mark.parametrize(("given", "stays"), [(TRAVELS, 1.0), (MEET, 1.6)])
+def test_loads_that_meet_have_a_history_at_each_node(given, stays, tmp_path):
+    """Node by node the sum of all loads; at rest a tool that travels counts once."""
+    request = ExportRequest(target="block", to="calculix", out=tmp_path / "out", overrides=given)
+    folder = export(request, Silent())
+    scene = read_scene("block", given)
+    problem = problem_of(scene)
+    assert forces_of(folder / "load.inp")[2] == pytest.approx(-0.05 * stays, rel=1e-9)
+    motion = exporting.motion_of(scene, problem)
+    body = reference_of(scene).prepare(problem).body()
+    forces = (motion.factors @ body.loads.T).reshape(motion.count + 1, -1, 3)
+    written = cards((folder / "histories.inp").read_text())
+    assert len(written) == np.abs(forces).any(axis=0).sum()
+    for card, lines in written:
+        node, direction = map(int, card.removeprefix("AMPLITUDE, NAME=N").split("D"))
+        own = numbers(lines)[:, 1]
+        np.testing.assert_allclose(own, forces[:, node - 1, direction - 1], rtol=1e-9, atol=1e-15)
+    deck = (folder / "dynamic.inp").read_text()
+    assert deck.count("*CLOAD, AMPLITUDE=N") == len(written)
+    assert "that at rest in full" in (folder / "README.txt").read_text()

@@ -95,9 +95,7 @@ def linear_rest(body: Body, tissue: Tissue) -> Floats:
     """
     bare = touched(body, tissue, (), np.zeros(1))
     load, w = np.zeros(len(bare.free)), np.zeros(len(bare.free))
-    load[: bare.solid.size] = body.loads.sum(axis=1)
-    if body.dead is not None:
-        load[: bare.solid.size] += body.dead
+    load[: bare.solid.size] = body.whole_load
     factors = symmetric_factors(csc_array(bare.solid.linear()[bare.free][:, bare.free]))
     if factors is None:
         raise ValueError("the stiffness is singular: the support does not hold the body")

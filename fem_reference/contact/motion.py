@@ -374,5 +374,5 @@ def _rest(pressed: Pressed, body: Reduced, found: Sampled, peak: float) -> AtPea
 
 def _under_loads(given: Answered) -> Floats:
     """Displacement [m] (n,) at rest under all loads in full, without tools and what is dead."""
-    whole = given.body.loads.sum(axis=1)
+    whole = given.body.full_load
     return given.solve(whole) if whole.any() else np.zeros_like(whole)

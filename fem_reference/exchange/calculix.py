@@ -7,7 +7,7 @@ negative. Its Rayleigh damping has them in it, as the reference's has.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 ELEMENT_NAME = {4: "C3D4", 10: "C3D10"}
 FIELD = 20
 SET_NAME = "SPRINGS"
-WEIGHTS = "weights.inp"
+WEIGHTS, HISTORIES = "weights.inp", "histories.inp"
 MODEL = ("*INCLUDE, INPUT=mesh.inp", "*INCLUDE, INPUT=foundation.inp")
 
 
@@ -47,9 +47,13 @@ class Transient:
 
     def factor(self, times: Floats) -> Floats:
         """Factor of each load at times [s], as CalculiX interpolates it; of one load (t,)."""
-        known = self.step * np.arange(len(self.factors))
-        each = [np.interp(times, known, column) for column in self.columns]
+        each = [np.interp(times, self.times, column) for column in self.columns]
         return each[0] if len(each) == 1 else np.column_stack(each)
+
+    @property
+    def times(self) -> Floats:
+        """At which the factors are [s]."""
+        return np.asarray(self.step * np.arange(len(self.factors)), dtype=np.float64)
 
     @property
     def columns(self) -> list[Floats]:
@@ -64,13 +68,13 @@ class Transient:
 def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, str]:
     """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion.
 
-    ValueError for loads of a motion that meet at a node: CalculiX adds them under one history.
+    Of loads that meet at a node, as those of a tool that travels do, CalculiX would give all forces
+    there the history of one: each node has a history of its own instead, of its force [N].
     """
-    parts = dict(zip(load_files(problem), problem.loads, strict=True))
+    loads = (problem.full_load,) if problem.is_merged else problem.loads
+    parts = dict(zip(load_files(problem), loads, strict=True))
     if problem.hanging is not None:
         parts[WEIGHTS] = problem.hanging
-    if motion is not None:
-        _refuse_meeting(problem.loads)
     named = {
         "mesh.inp": _lines(_mesh(problem, motion)),
         "foundation.inp": _lines(_foundation(problem)),
@@ -78,23 +82,16 @@ def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, s
     } | {name: _lines(_load(forces)) for name, forces in parts.items()}
     if motion is not None:
         named["dynamic.inp"] = _lines(_dynamic(problem, motion))
+        if problem.is_merged:
+            named[HISTORIES] = _lines(_histories(problem, motion))
     return named
 
 
 def load_files(problem: NodalProblem) -> list[str]:
-    """Name of the file of each load that has a history."""
+    """Name of the file of each load that has a history, of all where these meet."""
+    if problem.is_merged:
+        return ["load.inp"]
     return ["load.inp", *(f"load.{n}.inp" for n in range(2, len(problem.loads) + 1))]
-
-
-def _refuse_meeting(loads: Sequence[Floats]) -> None:
-    taken = np.zeros(loads[0].shape, dtype=bool)
-    for number, forces in enumerate(loads, 1):
-        if (taken & (forces != 0.0)).any():
-            raise ValueError(
-                f"tool.{number}: meets another load at a node, and CalculiX adds forces there "
-                "under one history; move it, or export to vtu"
-            )
-        taken |= forces != 0.0
 
 
 def _lines(lines: Iterable[str]) -> str:
@@ -177,15 +174,45 @@ def _static(problem: NodalProblem, parts: Iterable[str]) -> Iterator[str]:
 def _dynamic(problem: NodalProblem, motion: Transient) -> Iterator[str]:
     """From rest under gravity, which leaves a linear motion as it is and is not in it."""
     yield from MODEL
-    times = motion.step * np.arange(len(motion.factors))
+    times = motion.times
     histories = ["HISTORY", *(f"HISTORY{n}" for n in range(2, len(problem.loads) + 1))]
-    for name, factors in zip(histories, motion.columns, strict=True):
-        yield f"*AMPLITUDE, NAME={name}"
-        for time, factor in zip(times, factors, strict=True):
-            yield f"{_number(time)}, {_number(factor)}"
+    if problem.is_merged:
+        yield f"*INCLUDE, INPUT={HISTORIES}"
+    else:
+        for name, factors in zip(histories, motion.columns, strict=True):
+            yield from _amplitude(name, times, factors)
     yield f"*STEP, INC={len(motion.factors)}"
     yield f"*DYNAMIC, DIRECT, ALPHA={motion.alpha:g}"
     yield f"{_number(motion.step)}, {_number(times[-1])}"
-    for name, part in zip(histories, load_files(problem), strict=True):
-        yield from (f"*CLOAD, AMPLITUDE={name}", f"*INCLUDE, INPUT={part}")
+    if problem.is_merged:
+        for node, direction in _loaded(problem):
+            yield f"*CLOAD, AMPLITUDE={_own_history(node, direction)}"
+            yield f"{node + 1}, {direction + 1}, 1."
+    else:
+        for name, part in zip(histories, load_files(problem), strict=True):
+            yield from (f"*CLOAD, AMPLITUDE={name}", f"*INCLUDE, INPUT={part}")
     yield from (f"*NODE PRINT, NSET=ALL, FREQUENCY={motion.kept}", "U", "*END STEP")
+
+
+def _amplitude(name: str, times: Floats, values: Floats) -> Iterator[str]:
+    yield f"*AMPLITUDE, NAME={name}"
+    for time, value in zip(times, values, strict=True):
+        yield f"{_number(time)}, {_number(value)}"
+
+
+def _histories(problem: NodalProblem, motion: Transient) -> Iterator[str]:
+    """Force [N] at each node, direction by direction, over time."""
+    times = motion.times
+    loads, factors = np.array(problem.loads), np.column_stack(motion.columns)
+    for node, direction in _loaded(problem):
+        own = factors @ loads[:, node, direction]
+        yield from _amplitude(_own_history(node, direction), times, own)
+
+
+def _loaded(problem: NodalProblem) -> list[tuple[int, int]]:
+    """Nodes, from 0, and directions in which any load acts there."""
+    return [(int(n), int(d)) for n, d in np.argwhere(np.any(np.array(problem.loads) != 0, axis=0))]
+
+
+def _own_history(node: int, direction: int) -> str:
+    return f"N{node + 1}D{direction + 1}"

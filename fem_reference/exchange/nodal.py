@@ -34,7 +34,8 @@ class NodalProblem:
     couples the nodes in each direction alike; `support_density` [Pa/m] (n,), its stiffness per
     area, mean of the facets at a node. `others` [N] (n, 3) each: of further loads. `gravity`
     [m/s^2] (3,) on the tissue and `hanging` [N] (n, 3), its forces on attached weights; None and
-    zero where the given shape is the one under gravity, from which displacements count.
+    zero where the given shape is the one under gravity, from which displacements count. `full`
+    (loads,): share of each load at rest in full, None for all of each.
     """
 
     nodes: Floats
@@ -46,6 +47,20 @@ class NodalProblem:
     others: tuple[Floats, ...] = ()
     gravity: Floats | None = None
     hanging: Floats | None = None
+    full: Floats | None = None
+
+    @property
+    def full_load(self) -> Floats:
+        """Nodal forces [N] (n, 3) of all loads in full: of one that travels, at one place."""
+        full = np.ones(len(self.loads)) if self.full is None else self.full
+        return np.asarray(np.einsum("k,knd->nd", full, np.array(self.loads)))
+
+    @property
+    def is_merged(self) -> bool:
+        """Whether loads meet at a node, or are not all there in full at once."""
+        loaded = [forces != 0.0 for forces in self.loads]
+        meet = bool((np.sum(loaded, axis=0) > 1).any())
+        return meet or (self.full is not None and bool((self.full != 1.0).any()))
 
     @property
     def loads(self) -> tuple[Floats, ...]:
@@ -87,6 +102,7 @@ def nodal_problem(
         tuple(other.reshape(-1, DIRECTIONS) for other in body.others),
         None if body.dead is None else burden.gravity,
         _hanging(body, burden),
+        body.full,
     )
 
 

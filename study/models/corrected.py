@@ -316,5 +316,5 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     any_load=False,
-    able=frozenset({"several-loads", "inclusions", "fixed-surfaces"}),
+    able=frozenset({"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}),
 )

@@ -521,7 +521,15 @@ def assumptions(scene: Scene) -> list[str]:
 
 
 ABLE = frozenset(
-    {"moved-tools", "several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"}
+    {
+        "moved-tools",
+        "several-loads",
+        "travelling-loads",
+        "gravity",
+        "weights",
+        "inclusions",
+        "fixed-surfaces",
+    }
 )
 
 KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)

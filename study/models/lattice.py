@@ -54,7 +54,15 @@ Floats = NDArray[np.float64]
 MASS_LIMIT = 0.05
 REGION_KEYS = ("spacing", "levels", "radius", "tolerance")
 FOLLOWED = frozenset(
-    {"moved-tools", "several-loads", "gravity", "weights", "inclusions", "fixed-surfaces"}
+    {
+        "moved-tools",
+        "several-loads",
+        "travelling-loads",
+        "gravity",
+        "weights",
+        "inclusions",
+        "fixed-surfaces",
+    }
 )
 """Names of `study.problem.features.FEATURES` that every uniform lattice follows."""
 

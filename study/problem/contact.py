@@ -67,12 +67,16 @@ class Foundation:
 
 @dataclass(frozen=True)
 class ToolPatch:
-    """Blunt tool at `centre` [m] pushing along the unit vector `direction` with `force` [N]."""
+    """Blunt tool at `centre` [m] pushing along the unit vector `direction` with `force` [N].
+
+    `name`: the key of the scene that places it, for messages.
+    """
 
     centre: Floats
     direction: Floats
     radius: float
     force: float
+    name: str = "tool"
 
     def profile(self, points: Floats, normals: Floats) -> Floats:
         """Traction at points (..., 3) with outward normals (..., 3), up to a factor.
@@ -90,7 +94,10 @@ class ToolPatch:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A blunt tool beside the first, and the share of its force at times [s]."""
+    """A blunt tool beside the first, or a station of one that travels (`study.problem.way`).
+
+    `factor`: share of its force at times [s].
+    """
 
     tool: ToolPatch
     factor: Callable[[Floats], Floats]

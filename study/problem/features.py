@@ -7,6 +7,7 @@ from collections.abc import Iterable
 FEATURES = {
     "moved-tools": "rigid tools that are moved",
     "several-loads": "several loads",
+    "travelling-loads": "a blunt tool that travels",
     "gravity": "gravity",
     "weights": "attached weights",
     "inclusions": "tissue that differs from place to place",
@@ -14,7 +15,7 @@ FEATURES = {
 }
 """Names of what a model must be able to follow, in the words of a message."""
 
-BESIDE_ONE_LOAD = ("moved-tools", "several-loads", "gravity", "weights")
+BESIDE_ONE_LOAD = ("moved-tools", "several-loads", "travelling-loads", "gravity", "weights")
 """Of these, what acts beside a single load of a given force."""
 
 

@@ -17,6 +17,7 @@ from study.problem.supports import Support
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
 from study.problem.varied import OUTLINE, VariedTissue, notes_of
+from study.problem.way import full_share, ways
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +28,8 @@ class Problem:
 
     `foundation`: all that holds it, fixed surfaces too. `tool` and `factor`: the first tool as a
     load, and the share of its force at times [s]; a tool that is moved has no force there and
-    stands in `rigid_tools`. `loads`: those of further tools.
+    stands in `rigid_tools`. `loads`: those of further tools; a blunt tool that travels is a load at
+    each station of its way, the first tool at the first of them.
     `gravity` [m/s^2] (3,) acts on the tissue and on `weights`; with `given_loaded` the geometry is
     the shape at rest under it, and displacements count from there. `probes`: names of the control
     points. Two problems are the same only if they are one object, so that what is assembled for
@@ -68,6 +70,24 @@ class Problem:
             return self.factor
         histories = (self.factor, *(load.factor for load in self.loads))
         return lambda times: np.column_stack([one(times) for one in histories])
+
+    @property
+    def full(self) -> Floats:
+        """Share (loads,) of each load where all are told at rest in full.
+
+        Of a tool that travels it is there where it is at the first of the kept frames, the peak.
+        """
+        times, frames = self.observation.times, self.observation.frames
+        peak = float(times[frames[0] if frames else -1])
+        histories = (self.factor, *(load.factor for load in self.loads))
+        return np.array([full_share(one, peak) for one in histories])
+
+    @property
+    def ways(self) -> Floats:
+        """Places [m] (tools, places, 3), equally spaced in time, of each tool that travels."""
+        first = (self.tool, self.factor)
+        loads = [first, *((load.tool, load.factor) for load in self.loads)]
+        return ways([(tool.name, tool.centre, factor) for tool, factor in loads])
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -118,7 +118,7 @@ def _check_tools(results: Results, times: Floats) -> None:
 
 def _check_record(scene: Scene, record: StudyRecord) -> None:
     _agree("title", record.title, scene.title)
-    probes = ("control-point",) if scene.is_point else tuple(scene.control_points) or ("tool",)
+    probes = ("control-point",) if scene.is_point else scene.probes
     _agree("probes", record.probes, probes)
     systems = tuple(record.fuzzy.systems)
     if systems:
@@ -386,12 +386,13 @@ def _check_sensitivity(results: Results) -> None:
 
 
 def _check_fields(results: Results) -> None:
-    """Surface, tool, control points, inclusions, cut, and displacements of each model."""
+    """Surface, tools and their ways, control points, inclusions, cut, and what each model does."""
     file, fields, record = "fields.npz", results.fields, results.record
     if results.scene.is_point:
         return check_names(file, fields, [])
     names = [model.name for model in record.models]
     inside = {"inclusions": "ko3"} if results.scene.tissue.inclusion else {}
+    inside |= {"ways": "wv3"} if "travelling-loads" in results.scene.features else {}
     surface = {**SURFACE, **inside}
     of_models = {start + name: dims for name in names for start, dims in OF_MODEL.items()}
     check_names(file, fields, [*surface, *of_models])

@@ -111,7 +111,12 @@ class OrganRequest:
 
 
 def _refuse_moved(scene: Scene) -> None:
-    """ValueError for tools that are moved, of which a draw has no force to change."""
+    """ValueError for tools that are moved, whose force or place a draw cannot change."""
+    if "travelling-loads" in scene.features:
+        raise ValueError(
+            "robustness: a draw changes place and radius of a tool, and the scene has one that "
+            "travels; leave out its path, or use run"
+        )
     if "moved-tools" in scene.features:
         raise ValueError(
             "robustness: a draw changes place and force of a blunt tool, and the scene has rigid "

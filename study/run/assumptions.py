@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from study.models import table
 from study.problem.supports import CLAMPED, FOUNDATION
+from study.problem.way import APART, MEASURED
 from study.results.records import ControlPoint
 from study.scene import Scene, Support
 
@@ -36,7 +37,21 @@ def _organ(scene: Scene) -> list[str]:
         "none.",
         *(_held(one) for one in scene.supports),
         *_tissue(scene),
+        *_travelling(scene),
         _given(scene),
+    ]
+
+
+def _travelling(scene: Scene) -> list[str]:
+    """On tools that travel, and what stands for them."""
+    if not any(tool.travels for tool in scene.tools):
+        return []
+    return [
+        "A blunt tool that travels keeps its direction and stands for patches at stations on its "
+        f"way, at most {APART:g} radii apart, whose shares follow it as cubic splines: its force "
+        "and centre are exact, and the displacement under it is off by less than "
+        f"{100 * MEASURED:g} % on the built-in liver. Control points are those of the tissue and "
+        "stay where they are."
     ]
 
 

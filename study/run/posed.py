@@ -34,7 +34,8 @@ BLIND_TO = (
 class Posed:
     """What is seen of a problem: where, on which surface, and of which mesh (by its SHA-256).
 
-    `inclusions` [m] (regions, points, 3): points of the surface of each; `watched`: for pictures.
+    `inclusions` [m] (regions, points, 3): points of the surface of each; `ways` [m] (tools, places,
+    3): of tools that travel; `watched`: for pictures.
     """
 
     response: Response
@@ -46,6 +47,7 @@ class Posed:
     dimensionless: Dimensionless
     mesh: str
     inclusions: Floats
+    ways: Floats
     watched: Watched
 
 
@@ -91,6 +93,7 @@ class Posing:
             dimensionless(self.scene, problem),
             self.mesh,
             problem.inclusions,
+            problem.ways,
             self.watched,
         )
 

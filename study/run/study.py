@@ -179,7 +179,7 @@ def _save_mesh(moving: Moving, posed: Posed, path: Path) -> None:
 
 
 def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
-    """Surface, tool, probes and inclusions, and what is kept of each model to draw."""
+    """Surface, tool, its way, probes, inclusions, and what is kept of each model to draw."""
     seen = posed.watched
     found = {
         "points": posed.points,
@@ -187,6 +187,7 @@ def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
         "tool": posed.tool,
         "probes": posed.probes,
         **({"inclusions": posed.inclusions} if len(posed.inclusions) else {}),
+        **({"ways": posed.ways} if len(posed.ways) else {}),
         "held": seen.held,
         "loaded": seen.loaded,
         "cut": seen.points,

@@ -272,7 +272,7 @@ def _tool_contradictions(scene: Scene, name: str, tool: Tool) -> Iterator[str]:
     if tool.direction is not None and not any(tool.direction):
         yield f"{name}.direction: a zero vector has no direction"
     yield from _drive_contradictions(name, tool)
-    if tool.path:
+    if tool.path and tool.is_moved:
         return
     history, time = tool.history, scene.time
     if history.kind == "ramp-hold-release" and history.ramp == 0.0 and history.hold == 0.0:
@@ -286,11 +286,17 @@ def _tool_contradictions(scene: Scene, name: str, tool: Tool) -> Iterator[str]:
 def _drive_contradictions(name: str, tool: Tool) -> Iterator[str]:
     """A blunt tool has a force, a rigid one is moved in one way."""
     if not tool.is_moved:
-        for key in ("displacement", "path"):
-            if getattr(tool, key):
-                yield f"{name}.{key}: moves a rigid tool; set {name}.shape to one, or remove it"
+        if tool.displacement:
+            yield f"{name}.displacement: moves a rigid tool; set {name}.shape to one, or remove it"
         if tool.contact != SLIDING or tool.friction or tool.clearance:
             yield f"{name}.contact: a blunt tool is a pressure; set {name}.shape or remove it"
+        if any(point.travel is not None for point in tool.path):
+            yield (
+                f"{name}.path: a blunt tool stays on the surface; give each point an offset in x, "
+                f"y and z, of which what is across the push counts, or set {name}.shape"
+            )
+        else:
+            yield from _path_contradictions(name, tool.path)
         return
     if (tool.displacement is None) == (not tool.path):
         yield f"{name}.displacement: give either it or {name}.path, which moves the tool"

@@ -229,10 +229,11 @@ def _unused_of_tool(tool: Tool) -> Iterator[tuple[str | int, ...]]:
     """Keys of the other kinds of tool and history."""
     unused = ["force"] if tool.is_moved else ["shape", "clearance", "contact", "friction"]
     unused += [] if tool.path else ["path"]
-    unused += ["history"] if tool.path else []
+    timed = tool.path and tool.is_moved  # its path says when
+    unused += ["history"] if timed else []
     for key in unused:
         yield (key,)
-    if tool.path:
+    if timed:
         return
     for key, kind in (
         ("ramp", "ramp-hold-release"),

@@ -31,11 +31,8 @@ def contradictions(scene: Scene) -> Iterator[str]:
     if sized and set(scene.features) & set(BESIDE_ONE_LOAD):
         yield NO_TOLERANCE
     for name in scene.region.at:
-        if name not in (scene.control_points or ("tool",)):
-            yield (
-                f"region.at: {name!r} is no control point; there are "
-                f"{', '.join(scene.control_points or ('tool',))}"
-            )
+        if name not in scene.probes:
+            yield (f"region.at: {name!r} is no control point; there are {', '.join(scene.probes)}")
 
 
 def unfit(lattice: Lattice) -> Iterator[str]:

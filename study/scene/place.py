@@ -58,6 +58,18 @@ def _from_side(
     return point, n[first]
 
 
+def depths(point: Floats, direction: Floats, surface: SurfaceMesh) -> Floats:
+    """How far [m] (hits,) along a unit vector from a point the surface that faces it is met."""
+    corner = surface.points[surface.triangles]
+    normal = _unit_normals(corner)
+    first = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
+    first = first / np.linalg.norm(first)
+    frame = np.stack([first, np.cross(direction, first)], axis=1)
+    slope = normal @ direction
+    met = (slope < 0.0) & _triangles_under((corner - point) @ frame, np.zeros(2))
+    return np.asarray(((corner[met, 0] - point) * normal[met]).sum(axis=1) / slope[met])
+
+
 def _triangles_under(corner: Floats, target: Floats) -> NDArray[np.bool_]:
     """Whether a projected triangle (k, 3, 2) covers a point; edges count."""
     a, b, c = (corner[:, i] - target for i in range(3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,10 +27,12 @@ from study.problem.supports import (
     free_motion,
 )
 from study.problem.trajectory import Observation
+from study.problem.way import full_share
 from study.scene.place import OUTWARD, resolve
-from study.scene.schema import AttachedWeight, Organ, Scene, Tool
+from study.scene.schema import END_POINT, TOOL_POINT, AttachedWeight, Organ, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
+from study.scene.travel import travelling
 
 Floats = NDArray[np.float64]
 
@@ -50,18 +52,18 @@ def problem_of(scene: Scene) -> Problem:
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
     foundation = _support(scene, surface)
-    tool = _tool(scene.tool, "tool", surface)
+    first, *loads = _loads(scene.tool, "tool", surface)
+    tool, factor = first.tool, first.factor
     surface_rule = over_surface(surface, SURFACE_POINTS)
     volume_rule = over_volume(geometry.mesh, VOLUME_POINTS)
     _check_held(foundation, surface_rule)
     _check_touch(tool, surface_rule)
 
-    factor = scene.tool.history.factor
     if scene.tool.is_moved:  # its force is a result, and as a load it has none
         tool = replace(tool, force=0.0)
     times = np.linspace(0.0, scene.time.duration, scene.time.samples)
-    places = scene.control_points or {"tool": scene.tool.place}
-    probes = np.array([resolve(place, surface)[0] for place in places.values()])
+    places = _probes(scene, surface, (first, *loads))
+    probes = np.array(list(places.values()))
     _check_inside(geometry.mesh, probes, tuple(places))
     observation = Observation(
         times,
@@ -81,15 +83,42 @@ def problem_of(scene: Scene) -> Problem:
         observation,
         tuple(places),
         tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene)),
-        tuple(
-            Load(_tool(one, f"tool.{n}", surface), one.history.factor)
-            for n, one in enumerate(scene.further_tools, 2)
-            if not one.is_moved
-        ),
+        (*loads, *_further_loads(scene, surface)),
         scene.gravity.acceleration * OUTWARD[scene.gravity.towards],
         tuple(_weight(one, n, surface) for n, one in enumerate(scene.weight, 1)),
         scene.gravity.given == "loaded",
     )
+
+
+def _probes(scene: Scene, surface: SurfaceMesh, loads: Sequence[Load]) -> dict[str, Floats]:
+    """Control points [m] (3,) by name; by default those of the tissue where the tool is placed.
+
+    Of one that travels, where its path ends too.
+    """
+    if scene.control_points:
+        return {name: resolve(one, surface)[0] for name, one in scene.control_points.items()}
+    found = {TOOL_POINT: resolve(scene.tool.place, surface)[0]}
+    if END_POINT in scene.probes:
+        end = scene.tool.path[-1].time
+        found[END_POINT] = max(loads, key=lambda one: full_share(one.factor, end)).tool.centre
+    return found
+
+
+def _loads(tool: Tool, name: str, surface: SurfaceMesh) -> tuple[Load, ...]:
+    """A blunt tool as a load, or one at each station of its path; a moved one where it starts."""
+    patch = _tool(tool, name, surface)
+    if tool.travels:
+        return travelling(tool, patch, surface)
+    return (Load(patch, tool.history.factor),)
+
+
+def _further_loads(scene: Scene, surface: SurfaceMesh) -> list[Load]:
+    return [
+        load
+        for n, one in enumerate(scene.further_tools, 2)
+        if not one.is_moved
+        for load in _loads(one, f"tool.{n}", surface)
+    ]
 
 
 def _moved(scene: Scene) -> list[tuple[str, Tool]]:
@@ -229,7 +258,7 @@ def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
             f"{name}.direction: points out of the organ at {name}.place; reverse it, or leave it "
             "out to push straight in"
         )
-    return ToolPatch(centre, unit, tool.radius, tool.force)
+    return ToolPatch(centre, unit, tool.radius, tool.force, name)
 
 
 def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...]) -> None:

@@ -22,6 +22,9 @@ Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
 
 Component = Annotated[float, Quantity("", -1.0, 1.0)]
 
+TOOL_POINT, END_POINT = "tool", "tool-end"
+"""Names of the control points of a scene that has none: at the tool, and where its path ends."""
+
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Annotated[str, Choice("fuzzy.systems.kinds:SYSTEMS")]
 ModelName = Annotated[str, Choice("study.models.table:MODELS")]
@@ -147,7 +150,10 @@ class OrganTissue(Tissue):
 
 @dataclass(frozen=True, kw_only=True)
 class Waypoint:
-    """Where a tool's tip is at a time: how far along its direction, or how far in x, y and z."""
+    """Where a tool is at a time: how far along its direction, or how far in x, y and z.
+
+    Of a rigid one its tip. Of a blunt one, which has offsets alone, what is across its push counts.
+    """
 
     time: Annotated[float, Quantity("s", 0.0, 3600.0)]
     travel: Coordinate | None = None
@@ -158,7 +164,8 @@ class Waypoint:
 class Tool:
     """A tool: where it touches, which way it faces (inwards by default), and what drives it.
 
-    A blunt one is a smooth pressure of a given `force`, over time as its `history`. The other
+    A blunt one is a smooth pressure of a given `force`, over time as its `history`; on a `path` it
+    travels over the surface, starting at its `place`. The other
     shapes are rigid and moved: by a `displacement` along the direction, over time as its `history`,
     or on a `path` of straight pieces; their tip starts at `place`, `clearance` off the surface.
     `contact`: bonded to what they touch at the start, or pressing only, with `friction` by
@@ -181,6 +188,11 @@ class Tool:
     def is_moved(self) -> bool:
         """Whether it is a rigid one, whose force is a result."""
         return self.shape != "blunt"
+
+    @property
+    def travels(self) -> bool:
+        """Whether it is a blunt one whose place changes."""
+        return not self.is_moved and bool(self.path)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -436,6 +448,13 @@ class Scene:
         return (self.tool, *self.further_tools)
 
     @property
+    def probes(self) -> tuple[str, ...]:
+        """Names of the control points of an organ; no end of a path that comes back."""
+        path = self.tool.path
+        ends = (END_POINT,) if self.tool.travels and path[-1].offset != path[0].offset else ()
+        return tuple(self.control_points) or (TOOL_POINT, *ends)
+
+    @property
     def supports(self) -> tuple[Support, ...]:
         """All of them."""
         return (self.support, *self.further_supports)
@@ -446,6 +465,7 @@ class Scene:
         asked = {
             "moved-tools": any(tool.is_moved for tool in self.tools),
             "several-loads": any(not tool.is_moved for tool in self.further_tools),
+            "travelling-loads": any(tool.travels for tool in self.tools),
             "gravity": self.gravity.acceleration > 0.0,
             "weights": bool(self.weight),
             "inclusions": bool(self.tissue.inclusion) or self.tissue.stiffness_map is not None,

@@ -1,0 +1,166 @@
+"""A blunt tool that travels over the surface: patches at stations on its way that take turns.
+
+The share of each station is a cardinal cubic spline of the place along a straight piece of the way
+(de Boor 1978, A Practical Guide to Splines, chapter 4; ends without a knot next to them), one at
+its own station and zero at all others. Together they repeat polynomials up to the third degree, so
+that on a flat surface the force, its centre and its second and third moment along the way are those
+of the tool itself at all times; what is left falls with the fourth power of the distance of
+stations, with hat functions by the second. At its rim the pressure pulls a little, by 0.6 % of the
+force at the distance in use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+Floats = NDArray[np.float64]
+
+APART = 0.25
+"""Distance of stations, at most, in radii of the tool: `reports/data/travelling_stations.csv`."""
+MEASURED = 0.002
+"""Larger than what such stations were off in the displacement under the tool, in the same table."""
+DEGREE = 3
+MOST = 200
+"""Stations: each is a load of its own, which every step of a lattice adds up."""
+OUTLINE = 33
+"""Places by which a way is drawn."""
+SAME = 1e-6
+"""Distance, in radii, below which two stations are one that the tool passes twice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Share of one station along a straight piece between two marks [m] of the way."""
+
+    first: float
+    last: float
+    share: BSpline
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """The factor of a station: its share of the tool, wherever that is, times the tool's history.
+
+    `times` [s] and `marks` [m] (c,): when the tool is how far on its way, linear in between, at
+    rest before and after. `history`: share of the tool's force at times [s].
+    """
+
+    times: Floats
+    marks: Floats
+    pieces: tuple[Piece, ...]
+    history: Callable[[Floats], Floats]
+
+    def share(self, times: Floats) -> Floats:
+        """Of the tool's pressure, what stands at the station at times [s]; the shape of `times`."""
+        at = np.asarray(np.interp(times, self.times, self.marks))
+        found = np.zeros_like(at)
+        for one in self.pieces:
+            on = (one.first <= at) & (at <= one.last)  # where two meet, both are the same
+            found[on] = one.share(at[on])
+        return found
+
+    def __call__(self, times: Floats) -> Floats:
+        """Share of the tool's whole force at times [s]."""
+        return np.asarray(self.share(times) * self.history(times))
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Marks [m] (k,) of stations along a way, and where they are across the push [m] (k, 3).
+
+    `pieces` (p, 2): numbers of the first and last station of each straight piece.
+    """
+
+    marks: Floats
+    away: Floats
+    pieces: tuple[tuple[int, int], ...]
+
+    def shares(self) -> list[list[Piece]]:
+        """Of each station, on the pieces that it is a station of."""
+        from scipy.interpolate import make_interp_spline
+
+        found: list[list[Piece]] = [[] for _ in self.marks]
+        for first, last in self.pieces:
+            marks = self.marks[first : last + 1]
+            for n, unit in enumerate(np.eye(len(marks))):
+                spline = make_interp_spline(marks, unit, min(DEGREE, len(marks) - 1))
+                found[first + n].append(Piece(marks[0], marks[-1], spline))
+        return found
+
+
+def stations(corners: Floats, distance: float) -> tuple[Stations, Floats]:
+    """Stations at most a `distance` [m] apart on straight pieces between corners [m] (c, 3).
+
+    And marks (c,) of the corners. ValueError for a way without length, or of too many stations.
+    """
+    lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    marks, away, pieces = [0.0], [corners[0]], []
+    if not lengths.any():
+        raise ValueError("stays where it is; give offsets across the push, or leave it out")
+    if lengths.sum() > distance * MOST:
+        raise ValueError(
+            f"{1e3 * lengths.sum():.4g} mm take more than {MOST} places of the tool, "
+            f"{1e3 * distance:.3g} mm apart; shorten it or enlarge the radius"
+        )
+    for start, end, length in zip(corners, corners[1:], lengths, strict=False):
+        if not length:
+            continue
+        shares = np.linspace(0.0, 1.0, int(np.ceil(length / distance * (1.0 - 1e-9))) + 1)[1:]
+        pieces.append((len(marks) - 1, len(marks) - 1 + len(shares)))
+        marks += (marks[-1] + length * shares).tolist()
+        away += list(start + np.outer(shares, end - start))
+    found = Stations(np.array(marks), np.array(away), tuple(pieces))
+    return found, np.concatenate([[0.0], np.cumsum(lengths)])
+
+
+def turns(
+    found: Stations,
+    places: Floats,
+    times: Floats,
+    marks: Floats,
+    history: Callable[[Floats], Floats],
+    same: float,
+) -> Iterator[tuple[Floats, Turn]]:
+    """Place [m] (3,) and factor of each station, of those less than `same` [m] apart as one."""
+    shares, left = found.shares(), list(range(len(places)))
+    while left:
+        here = places[left[0]]
+        at = [n for n in left if np.linalg.norm(places[n] - here) < same]
+        left = [n for n in left if n not in at]
+        yield here, Turn(times, marks, tuple(one for n in at for one in shares[n]), history)
+
+
+def ways(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
+    """Places [m] (tools, OUTLINE, 3), equally spaced in time, of each tool that travels.
+
+    `loads`: name of the tool, place [m] (3,) and factor of each load.
+    """
+    stations: dict[str, list[tuple[Floats, Turn]]] = {}
+    for name, place, factor in loads:
+        if isinstance(factor, Turn):
+            stations.setdefault(name, []).append((place, factor))
+    found = [_outline(one) for one in stations.values()]
+    return np.stack(found) if found else np.zeros((0, OUTLINE, 3))
+
+
+def _outline(stations: Sequence[tuple[Floats, Turn]]) -> Floats:
+    times = stations[0][1].times
+    at = np.linspace(times[0], times[-1], OUTLINE)
+    shares = np.column_stack([turn.share(at) for _, turn in stations])
+    return np.asarray(shares @ np.array([place for place, _ in stations]))
+
+
+def full_share(history: Callable[[Floats], Floats], time: float) -> float:
+    """Share of a load at rest in full: all of it, of a station what the tool leaves it at a time.
+
+    `time` [s]: at which the tool is where its rest is told.
+    """
+    return float(history.share(np.array([time]))[0]) if isinstance(history, Turn) else 1.0

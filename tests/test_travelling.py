@@ -1,0 +1,282 @@
+"""A blunt tool that travels over the surface: its stations, its loads, and what follows it."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference.subspace import ritz_subspace
+from reports import field_figures
+from reports.renders import FLAT
+from study.models.table import model
+from study.plan.plan import plan
+from study.problem import way
+from study.problem.way import Turn, stations, turns
+from study.progress import Silent
+from study.results.folder import read, write
+from study.run.study import run_study
+from study.scene.file import SceneError, read_scene, write_scene
+from study.scene.problem import problem_of
+from tests.benchmarks import travelling
+
+BLOCK = (
+    'organ.size=["80 mm", "40 mm", "30 mm"]',
+    "tool.radius=12 mm",
+    'tool.place={side="superior", at=[0.3, 0.5]}',
+    "support.depth=10 mm",
+    "reference.element_size=20 mm",
+    "lattice.spacing=10 mm",
+    "time.duration=0.4 s",
+    "time.samples=41",
+    "tool.history.ramp=0.1 s",
+    "tool.history.hold=1 s",
+    "control_points={}",
+)
+WAY = 'tool.path=[{time="0 s", offset=[0,0,0]}, {time="0.3 s", offset=["25 mm",0,0]}]'
+TOGETHER = 'models=["fem", "tissue", "corrected"]'
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return read_scene("block", (*BLOCK, WAY, TOGETHER))
+
+
+@pytest.fixture(scope="module")
+def problem(scene):
+    return problem_of(scene)
+
+
+def loads_of(problem):
+    return [(problem.tool, problem.factor), *((one.tool, one.factor) for one in problem.loads)]
+
+
+def nodal(problem, body, times):
+    """Nodal forces [N] (t, nodes, 3) of elements over time."""
+    return (problem.factors(times) @ body.loads.T).reshape(len(times), -1, 3)
+
+
+# --- stations -------------------------------------------------------------------------------------
+
+
+def moments(corners, times, distance):
+    """Moments 0 to 3 of the shares about the tool's own place [m], largest over time, by degree."""
+    found, marks = stations(corners, distance)
+    at = np.linspace(times[0], times[-1], 101)
+    own = np.interp(at, times, marks)
+    histories = [
+        one for _, one in turns(found, found.away, times, marks, np.ones_like, 1e-6 * distance)
+    ]
+    shares = np.column_stack([one.share(at) for one in histories])
+    return [np.abs(shares @ found.marks**k - own**k).max() / marks[-1] ** k for k in range(4)]
+
+
+def test_force_centre_and_two_more_moments_are_the_tools_own():
+    corners = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]])
+    assert max(moments(corners, np.array([0.0, 0.7]), 0.006)) < 1e-12
+
+
+def test_hats_would_be_off_by_a_quarter_of_the_distance_squared(monkeypatch):
+    monkeypatch.setattr("study.problem.way.DEGREE", 1)
+    found = moments(np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]), np.array([0.0, 0.7]), 0.006)
+    assert max(found[:2]) < 1e-12
+    assert found[2] == pytest.approx(0.25 * 0.2**2, rel=0.02)
+
+
+def test_a_way_with_a_corner_and_a_stop_has_stations_on_both_pieces():
+    corners = np.array([[0, 0, 0], [0.01, 0, 0], [0.01, 0, 0], [0.01, 0.02, 0]], dtype=float)
+    found, marks = stations(corners, 0.004)
+    assert found.pieces == ((0, 3), (3, 8))
+    assert marks.tolist() == pytest.approx([0.0, 0.01, 0.01, 0.03])
+    np.testing.assert_allclose(found.away[[0, 3, 8]], corners[[0, 1, 3]], atol=1e-15)
+
+
+def test_there_and_back_takes_each_station_once():
+    out = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    found, marks = stations(out, 0.005)
+    times = np.array([0.0, 1.0, 2.0])
+    both = list(turns(found, found.away, times, marks, np.ones_like, 1e-9))
+    assert len(both) == 5
+    for _, one in both:
+        np.testing.assert_allclose(one.share(np.array([0.3])), one.share(np.array([1.7])))
+    at = np.linspace(0.0, 2.0, 41)
+    whole = sum(place[0] * one.share(at) for place, one in both)
+    np.testing.assert_allclose(whole, np.interp(at, times, out[:, 0]), atol=1e-15)
+
+
+# --- the scene ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        (
+            WAY.replace("25 mm", "70 mm"),
+            r"tool\.path: leaves the surface that faces the tool, .* s;",
+        ),
+        (WAY.replace('"25 mm",0,0', '0,0,"25 mm"'), r"tool\.path: stays where it is"),
+    ],
+)
+def test_a_path_off_the_surface_or_without_length_is_refused_by_name(path, said):
+    given = read_scene("block", (*BLOCK, path, TOGETHER))
+    with pytest.raises(ValueError, match=said):
+        problem_of(given)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((WAY.replace('offset=["25 mm",0,0]', 'travel="2 mm"'),), "blunt tool stays on the surf"),
+        ((WAY.replace("[0,0,0]", '["1 mm",0,0]'),), r"tool\.path: starts elsewhere"),
+        ((WAY.replace("0.3 s", "0 s"),), r"tool\.path: give two points or more at rising times"),
+        ((WAY, 'models=["superposition"]'), "superposition cannot follow a blunt tool that travel"),
+        ((WAY, "tool.history.hold=0 s", "tool.history.ramp=0 s"), "nothing is ever loaded"),
+    ],
+)
+def test_what_a_travelling_tool_has_not_is_refused_with_the_remedy(words, said):
+    with pytest.raises(SceneError, match=said):
+        read_scene("block", (*BLOCK, TOGETHER, *words))
+
+
+def test_too_many_stations_are_refused_with_the_remedy():
+    small = read_scene("block", (*BLOCK, WAY, "tool.radius=0.4 mm"))
+    with pytest.raises(ValueError, match=r"tool\.path: 25 mm take more than 200 places"):
+        problem_of(small)
+
+
+def test_the_scene_is_written_and_read_back(scene, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(write_scene(scene))
+    again = read_scene(str(path))
+    assert again.tool == scene.tool
+    assert again.features == ("travelling-loads",)
+
+
+def test_control_points_are_where_the_way_starts_and_ends(scene, problem):
+    assert problem.probes == scene.probes == ("tool", "tool-end")
+    assert problem.tool_probe == 0
+    apart = problem.observation.probes[1] - problem.observation.probes[0]
+    np.testing.assert_allclose(apart, [0.025, 0.0, 0.0], atol=1e-12)
+
+
+# --- what the models are given --------------------------------------------------------------------
+
+
+def test_elements_carry_the_whole_force_at_the_tool(scene, problem):
+    """On a mesh, whose patches have their force but not quite their centre."""
+    body = model(scene, "fem").prepare(problem).body()
+    times = np.array([0.05, 0.13, 0.22, 0.3, 0.4])
+    forces = nodal(problem, body, times)
+    share, force = scene.tool.history.factor(times), scene.tool.force
+    np.testing.assert_allclose(forces.sum(axis=1)[:, 2], -share * force, rtol=1e-9)
+    centre = np.einsum("tn,nd->td", forces[..., 2], body.points) / forces[..., 2].sum(1)[:, None]
+    start, way = problem.tool.centre[0], np.minimum(times / 0.3, 1.0) * 0.025
+    assert np.abs(centre[:, 0] - start - way).max() < 0.1 * scene.tool.radius
+
+
+def test_a_lattice_carries_the_whole_force(scene, problem):
+    found = model(scene, "tissue").prepare(problem).assembly
+    times = np.array([0.05, 0.22, 0.4])
+    first, *others = problem.factors(times).T
+    whole = first[:, None, None] * found.load + np.einsum(
+        "kt,knd->tnd", np.array(others), found.burden.loads
+    )
+    expected = -scene.tool.history.factor(times) * scene.tool.force
+    np.testing.assert_allclose(whole.sum(axis=1)[:, 2], expected, rtol=1e-9)
+
+
+def test_rest_is_told_where_the_tool_is_at_the_peak(scene, problem):
+    """One tool in full, not all of its stations."""
+    body = model(scene, "fem").prepare(problem).body()
+    last, turn = loads_of(problem)[-1]
+    assert isinstance(turn, Turn)
+    np.testing.assert_allclose(problem.full, [0.0] * len(problem.loads) + [1.0], atol=1e-12)
+    single = replace(problem, tool=last, factor=turn.history, loads=())
+    alone = model(scene, "fem").prepare(single).body()
+    np.testing.assert_allclose(body.whole_load, alone.load, rtol=1e-9, atol=1e-15)
+    among = ritz_subspace(body, len(problem.loads) + 1)
+    np.testing.assert_allclose(
+        body.stiffness @ among.rest(body.full), alone.load, atol=1e-6 * np.abs(alone.load).max()
+    )
+    assert np.abs(body.loads.sum(axis=1) - body.full_load).max() > 0.1 * np.abs(alone.load).max()
+
+
+def at_end(scene, name):
+    posed = problem_of(scene)
+    return model(scene, name).prepare(posed).simulate().trajectory.displacement[-1, -1]
+
+
+def test_after_its_way_the_tissue_settles_as_under_a_tool_that_was_always_there(scene):
+    slow = replace(
+        scene,
+        damping=replace(scene.damping, ratio=3.0),
+        time=replace(scene.time, duration=1.2, samples=41),
+    )
+    there = read_scene("block", (*BLOCK, 'tool.place={side="superior", at=[0.6125, 0.5]}'))
+    still = replace(slow, tool=replace(there.tool, path=()), control_points={})
+    found, wanted = at_end(slow, "tissue"), at_end(still, "tissue")
+    assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
+
+
+# --- the corrected lattice ------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def results(scene):
+    return run_study(replace(scene, tool=replace(scene.tool, force=0.3)))
+
+
+def test_a_run_compares_all_that_follow(results):
+    one = results.model("corrected")
+    assert one.status == "finished"
+    assert one.correction is not None
+    assert any("at most 0.25 radii apart" in said for said in results.record.assumptions)
+    assert results.record.probes == ("tool", "tool-end")
+    start, end = (results.curve("corrected", name) for name in results.record.probes)
+    assert np.abs(start.displacement).argmax() < np.abs(end.displacement).argmax()
+
+
+def test_results_keep_the_way_and_a_picture_draws_it(results, tmp_path):
+    write(results, tmp_path)
+    fields = read(tmp_path).fields
+    ((start, *_, end),) = fields["ways"]
+    np.testing.assert_allclose(end - start, [0.025, 0.0, 0.0], atol=1e-9)
+    drawn = field_figures.views(results)
+    assert field_figures.explain(drawn)["travels"] == "1"
+    picture = field_figures._scene(drawn, drawn.sheets[0], FLAT)
+    dashed = [line for line in picture.axes[0].lines if line.get_linestyle() == "--"]
+    assert len(dashed) == 1
+    still = replace(drawn, ways=drawn.ways[:0])
+    picture = field_figures._scene(still, still.sheets[0], FLAT)
+    assert not [line for line in picture.axes[0].lines if line.get_linestyle() == "--"]
+
+
+def test_a_small_load_that_travels_moves_the_corrected_lattice_as_the_elements(scene):
+    light = replace(scene, tool=replace(scene.tool, force=1e-3))
+    one = model(light, "corrected").prepare(problem_of(light))
+    elements = one.fine.solved_on(None, Silent()).found.trajectory.displacement
+    found = one.simulate().trajectory.displacement
+    assert np.linalg.norm(found - elements) < 2e-3 * np.linalg.norm(elements)
+
+
+def test_a_plan_knows_that_it_travels():
+    wanted = read_scene(
+        "block", (*BLOCK, WAY, 'require.quantities=["history"]', "require.error=90 %")
+    )
+    assert "mm" in next(one.choice for one in plan(wanted).decisions if one.about == "model")
+    with pytest.raises(SceneError, match="a blunt tool that travels"):
+        read_scene("block", (*BLOCK, WAY, 'require.quantities=["rest"]'))
+
+
+# --- on the liver ---------------------------------------------------------------------------------
+
+
+def test_the_sentence_on_stations_is_what_was_measured():
+    """The table is committed; `tests.benchmarks.travelling` writes it."""
+    with travelling.STATIONS.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    used = [one for one in rows if float(one["apart"]) == way.APART]
+    assert len(used) == 2
+    for one in used:
+        assert float(one["spline"]) < way.MEASURED
+        assert float(one["hat"]) > 3.0 * way.MEASURED  # which is why they are not hats
