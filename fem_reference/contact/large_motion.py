@@ -33,6 +33,7 @@ from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
 from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
+from fem_reference.unloading import unload
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, RigidTool
 from study.problem.tissue import Tissue
@@ -54,8 +55,6 @@ LOOKS, MOST_LOOKS = 32, 1000
 """Places of a tool on its way at which the surface is looked at."""
 FARTHEST = 0.5
 """Share of its radius that a tool may move in a step: it must not pass through a surface unseen."""
-RELIEVED, MOST_RELIEVING = 1e-6, 40
-"""Change of the unloaded shape, relative to what the load does, at which it is found."""
 
 
 def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Floats) -> TouchedBody:
@@ -185,32 +184,16 @@ def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
 def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
     """The body without stress that a load [N] (n,) deforms into the given shape.
 
-    By fixed-point iteration on the shape without stress: Sellier (2011), Comput. Methods Appl.
-    Mech. Eng. 200:3245. ValueError where it does not end.
+    ValueError where there is none (`fem_reference.unloading`).
     """
-    given, at, last = body.solid, Demand(0.0, 0.0, load), np.inf
-    bare = replace(body, contact=FiniteContact((), given.size))
-    moved, state = np.zeros(given.size + given.pressures), None
-    for _ in range(MOST_RELIEVING):
-        solid = relieved(given, moved)
-        there = replace(bare, solid=solid, origin=-moved[: given.size])
-        guess = Balanced(np.zeros_like(moved) if state is None else state.w, np.zeros(0))
-        try:
-            state = Balance(there).found(guess, at, float(np.linalg.norm(load)))
-        except UnbalancedError:
-            break
-        off = there.given(state.w)
-        size = float(np.linalg.norm(off) / np.linalg.norm(state.w[: given.size]))
-        if size <= RELIEVED:
-            return replace(there, contact=body.contact)
-        if size > last:
-            break
-        last = size
-        moved[: given.size] -= off
-    raise ValueError(
-        "gravity.given: no shape without load is found from which the organ would sag into the "
-        'given one; reduce gravity.acceleration, or set it to "unloaded"'
-    )
+    found, n = unload(body.solid, load, body.free), body.solid.size
+    if found.reached < 1.0:
+        raise ValueError(
+            "gravity.given: no shape without load is found from which the organ would sag into the "
+            f"given one, but for {found.reached:.2g} of the load; reduce gravity.acceleration, or "
+            'set it to "unloaded"'
+        )
+    return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
 
 
 class Steps:
