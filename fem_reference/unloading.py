@@ -122,10 +122,14 @@ def _off(given: MixedSolid, load: Floats, free: Bools, z: Floats, at: _Point) ->
     """What does not balance: forces [N], then volumes [m^3]."""
     n, weights = given.size, given.weights * at.volume
     nodal = np.einsum("tqij,tqja->tai", at.stress * weights[..., None, None], given.slopes)
-    own = np.bincount(given.unknowns.ravel(), nodal.ravel(), minlength=len(z))
     pressure = z[given.corners] @ given.shares.T
     missed = ((at.log_volume - pressure / given.carried) * weights) @ given.shares
-    own += np.bincount(given.corners.ravel(), missed.ravel(), minlength=len(z))
+    count = len(z)
+    own = np.asarray(
+        np.bincount(given.unknowns.ravel(), nodal.ravel(), minlength=count)
+        + np.bincount(given.corners.ravel(), missed.ravel(), minlength=count),
+        dtype=np.float64,
+    )
     own[:n] -= given.support @ z[:n]
     left = -own
     left[:n] += load
