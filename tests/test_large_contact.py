@@ -230,7 +230,7 @@ def test_a_tool_through_the_body_ends_the_motion_and_says_when():
     body, sphere = block(), tool(depth=0.2, corners=(0.0, 0.02, 0.3))
     found = moved(body, sphere, observed(0.3, 61, 10))[1].trajectory
     assert found.status == "diverged"
-    assert 0.0 < found.diverged_at < 0.1
+    assert 0.0 < found.ended_at < 0.1
     assert np.isnan(found.tool_force[-1]).all()
     with pytest.raises(UnbalancedError):
         at_rest(body, steady(0.2))

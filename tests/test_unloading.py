@@ -79,5 +79,5 @@ def test_what_is_found_balances_in_the_equations_of_motion(body, bare):
 
 
 def test_a_load_for_which_there_is_no_shape_is_refused_with_what_was_reached(body, bare):
-    with pytest.raises(ValueError, match=r"gravity\.given.* 0\.\d+ of the load"):
+    with pytest.raises(ValueError, match=r"gravity\.given.* \d.* % of the load"):
         unloaded(bare, weight(body, 1000.0))

@@ -38,6 +38,7 @@ from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation, Trajectory
+from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]
 Factors = Callable[[Floats], Floats]
@@ -152,7 +153,7 @@ def pressed(
 ) -> Pressed:
     """A body under tools and loads; `borne` [N] (n,): forces at rest under which it is as given.
 
-    ValueError as of `touched`, for damping by stiffness, and where no unloaded shape is found.
+    ValueError as of `touched`, and for damping by stiffness; UnfinishedError as of `unloaded`.
     """
     refuse(damping, tissue)
     free = touched(body, tissue, tools, times)
@@ -184,14 +185,14 @@ def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
 def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
     """The body without stress that a load [N] (n,) deforms into the given shape.
 
-    ValueError where there is none (`fem_reference.unloading`).
+    UnfinishedError where none is found (`fem_reference.unloading`).
     """
     found, n = unload(body.solid, load, body.free), body.solid.size
     if found.reached < 1.0:
-        raise ValueError(
+        raise UnfinishedError(
             "gravity.given: no shape without load is found from which the organ would sag into the "
-            f"given one, but for {found.reached:.2g} of the load; reduce gravity.acceleration, or "
-            'set it to "unloaded"'
+            f"given one, but for {100.0 * found.reached:.2g} % of the load",
+            'reduce gravity.acceleration, or set gravity.given to "unloaded"',
         )
     return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
 
@@ -363,7 +364,7 @@ def run(
         lost = float(times[len(states)])
     trajectory = recorder.trajectory
     if lost is not None:
-        trajectory = replace(trajectory, status="diverged", diverged_at=lost)
+        trajectory = replace(trajectory, status="diverged", ended_at=lost)
     kept = [states[k] for k in set(observation.frames) if k < len(states)]
     gradients = [pressed.body.solid.deformation(one.w) for one in kept]
     contact, given = pressed.body.contact, pressed.body.given

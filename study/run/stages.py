@@ -45,7 +45,7 @@ ALONE = Means()
 class Stage(Generic[T]):
     """What gives a value of a kind, under the key of all it depends on, None if it has no such.
 
-    `readable`: whether what is kept will do.
+    `readable`: whether what is kept will do; `lasting`: whether a value is worth keeping.
     """
 
     name: str
@@ -53,6 +53,7 @@ class Stage(Generic[T]):
     key: str | None
     work: Callable[[Progress], T]
     readable: bool = True
+    lasting: Callable[[T], bool] = lambda _: True
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def _computed(stage: Stage[T], store: Store | None, progress: Progress) -> _Foun
     started = time.perf_counter()
     value = stage.work(progress)
     entry = Entry(None, {}, time.perf_counter() - started, time.time())
-    if store is not None and stage.key is not None:
+    if store is not None and stage.key is not None and stage.lasting(value):
         _keep(stage, value, store, entry.wall)
     return _Found(value, _record(stage.name, entry, kept=False))
 
