@@ -344,7 +344,7 @@ def test_numbers_that_are_none_are_refused(text, folder):
         (("models", 0, "name"), "other", "references: fem is none of its models"),
         (("models", 1, "name"), "fem", "two of one name"),
         (("models",), [], "models: are none"),
-        (("models", 0, "status"), "done", "neither finished nor diverged"),
+        (("models", 0, "status"), "done", "none of finished, diverged, not finished"),
         (("models", 0, "status"), "diverged", "ended_at_s"),
         (("models", 0, "system"), "mamdani", "none of the fuzzy systems"),
         (("models", 0, "simulated_s"), "long", "models.0.simulated_s"),
