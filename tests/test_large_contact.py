@@ -237,7 +237,7 @@ def test_a_tool_through_the_body_ends_the_motion_and_says_when():
 
 
 def wrapped(given, side):
-    """Displacement that lays the surface round a sphere from its lowest (-1) or highest (1) point."""
+    """Displacement that lays the surface round a sphere from its lowest (-1) or highest point."""
     offset = given.body.solid.points - TOP
     away = np.linalg.norm(offset[:, :2], axis=1)
     angle = 1.7 * away / 0.015
