@@ -34,6 +34,7 @@ SCENE = (
     "tool.history.hold=0.02 s",
     "tool.history.release=0.05 s",
 )
+BRIEF = 'models=["reading"]'
 LOST, WHY, REMEDY = "msm-interval-type-2", "no rest is found", "give it less to bear"
 
 
@@ -103,6 +104,21 @@ def test_a_reference_that_is_not_finished_leaves_no_score_against_it(monkeypatch
     assert "--workers" in results.model("basafa").remedy
     assert results.scores == results.tool_scores == ()
     assert results.model("reading").status == "finished"
+
+
+def test_a_model_that_takes_too_long_is_stopped_and_says_how_far_it_was():
+    results = run_study(read_scene("block", (*SCENE, BRIEF)), means=Means(minutes=1e-9))
+    for model in results.record.models:
+        assert model.status == "not finished"
+        assert f"done of the stage '{model.name}" in model.reason
+        assert "--minutes" in model.remedy
+    assert answer(results).sentences
+
+
+def test_time_enough_changes_nothing(found):
+    timed = run_study(read_scene("block", (*SCENE, BRIEF)), means=Means(minutes=60.0))
+    curve = [row for row in found[1].curves if row.model == "reading"]
+    assert list(timed.curves) == curve
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from study.run.limits import (
 from study.run.posed import Posed, Posing
 from study.run.ready import set_up
 from study.run.stages import Stage, Stages
-from study.run.unfinished import moved
+from study.run.unfinished import moved, within
 from study.run.watched import thinned
 from study.scene import Scene
 from study.similarity.batch import compile_measures
@@ -246,7 +246,8 @@ class Moving:
         return self.prepared[name]
 
     def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> Moved:
-        prepared, watch = self._prepare(name), replace(self.watch, progress=progress)
+        prepared, watch = self._prepare(name), self.watch
+        watch = replace(watch, progress=within(progress, self.stages.means.minutes))
         run = thinned(moved(self.models[name], prepared, self.posing.problem, watch))
         if run.record.status == "not finished":
             return Moved(run, None, f"{name} is not finished")

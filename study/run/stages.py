@@ -28,13 +28,15 @@ T = TypeVar("T")
 class Means:
     """What a run may use: a store, read unless `fresh`, and so many processes side by side.
 
-    `mesh`: file to keep the tetrahedra in, if they are wanted.
+    `mesh`: file to keep the tetrahedra in, if they are wanted; `minutes`: most that a model may
+    take, None for no end.
     """
 
     store: Store | None = None
     fresh: bool = False
     workers: int = 1
     mesh: Path | None = None
+    minutes: float | None = None
 
 
 ALONE = Means()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 from study.models.lattice import LatticeModel
@@ -9,6 +12,7 @@ from study.models.model import Model, ModelRun, Prepared, Watch
 from study.problem.problem import Problem
 from study.problem.trajectory import empty_trajectory
 from study.problem.unfinished import UnfinishedError
+from study.progress import Advance, Progress
 from study.results.records import ModelRecord
 
 NO_MEMORY = UnfinishedError(
@@ -16,6 +20,40 @@ NO_MEMORY = UnfinishedError(
     "give it more, run fewer models side by side (--workers 1), or coarsen the model's mesh "
     "(reference.element_size, lattice.spacing)",
 )
+
+
+def within(progress: Progress, minutes: float | None) -> Progress:
+    """What is told of a model, which ends it once it has taken so long; None for no end."""
+    return progress if minutes is None else _Timed(progress, minutes)
+
+
+class _Timed:
+    """Raises an UnfinishedError when a model tells how far it is, and is late."""
+
+    def __init__(self, progress: Progress, minutes: float) -> None:
+        self.progress, self.minutes = progress, minutes
+        self.end = time.monotonic() + 60.0 * minutes
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Advance]:
+        """See Progress."""
+        self._stop_late(name, 0.0)
+        with self.progress.stage(name) as advance:
+
+            def on_time(share: float) -> None:
+                advance(share)
+                self._stop_late(name, share)
+
+            yield on_time
+
+    def _stop_late(self, name: str, share: float) -> None:
+        if time.monotonic() > self.end:
+            raise UnfinishedError(
+                f"it took more than {self.minutes:g} min, with {100.0 * share:.0f} % done of the "
+                f"stage {name!r}",
+                "allow it more with --minutes, or coarsen its mesh (reference.element_size, "
+                "lattice.spacing)",
+            )
 
 
 def moved(model: Model, prepared: Prepared, problem: Problem, watch: Watch) -> ModelRun:
