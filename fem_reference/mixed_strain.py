@@ -110,7 +110,7 @@ class MixedSolid:
         density = 0.5 * self.shear * ((F**2).sum(axis=(-2, -1)) - 3.0)
         log_volume = np.log(np.linalg.det(F))
         density += (0.5 * self.pointwise * log_volume - self.shear) * log_volume
-        density += 0.5 * self._pressure(w) ** 2 / self._carried
+        density += 0.5 * self._pressure(w) ** 2 / self.carried
         return float((density * self.weights).sum() + 0.5 * u @ (self.support @ u))
 
     def gradient(self, w: Floats) -> Floats:
@@ -122,7 +122,7 @@ class MixedSolid:
         push = (stress * self.weights)[:, None, :]
         nodal += (push @ slopes).reshape(len(nodal), 3, -1).mT
         force = np.bincount(self.unknowns.ravel(), nodal.ravel(), minlength=len(w))
-        missed = ((np.log(found.volume) - p / self._carried) * self.weights) @ self.shares
+        missed = ((np.log(found.volume) - p / self.carried) * self.weights) @ self.shares
         force += np.bincount(self.corners.ravel(), missed.ravel(), minlength=len(w))
         force[: self.size] += self.support @ w[: self.size]
         return np.asarray(force, dtype=np.float64)
@@ -153,14 +153,14 @@ class MixedSolid:
         whole[:, count:, :count] = coupling
         whole[:, :count, count:] = coupling.mT
         whole[:, count:, count:] = -self._pressure_mass
-        return self._assembled(whole) + self._padded_support
+        return self.assembled(whole) + self.padded_support
 
     def linear(self) -> csc_array:
         """The tangent without deformation: that of linear elasticity."""
         return self.tangent(np.zeros(self.size + self.pressures))
 
     @property
-    def _carried(self) -> Any:
+    def carried(self) -> Any:
         """Of lambda [Pa], what goes by the pressure."""
         return self.lame - self.pointwise
 
@@ -188,7 +188,7 @@ class MixedSolid:
     def _pressure_mass(self) -> Floats:
         """What each tetrahedron adds to the pressures' mass over lambda, (t, 4, 4)."""
         pairs = self.shares[:, :, None] * self.shares[:, None, :]
-        return np.asarray(np.einsum("tq,qab->tab", self.weights / self._carried, pairs))
+        return np.asarray(np.einsum("tq,qab->tab", self.weights / self.carried, pairs))
 
     @cached_property
     def _sparsity(self) -> Sparsity:
@@ -199,15 +199,16 @@ class MixedSolid:
         counts = np.bincount(known // total, minlength=total)
         return Sparsity(np.concatenate([[0], np.cumsum(counts)]), known % total, place)
 
-    def _assembled(self, blocks: Floats) -> csc_array:
-        """Of symmetric blocks, whose rows are as good as their columns."""
+    def assembled(self, blocks: Floats) -> csc_array:
+        """The matrix in the order of w of a block for each cell: its displacements, pressures."""
         indptr, indices, place = self._sparsity
         entries = np.bincount(place, blocks.ravel(), minlength=len(indices))
         total = self.size + self.pressures
         return csc_array((entries, indices, indptr), shape=(total, total))
 
     @cached_property
-    def _padded_support(self) -> csc_array:
+    def padded_support(self) -> csc_array:
+        """The support [N/m] in the order of w, without any of the pressures."""
         total, own = self.size + self.pressures, coo_array(self.support)
         return csc_array(coo_array((own.data, (own.row, own.col)), shape=(total, total)))
 

@@ -73,5 +73,5 @@ def _as_trajectory(state: Floats, times: Floats, finished: bool) -> Trajectory:
         none,
         none,
         status="diverged",
-        diverged_at=float(times[lost]),
+        ended_at=float(times[lost]),
     )

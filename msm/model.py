@@ -364,6 +364,6 @@ class _Recorder:
         return replace(
             self.trajectory,
             status="diverged",
-            diverged_at=lost.at,
-            diverged_near=self.lattice.nodes[lost.near],
+            ended_at=lost.at,
+            ended_near=self.lattice.nodes[lost.near],
         )

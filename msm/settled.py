@@ -12,6 +12,7 @@ from msm.kinematics import cross, deformation, dot
 from msm.laws import Law
 from msm.network import Network
 from msm.relaxation import relax
+from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ MIXED = 6
 """Earlier shapes that Anderson's mixing looks back at (1965, J. ACM 12:547)."""
 
 
-class NoRestError(ValueError):
+class NoRestError(UnfinishedError):
     """A body that finds no rest under its weight."""
 
 
@@ -39,8 +40,8 @@ def sagged(law: Law, net: Network, dead: Floats) -> Floats:
     if how.status != "at rest":
         raise NoRestError(
             f"gravity: the lattice does not come to rest under it ({how.status} after {how.steps} "
-            f"steps, {how.residual:.1g} of the load unbalanced); reduce gravity.acceleration or "
-            "weight.mass, or enlarge lattice.spacing"
+            f"steps, {how.residual:.1g} of the load unbalanced)",
+            "reduce gravity.acceleration or weight.mass, or enlarge lattice.spacing",
         )
     return found
 
@@ -50,7 +51,7 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
 
     And the dead load [N] (n, 3) with what the foundation bears of it. The unloaded shape is sought
     that sags to the given one. Forces of small displacements are
-    those of the given shape as it is, and nothing is left of the load. ValueError if no shape is
+    those of the given shape as it is, and nothing is left of the load. NoRestError if no shape is
     found.
     """
     if net.linear or not dead.any():
@@ -74,8 +75,8 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
         )
     except NoConvergence:
         raise NoRestError(
-            "gravity.given: no unloaded shape was found that sags to the given one; reduce "
-            "gravity.acceleration, or set gravity.given to unloaded"
+            "gravity.given: no unloaded shape was found that sags to the given one",
+            "reduce gravity.acceleration, or set gravity.given to unloaded",
         ) from None
     return from_shape(net, raised), borne(raised)
 

@@ -124,10 +124,12 @@ def young_modulus(results: Results, model: ModelRecord) -> float | None:
 
 
 def status(model: ModelRecord) -> str:
-    """Whether a model finished, or when it diverged."""
-    if model.status != "diverged" or model.diverged_at_s is None:
+    """Whether a model finished, or when its motion ended before."""
+    if not model.ended_at_s and model.status != "diverged":  # at 0 one that never began
         return model.status
-    return f"diverged at {significant(model.diverged_at_s)} s"
+    if model.ended_at_s is None:
+        return model.status
+    return f"{model.status} at {significant(model.ended_at_s)} s"
 
 
 def sentences(results: Results) -> list[str]:

@@ -183,6 +183,6 @@ def test_its_figures_are_those_of_the_run():
 
 
 def test_a_diverged_model_and_a_run_without_finite_elements_are_said_to_be_so():
-    lost = with_model(results_of(), "basafa", status="diverged", diverged_at_s=0.5)
+    lost = with_model(results_of(), "basafa", status="diverged", ended_at_s=0.5)
     assert "Basafa benchmark: diverged at 0.500 s; no error is estimated" in credibility(lost)
     assert "no errors" in credibility(results_of(["basafa", "msm-sugeno"]))

@@ -247,7 +247,7 @@ def test_a_lattice_that_diverges_takes_the_sum_with_it():
     one = prepared(FEW, "lattice.time_step=10 ms", "tool.force=0.5 N")
     ran = one.run(SILENT)
     assert ran.record.status == ran.trajectory.status == "diverged"
-    assert ran.record.diverged_at_s is not None
+    assert ran.record.ended_at_s is not None
     assert ran.record.correction is None
     assert np.isnan(ran.trajectory.displacement[-1]).all()
     assert one.simulate().trajectory.status == "diverged"

@@ -230,10 +230,51 @@ def test_a_tool_through_the_body_ends_the_motion_and_says_when():
     body, sphere = block(), tool(depth=0.2, corners=(0.0, 0.02, 0.3))
     found = moved(body, sphere, observed(0.3, 61, 10))[1].trajectory
     assert found.status == "diverged"
-    assert 0.0 < found.diverged_at < 0.1
+    assert 0.0 < found.ended_at < 0.1
     assert np.isnan(found.tool_force[-1]).all()
     with pytest.raises(UnbalancedError):
         at_rest(body, steady(0.2))
+
+
+def wrapped(given, side):
+    """Displacement that lays the surface round a sphere from its lowest (-1) or highest point."""
+    offset = given.body.solid.points - TOP
+    away = np.linalg.norm(offset[:, :2], axis=1)
+    angle = 1.7 * away / 0.015
+    across = 0.015 * np.sin(angle) / np.maximum(away, 1e-12)
+    centre = TOP + 0.015 * (DOWN * 1.2 - DOWN)
+    moved = centre + np.column_stack(
+        [across[:, None] * offset[:, :2], side * 0.015 * np.cos(angle)]
+    )
+    top = np.isclose(offset[:, 2], 0.0)
+    return np.where(top[:, None], moved - given.body.solid.points, 0.0).ravel()
+
+
+def test_what_closes_round_a_sphere_is_not_behind_it():
+    """It pushes against its own axis there, which on its other side is the sign of a passage."""
+    sphere = tool(depth=0.018, corners=(0.0, 1.0))
+    given = pressed(block(), TISSUE, (sphere,), DAMPING, np.zeros_like, np.array([0.0, 1.0]))
+    contact = given.body.contact
+    force = np.ones(contact.patches[0].count)
+    u = wrapped(given, -1.0)
+    patch = contact.patches[0]
+    distance, normal = sphere.gap(patch.points + patch.shapes @ u.reshape(-1, 3), 1.0)
+    assert (normal @ DOWN).min() < -0.1
+    assert np.abs(distance).max() < 0.3 * 0.015
+    assert not contact.behind(u, 1.0, force)
+    assert contact.behind(wrapped(given, 1.0), 1.0, force)
+
+
+def test_normals_turn_with_the_body():
+    given = pressed(block(), TISSUE, (tool(),), DAMPING, np.zeros_like, np.array([0.0, 1.0]))
+    patch, points = given.body.contact.patches[0], given.body.solid.points
+    turn = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    stretched = points * [2.0, 1.0, 0.5]
+    assert patch.outward(np.zeros_like(points)) == pytest.approx(
+        np.tile(-DOWN, (len(patch.points), 1))
+    )
+    found = patch.outward(stretched @ turn.T - points)
+    assert found == pytest.approx(np.tile(turn @ -DOWN, (len(patch.points), 1)))
 
 
 @pytest.mark.parametrize(

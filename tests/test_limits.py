@@ -34,8 +34,8 @@ def test_an_unstable_step_is_recorded_as_divergence_with_its_time(unstable):
     diverged = unstable.model("msm-mamdani")
     assert diverged.status == "diverged"
     assert diverged.time_step_s > 1.5 * diverged.critical_time_step_s
-    assert 0 < diverged.diverged_at_s <= diverged.simulated_s
-    assert len(diverged.diverged_near_m) == 3
+    assert 0 < diverged.ended_at_s <= diverged.simulated_s
+    assert len(diverged.ended_near_m) == 3
     assert unstable.model("fem").status == "finished"
 
 

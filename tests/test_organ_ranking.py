@@ -121,7 +121,7 @@ def test_a_draw_that_finds_no_rest_under_its_weight_counts_for_no_one(monkeypatc
     hung = organ.prepared(read_scene("block", HUNG))
 
     def lost(*_):
-        raise NoRestError("it falls")
+        raise NoRestError("it falls", "hold it")
 
     monkeypatch.setattr("msm.stepper.sagged", lost)
     assert np.isnan(scored(as_the_scene(hung), stated(**arguments(hung)))).all()

@@ -160,7 +160,7 @@ def test_a_difference_below_the_error_of_the_reference_is_not_resolved():
 
 
 def test_a_diverged_model_is_told_and_never_the_nearest():
-    results = with_model(results_of(), "basafa", status="diverged", diverged_at_s=0.25)
+    results = with_model(results_of(), "basafa", status="diverged", ended_at_s=0.25)
     assert "Basafa benchmark diverged at 0.250 s" in said(results)
     assert nearest(results).model.name != "basafa"
 
@@ -168,7 +168,7 @@ def test_a_diverged_model_is_told_and_never_the_nearest():
 def test_where_nothing_finished_the_answer_says_so():
     results = results_of()
     for name in MODELS:
-        results = with_model(results, name, status="diverged", diverged_at_s=0.5)
+        results = with_model(results, name, status="diverged", ended_at_s=0.5)
     assert "No model finished" in said(results)
     assert answer(results).numbers == ()
     assert write.page_of(results)

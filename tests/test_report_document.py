@@ -188,7 +188,7 @@ def diverged(late: bool) -> Results:
     """One fuzzy model diverged, before the peak or after it."""
     name, found = "msm-mamdani", results_of()
     found = with_model(
-        found, name, status="diverged", diverged_at_s=0.31, diverged_near_m=(0.0, 0.0, 0.01)
+        found, name, status="diverged", ended_at_s=0.31, ended_near_m=(0.0, 0.0, 0.01)
     )
     found = with_model(found, name, time_step_errors={})
     found = with_record(found, warnings=(f"{name} diverged at 0.31 s",))

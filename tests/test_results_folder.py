@@ -344,8 +344,8 @@ def test_numbers_that_are_none_are_refused(text, folder):
         (("models", 0, "name"), "other", "references: fem is none of its models"),
         (("models", 1, "name"), "fem", "two of one name"),
         (("models",), [], "models: are none"),
-        (("models", 0, "status"), "done", "neither finished nor diverged"),
-        (("models", 0, "status"), "diverged", "diverged_at_s"),
+        (("models", 0, "status"), "done", "none of finished, diverged, not finished"),
+        (("models", 0, "status"), "diverged", "ended_at_s"),
         (("models", 0, "system"), "mamdani", "none of the fuzzy systems"),
         (("models", 0, "simulated_s"), "long", "models.0.simulated_s"),
         (
@@ -374,7 +374,7 @@ def test_numbers_that_do_not_fit_the_scene_are_refused(path, value, said, damage
 
 
 def test_a_model_that_diverged_has_rows_up_to_then_and_no_others():
-    found = with_model(whole(), "basafa", status="diverged", diverged_at_s=0.5)
+    found = with_model(whole(), "basafa", status="diverged", ended_at_s=0.5)
     notes = tuple(f"No score of basafa against fem at {probe}: lost." for probe in ("tool", "far"))
     found = with_record(found, notes=notes)
     rows = tuple(row for row in found.curves if row.model == "fem" or row.time_s < 0.5)

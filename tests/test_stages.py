@@ -297,8 +297,8 @@ def a_run(status="finished"):
     lost = dataclasses.replace(
         Trajectory(*fields),
         status=status,
-        diverged_at=0.5,
-        diverged_near=np.array([1.0, np.nan, 3]),
+        ended_at=0.5,
+        ended_near=np.array([1.0, np.nan, 3]),
     )
     record = ModelRecord(name="m", label="M", simulated_s=1.0, status=status, time_step_errors={})
     check = Check(name="c", value=float("inf"), limit=1.0, meaning="m")

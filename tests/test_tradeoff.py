@@ -254,7 +254,7 @@ def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
 
 def observed(**values):
     """What a run observed, of a whole motion unless told otherwise."""
-    whole = {"diverged_at_s": None, "inverted_cells": 0, "margin": None, "step_s": 1e-3}
+    whole = {"ended_at_s": None, "inverted_cells": 0, "margin": None, "step_s": 1e-3}
     return vars(Observed(**whole | values))
 
 

@@ -98,7 +98,7 @@ def run_of(given, times, **values):
     force = np.linspace(0.0, 1.0, shape[0])[:, None, None] * problem.rigid_tools[0].axis
     field = np.ones((len(problem.observation.volume_points), 3))
     curves = np.ones((shape[0], len(problem.probes), 3))
-    whole = {"diverged_at_s": None, "inverted_cells": 0, "margin": None, "step_s": 1e-3}
+    whole = {"ended_at_s": None, "inverted_cells": 0, "margin": None, "step_s": 1e-3}
     seen = {"field": plain(times * field), "curves": plain(times * curves)}
     value = vars(Observed(**whole | seen | {"force": plain(times * force)} | values))
     return Outcome(Task("study.tradeoff.observation:observe", {}), "done", value, "", 0.0)
@@ -111,7 +111,7 @@ def test_the_own_error_of_the_finest_lattice_is_what_halving_the_spacing_changed
     own = pytest.approx(3.0 * FINEST * SPACING / fine)
     assert (found.field_error, found.force_errors[0], found.peak_errors[0]) == (own, own, own)
     assert found.curve_errors == pytest.approx(found.field_error)
-    lost = run_of(given, 1.0, field=None, diverged_at_s=0.1)
+    lost = run_of(given, 1.0, field=None, ended_at_s=0.1)
     with pytest.raises(ValueError, match=r"did not reach the end.*reduce the displacement"):
         truth_of([run_of(given, 1.0), lost], given)
 
@@ -157,7 +157,7 @@ def test_a_promise_is_what_a_run_was_off_the_finest_by_and_the_finest_itself(fou
     exact = replace(truth, force=np.reshape(outcomes[0].value["force"], truth.force.shape))
     judge = replace(found.judge, finest={("tissue", False): exact})
     outcomes[0] = run_of(found.judge.given, 1.3)
-    outcomes[1] = run_of(found.judge.given, 1.0, field=None, diverged_at_s=0.1)
+    outcomes[1] = run_of(found.judge.given, 1.0, field=None, ended_at_s=0.1)
     promises = _promises(judge, tried, outcomes, [])
     assert list(promises) == [2.0 * SPACING, FINEST * SPACING]
     assert promises[2.0 * SPACING].error == pytest.approx(0.3)

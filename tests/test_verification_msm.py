@@ -281,8 +281,8 @@ def test_the_predicted_critical_step_is_sharp(fraction, status, rng):
     assert found.largest_step == found.smallest_step == pytest.approx(fraction * critical)
     assert found.trajectory.status == status
     if status == "diverged":
-        assert 0 < found.trajectory.diverged_at <= samples[-1]
-        assert found.trajectory.diverged_near.shape == (3,)
+        assert 0 < found.trajectory.ended_at <= samples[-1]
+        assert found.trajectory.ended_near.shape == (3,)
 
 
 def test_interpolation_reproduces_linear_fields_also_just_outside(rng):

@@ -92,10 +92,14 @@ class FiniteContact:
         return [np.unique(one.shapes.indices).astype(np.int64) for one in self.patches]
 
     @cached_property
+    def _seeing(self) -> list[Patch]:
+        """The patches with shape functions of these alone."""
+        return [one.seeing(n) for one, n in zip(self.patches, self.nodes, strict=True)]
+
+    @cached_property
     def _shapes(self) -> list[csr_array]:
         """Shape functions of these alone, at the points of each patch."""
-        pairs = zip(self.patches, self.nodes, strict=True)
-        return [csr_array(one.shapes[:, nodes]) for one, nodes in pairs]
+        return [one.shapes for one in self._seeing]
 
     def gaps(self, u: Floats, time: float) -> Floats:
         """Gaps [m] (c,) of a displacement u [m] (n,), negative inside a tool, at a time [s]."""
@@ -150,14 +154,18 @@ class FiniteContact:
         return np.array(found).reshape(-1, 3)
 
     def behind(self, u: Floats, time: float, force: Floats) -> bool:
-        """Whether a tool pushes against its own axis, having gone through the surface."""
+        """Whether a tool pushes the surface from inside the body, having gone through it.
+
+        Against its own axis alone it may push: what a sphere has sunk in closes round it.
+        """
         for k, (patch, part) in enumerate(zip(self.patches, self._parts, strict=True)):
             pushed = force[part] > 0.0
             if patch.tool.bonded or not pushed.any():
                 continue
             touch = self._touch(k, u, time)
-            along = patch.shares @ (touch.slope * (touch.normal @ patch.tool.axis))
-            if (along[pushed] < 0.0).any():
+            outward = self._seeing[k].outward(u.reshape(-1, 3)[self.nodes[k]])
+            inside = patch.shares @ (touch.slope * (touch.normal * outward).sum(axis=1))
+            if (inside[pushed] > 0.0).any():
                 return True
         return False
 

@@ -33,10 +33,12 @@ from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
 from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
+from fem_reference.unloading import unload
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation, Trajectory
+from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]
 Factors = Callable[[Floats], Floats]
@@ -54,8 +56,6 @@ LOOKS, MOST_LOOKS = 32, 1000
 """Places of a tool on its way at which the surface is looked at."""
 FARTHEST = 0.5
 """Share of its radius that a tool may move in a step: it must not pass through a surface unseen."""
-RELIEVED, MOST_RELIEVING = 1e-6, 40
-"""Change of the unloaded shape, relative to what the load does, at which it is found."""
 
 
 def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Floats) -> TouchedBody:
@@ -151,7 +151,7 @@ def pressed(
 ) -> Pressed:
     """A body under tools and loads; `borne` [N] (n,): forces at rest under which it is as given.
 
-    ValueError as of `touched`, for damping by stiffness, and where no unloaded shape is found.
+    ValueError as of `touched`, and for damping by stiffness; UnfinishedError as of `unloaded`.
     """
     refuse(damping, tissue)
     free = touched(body, tissue, tools, times)
@@ -183,32 +183,16 @@ def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
 def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
     """The body without stress that a load [N] (n,) deforms into the given shape.
 
-    By fixed-point iteration on the shape without stress: Sellier (2011), Comput. Methods Appl.
-    Mech. Eng. 200:3245. ValueError where it does not end.
+    UnfinishedError where none is found (`fem_reference.unloading`).
     """
-    given, at, last = body.solid, Demand(0.0, 0.0, load), np.inf
-    bare = replace(body, contact=FiniteContact((), given.size))
-    moved, state = np.zeros(given.size + given.pressures), None
-    for _ in range(MOST_RELIEVING):
-        solid = relieved(given, moved)
-        there = replace(bare, solid=solid, origin=-moved[: given.size])
-        guess = Balanced(np.zeros_like(moved) if state is None else state.w, np.zeros(0))
-        try:
-            state = Balance(there).found(guess, at, float(np.linalg.norm(load)))
-        except UnbalancedError:
-            break
-        off = there.given(state.w)
-        size = float(np.linalg.norm(off) / np.linalg.norm(state.w[: given.size]))
-        if size <= RELIEVED:
-            return replace(there, contact=body.contact)
-        if size > last:
-            break
-        last = size
-        moved[: given.size] -= off
-    raise ValueError(
-        "gravity.given: no shape without load is found from which the organ would sag into the "
-        'given one; reduce gravity.acceleration, or set it to "unloaded"'
-    )
+    found, n = unload(body.solid, load, body.free), body.solid.size
+    if found.reached < 1.0:
+        raise UnfinishedError(
+            "gravity.given: no shape without load is found from which the organ would sag into the "
+            f"given one, but for {100.0 * found.reached:.2g} % of the load",
+            'reduce gravity.acceleration, or set gravity.given to "unloaded"',
+        )
+    return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
 
 
 class Steps:
@@ -378,7 +362,7 @@ def run(
         lost = float(times[len(states)])
     trajectory = recorder.trajectory
     if lost is not None:
-        trajectory = replace(trajectory, status="diverged", diverged_at=lost)
+        trajectory = replace(trajectory, status="diverged", ended_at=lost)
     kept = [states[k] for k in set(observation.frames) if k < len(states)]
     gradients = [pressed.body.solid.deformation(one.w) for one in kept]
     contact, given = pressed.body.contact, pressed.body.given

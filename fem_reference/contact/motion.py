@@ -306,7 +306,7 @@ def _record(recorder: Recorder, pressed: Pressed, body: Reduced, found: Sampled)
 def _trajectory(recorder: Recorder, found: Sampled) -> Trajectory:
     if found.unsettled is None:
         return recorder.trajectory
-    return replace(recorder.trajectory, status="diverged", diverged_at=found.unsettled)
+    return replace(recorder.trajectory, status="diverged", ended_at=found.unsettled)
 
 
 def _outcome(

@@ -7,7 +7,7 @@ the elements are: Hueeber and Wohlmuth (2005), Comput. Methods Appl. Mech. Eng. 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,12 +20,13 @@ from study.problem.rigid import PLATE, SPHERE, RigidTool
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 PARTS = 4
 """Of each edge of a facet, for the edge of a punch may run anywhere across it."""
 LEAST_SHARE = 0.02
 """Of a vertex's shape function, that lies under the tool; one with less bears no pressure."""
-ROUNDING = 1e-12
+ROUNDING, TINY = 1e-12, 1e-300
 # Strang and Fix, three points inside a triangle, exact for squares of linear functions.
 _INSIDE = np.array([[1.0, 1.0, 4.0], [1.0, 4.0, 1.0], [4.0, 1.0, 1.0]]) / 6.0
 
@@ -45,13 +46,17 @@ class Patch:
     """Integration points [m] (q, 3) under a tool, and the vertices that bear its pressure.
 
     `shapes` (q, nodes): shape functions of the body; `shares` (v, q): of the points in the mean at
-    a vertex, each row of which adds up to one.
+    a vertex, each row of which adds up to one. `along` [1/m] (q, nodes): derivatives of the shape
+    functions along two directions in the surface, `tangents` (2, q, 3), whose vector product points
+    out of the body.
     """
 
     tool: RigidTool
     points: Floats
     shapes: csr_array
     shares: csr_array
+    tangents: Floats
+    along: tuple[csr_array, csr_array]
 
     @property
     def count(self) -> int:
@@ -63,6 +68,11 @@ class Patch:
         """Nodal forces (nodes, v) of a unit force at each vertex, or means of displacements."""
         return csr_array((self.shares @ self.shapes).T)
 
+    def seeing(self, nodes: Ints) -> Patch:
+        """With shape functions of these nodes alone, beside which none reaches the surface."""
+        first, second = (csr_array(one[:, nodes]) for one in self.along)
+        return replace(self, shapes=csr_array(self.shapes[:, nodes]), along=(first, second))
+
     def gaps(self, displacement: Floats, time: float) -> Gaps:
         """Where the nodes have moved by a displacement [m] (nodes, 3), at a time [s]."""
         distance, normal = self.tool.gap(self._moved(displacement), time)
@@ -71,7 +81,7 @@ class Patch:
         with np.errstate(divide="ignore", invalid="ignore"):
             mean = (self.shares @ np.where(opposite, distance, 0.0)) / seen
         direction = self.shares @ normal
-        direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+        direction /= np.maximum(np.linalg.norm(direction, axis=1), TINY)[:, None]
         return Gaps(np.where(seen > LEAST_SHARE, mean, np.inf), direction)
 
     def _moved(self, displacement: Floats) -> Floats:
@@ -83,6 +93,15 @@ class Patch:
         if self.tool.shape != SPHERE:
             moved = np.outer(moved @ self.tool.axis, self.tool.axis)
         return np.asarray(self.points + moved)
+
+    def outward(self, displacement: Floats) -> Floats:
+        """Normals (q, 3) out of the body at the points, where the nodes (nodes, 3) have moved."""
+        first, second = (
+            tangent + slope @ displacement
+            for tangent, slope in zip(self.tangents, self.along, strict=True)
+        )
+        normal = np.cross(first, second)
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), TINY)[:, None])
 
     def penetration(self, displacement: Floats, time: float) -> float:
         """How deep [m] the deepest integration point is inside the tool."""
@@ -114,8 +133,35 @@ def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
     whole, part = hats.T @ weights, under.sum(axis=1)
     kept = np.flatnonzero(part > LEAST_SHARE * whole)
     shares = csr_array(diags_array(1.0 / part[kept]) @ under[kept])
-    points = rows(fine.global_coordinates()).reshape(-1, 3)
-    return Patch(tool, points[inside], _values(fine)[inside], shares[:, np.flatnonzero(inside)])
+    points = rows(fine.global_coordinates()).reshape(-1, 3)[inside]
+    tangents = _tangents(rows(fine.normals).reshape(-1, 3)[inside])
+    first, second = (_slopes(fine, inside, one) for one in tangents)
+    known = _values(fine)[inside], shares[:, np.flatnonzero(inside)]
+    return Patch(tool, points, *known, tangents, (first, second))
+
+
+def _tangents(normals: Floats) -> Floats:
+    """Two unit vectors (2, q, 3) square to each of the normals (q, 3), of which they are right."""
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, least)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normals, first)])
+
+
+def _slopes(basis: Any, chosen: Bools, direction: Floats) -> csr_array:
+    """Derivatives [1/m] (q, dofs) of shape functions at the chosen points along directions."""
+    whole = np.zeros((len(chosen), 3))
+    whole[chosen] = direction
+    size = basis.dx.shape
+    values = np.stack(
+        [
+            np.einsum("i...,i...", np.asarray(one[0].grad), whole.T.reshape(3, *size))
+            for one in basis.basis
+        ]
+    )
+    longest = np.abs(values).max(initial=0.0)
+    values[np.abs(values) < ROUNDING * longest] = 0.0  # likewise
+    return _sparse(basis, values)[chosen]
 
 
 def _surface(body: Body, facets: NDArray[np.int64]) -> Any:
@@ -142,6 +188,11 @@ def _values(basis: Any) -> csr_array:
     """Shape functions of a basis at its integration points (q, dofs)."""
     values = np.stack([np.asarray(one[0]) for one in basis.basis])
     values[np.abs(values) < ROUNDING] = 0.0  # of nodes that are not on the facet
+    return _sparse(basis, values)
+
+
+def _sparse(basis: Any, values: Floats) -> csr_array:
+    """Values (functions, facets, points) as a matrix (q, dofs)."""
     columns = np.broadcast_to(basis.element_dofs[:, :, None], values.shape)
     points = np.broadcast_to(np.arange(values[0].size).reshape(values[0].shape), values.shape)
     entries = (values.ravel(), (points.ravel(), columns.ravel()))

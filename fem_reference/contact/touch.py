@@ -111,10 +111,7 @@ class Touch:
     @cached_property
     def _seeing(self) -> tuple[Patch, ...]:
         """The patches with shape functions of the surface nodes alone."""
-        return tuple(
-            Patch(one.tool, one.points, csr_array(one.shapes[:, self.nodes]), one.shares)
-            for one in self.patches
-        )
+        return tuple(one.seeing(self.nodes) for one in self.patches)
 
     def on_tools(self, force: Floats) -> Floats:
         """What the body does to each tool [N] (tools, 3) under forces (c,)."""

@@ -13,7 +13,7 @@ from reports.differences import ELEMENTS, elements, field_errors, finite_element
 from reports.digits import DASH, percent, significant, spread, with_error, words
 from reports.motion_figures import peak
 from reports.ranking import references, tool_probe
-from reports.summary import printed_peak
+from reports.summary import printed_peak, status
 from study.results.folder import Results
 from study.results.numerical import numerical_errors, whole_error
 from study.results.records import ModelRecord
@@ -146,8 +146,9 @@ def curve_difference(results: Results, model: str, reference: str, probe: str) -
 def _lost(results: Results) -> Iterator[str]:
     for model in results.record.models:
         if model.status == "diverged":
-            at = "" if model.diverged_at_s is None else f" at {significant(model.diverged_at_s)} s"
-            yield f"{model.label} diverged{at}, and is not to be used with these settings."
+            yield f"{model.label} {status(model)}, and is not to be used with these settings."
+        elif model.status == "not finished":
+            yield f"{model.label} is not finished: {model.reason}. To have it run, {model.remedy}."
 
 
 def _nothing(results: Results) -> Iterator[str]:

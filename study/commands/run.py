@@ -35,6 +35,7 @@ def run(
     resume: Switch = False,
     fresh: Switch = False,
     workers: int | None = None,
+    minutes: float | None = None,
 ) -> None:
     """Run a scene through every model it names and write a results folder with its report.
 
@@ -64,6 +65,9 @@ def run(
         Compute everything anew.
     workers
         Processes that stages run in side by side, as many as processors by default; 1 for none.
+    minutes
+        Most that a model may take; one that needs longer is told as not finished, and the others
+        go on.
     """
     from study.results.folder import default_folder
     from study.scene.file import read_scene
@@ -73,6 +77,8 @@ def run(
         raise ValueError("--resume and --fresh: give one; --fresh takes nothing from before")
     if workers is not None and workers < 1:
         raise ValueError(f"--workers {workers}: give 1 or more")
+    if minutes is not None and not minutes > 0.0:
+        raise ValueError(f"--minutes {minutes:g}: give more than 0, or leave it out for no end")
     if open_ and not (report and html):
         raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
     chosen = read_scene(scene, set_ or ())
@@ -82,7 +88,7 @@ def run(
     folder = out or default_folder(scene)
     if chosen.require is not None and not chosen.require.moves:
         _refuse_any(
-            of_a_body | {"--resume": resume, "--open": open_},
+            of_a_body | {"--resume": resume, "--open": open_, "--minutes": minutes is not None},
             "require.quantities asks for the rest alone, whose folder has no motion and no report; "
             "leave it out, or ask for history too",
         )
@@ -90,7 +96,7 @@ def run(
         return
     if chosen.require is not None:
         chosen = _planned(chosen)
-    how = _How(folder, report, report and html, fields, save_mesh, resume, fresh, workers)
+    how = _How(folder, report, report and html, fields, save_mesh, resume, fresh, workers, minutes)
     results = _results(chosen, how, user_store())
     if open_:
         from study.commands.view import show
@@ -143,6 +149,7 @@ class _How:
     resume: bool
     fresh: bool
     workers: int | None
+    minutes: float | None
 
 
 def _results(scene: Scene, how: _How, store: Store | None) -> Results:
@@ -163,7 +170,9 @@ def _results(scene: Scene, how: _How, store: Store | None) -> Results:
         report = how.report and not (left and left.has_report)
         page = how.page and not (left and left.has_page)
         failure = _report_failure(_Wanted(report, page), how, store, progress)
-    if store is not None and (left is None or report or page):
+    # What is not finished is sought anew by the next run.
+    whole = all(model.status != "not finished" for model in results.record.models)
+    if store is not None and whole and (left is None or report or page):
         unchanged.note(store, key, how.folder)
     _print_summary(results, how.folder)
     if failure is not None:
@@ -200,7 +209,7 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
         continuing(how.folder, scene, resume=how.resume) as state,
     ):
         mesh = partial / manifest.MESH if how.mesh else None
-        means = Means(store, how.fresh, how.workers or available(), mesh)
+        means = Means(store, how.fresh, how.workers or available(), mesh, how.minutes)
         keeping = Keeping(state, how.resume, partial if how.fields else None)
         results = run_study(scene, Watch(progress, keeping), means)
         with progress.stage("results"):

@@ -102,7 +102,7 @@ def _curve_checks(
 
 def place(trajectory: Trajectory) -> tuple[float, float, float] | None:
     """Where a run diverged [m], if it is known."""
-    near = trajectory.diverged_near
+    near = trajectory.ended_near
     return None if near is None else (float(near[0]), float(near[1]), float(near[2]))
 
 
@@ -130,8 +130,8 @@ def estimated_run(
         label=model.label,
         simulated_s=float(problem.observation.times[-1]),
         status=found.trajectory.status,
-        diverged_at_s=found.trajectory.diverged_at,
-        diverged_near_m=place(found.trajectory),
+        ended_at_s=found.trajectory.ended_at,
+        ended_near_m=place(found.trajectory),
         time_step_s=found.step,
         wall_s=wall,
         largest_strain=found.largest_strain,

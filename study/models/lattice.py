@@ -453,7 +453,7 @@ class PreparedLattice:
     def _lost_bounds(self, bounds: tuple[Trajectory, Trajectory] | None) -> tuple[str, ...]:
         return tuple(
             f"The run of {self.model.name} at the {side} bound of its interval diverged at "
-            f"{run.diverged_at:g} s: its band ends there."
+            f"{run.ended_at:g} s: its band ends there."
             for side, run in zip(("lower", "upper"), bounds or (), strict=False)
             if run.status == "diverged"
         )
@@ -499,8 +499,8 @@ class PreparedLattice:
             system=model.system,
             simulated_s=float(self.problem.observation.times[-1]),
             status=trajectory.status,
-            diverged_at_s=trajectory.diverged_at,
-            diverged_near_m=place(trajectory),
+            ended_at_s=trajectory.ended_at,
+            ended_near_m=place(trajectory),
             nodes=len(self.assembly.mass),
             time_step_s=found.largest_step,
             critical_time_step_s=_finite(found.critical_time_step),

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Status = Literal["finished", "diverged", "not finished"]
+"""Not finished: no state was found to go on from, or the means of the run did not suffice."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,9 @@ class Trajectory:
 
     `displacement` [m] and `velocity` [m/s], shape (samples, probes, 3); `volume_field` [m], shape
     (frames, q, 3); `surface_field` [m], shape (frames, s, 3). `tool_force` [N], shape (samples,
-    tools, 3): what the body does to each rigid tool of the problem. A model that diverges keeps NaN
-    from there on and says when and, if it has nodes, at which node's rest position [m].
+    tools, 3): what the body does to each rigid tool of the problem. A motion that did not finish
+    keeps NaN from where it `ended_at` [s] on, 0 if it never began: one that diverged, if it has
+    nodes, near the rest position [m] of which.
     """
 
     displacement: Floats
@@ -48,9 +51,9 @@ class Trajectory:
     volume_field: Floats
     surface_field: Floats
     tool_force: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
-    status: Literal["finished", "diverged"] = "finished"
-    diverged_at: float | None = None
-    diverged_near: Floats | None = None
+    status: Status = "finished"
+    ended_at: float | None = None
+    ended_near: Floats | None = None
 
 
 def empty_trajectory(observation: Observation, tools: int = 0) -> Trajectory:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.trajectory import Status
 from study.results.arrays import Shapes, check_names, check_numbers, check_shapes
 from study.results.records import DiscretisationError, ModelRecord, StudyRecord
 from study.results.tables import (
@@ -34,6 +35,7 @@ Floats = NDArray[np.float64]
 
 FIRST_LINE = 2
 """Of a table's rows, below the names of its columns."""
+STATUSES: tuple[str, ...] = get_args(Status)
 SAME_TIME = 1e-9
 """Share of the simulated time within which two times are the same; tables have twelve digits."""
 SAME_SCORE = 1e-9
@@ -97,7 +99,8 @@ def _check_tools(results: Results, times: Floats) -> None:
     scene, record = results.scene, results.record
     names = ["tool", *(f"tool.{n}" for n in range(2, len(scene.tools) + 1))]
     moved = [name for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
-    keys = [(model.name, tool) for model in record.models for tool in moved]
+    sampled = [model.name for model in record.models if _finite_samples(model, times)]
+    keys = [(name, tool) for name in sampled for tool in moved]
     _agree("tools", [(one.model, one.tool) for one in record.tools], keys)
     wanted = [
         (model.name, tool)
@@ -167,10 +170,12 @@ def _check_systems(kind: str | None, record: StudyRecord, members: Sequence[bool
 
 def _check_model(model: ModelRecord, record: StudyRecord) -> None:
     where = f"results.json: models: {model.name}"
-    if model.status not in {"finished", "diverged"}:
-        raise ValueError(f"{where}: status {model.status!r} is neither finished nor diverged")
-    if (model.status == "diverged") != (model.diverged_at_s is not None):
-        raise ValueError(f"{where}: diverged_at_s does not go with its status")
+    if model.status not in STATUSES:
+        raise ValueError(f"{where}: status {model.status!r} is none of {', '.join(STATUSES)}")
+    if (model.status == "finished") != (model.ended_at_s is None):
+        raise ValueError(f"{where}: ended_at_s does not go with its status")
+    if (model.status == "not finished") != bool(model.reason and model.remedy):
+        raise ValueError(f"{where}: reason and remedy do not go with its status")
     if model.system is not None and model.system not in record.fuzzy.systems:
         raise ValueError(f"{where}: {model.system} is none of the fuzzy systems")
     rounding = {} if model.lattice is None else model.lattice.rounding_errors
@@ -201,17 +206,17 @@ def _curves(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
 
 
 def _finite_samples(model: ModelRecord, times: Floats) -> int:
-    """A model that diverges has samples up to then."""
-    if model.diverged_at_s is None:
+    """A model whose motion ended has samples up to then."""
+    if model.ended_at_s is None:
         return len(times)
-    return int((times < model.diverged_at_s - SAME_TIME * times[-1]).sum())
+    return int((times < model.ended_at_s - SAME_TIME * times[-1]).sum())
 
 
 def _bands(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
     """Of models with an interval; a band ends where the run at a bound diverged, as a note says."""
     for model in record.models:
         system = record.fuzzy.systems.get(model.system or "")
-        if system is None or system.interval_pa is None:
+        if system is None or system.interval_pa is None or model.status == "not finished":
             continue
         lost = any(note.startswith(f"The run of {model.name} at the ") for note in record.notes)
         for probe in record.probes:
@@ -352,7 +357,7 @@ def _different(record: StudyRecord) -> list[tuple[str, ...]]:
     """Model, reference and quantity of each difference of the field, of models that finished."""
     sound = [model for model in record.models if not model.inverted_cells]
     names = [model.name for model in sound]
-    lost = {model.name for model in sound if model.status == "diverged"}
+    lost = {model.name for model in sound if model.status != "finished"}
     return [
         (*pair, quantity)
         for pair in pairs(names, record.references)
@@ -397,8 +402,8 @@ def _check_fields(results: Results) -> None:
     of_models = {start + name: dims for name in names for start, dims in OF_MODEL.items()}
     check_names(file, fields, [*surface, *of_models])
     check_shapes(file, fields, {**surface, **of_models}, {"p": len(record.probes)})
-    diverged = {model.name for model in record.models if model.status == "diverged"}
-    lost = {start + name for name in diverged for start in OF_MODEL}
+    ended = {model.name for model in record.models if model.status != "finished"}
+    lost = {start + name for name in ended for start in OF_MODEL}
     check_numbers(file, {name: array for name, array in fields.items() if name not in lost})
     for name, of in (("triangles", "points"), ("cut_triangles", "cut")):
         _check_indices(file, name, fields[name], len(fields[of]))

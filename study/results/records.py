@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,20 +224,24 @@ class PointRecord:
 class ModelRecord:
     """What a run says of every model, and in its last four of what it is made of.
 
-    `label`: its name in print; `system`: the fuzzy system whose estimate it was given;
-    `small_strain_modulus_pa`: Young's modulus it has at small strain; `time_step_errors`: by
-    control point, empty where they are not estimated. `tool_force_errors`: relative L2 error of
-    the force of each rigid tool, by steps and mesh as far as they are estimated; `tool_overlap_m`:
-    deepest overlap of body and tools, None without tools. `spacing_errors`: of a lattice under more
-    than one load of a given force, None where they are not estimated.
+    `label`: its name in print; `status`: finished, diverged or not finished, as which of the latter
+    it `ended_at_s` before its end, at 0 if it never began, and with `reason` and `remedy` if it is
+    not finished; `system`: the fuzzy system whose estimate it was given; `small_strain_modulus_pa`:
+    Young's modulus it has at small strain; `time_step_errors`: by control point, empty where they
+    are not estimated. `tool_force_errors`: relative L2 error of the force of each rigid tool, by
+    steps and mesh as far as they are estimated; `tool_overlap_m`: deepest overlap of body and
+    tools, None without tools. `spacing_errors`: of a lattice under more than one load of a given
+    force, None where they are not estimated.
     """
 
     name: str
     label: str
     simulated_s: float
     status: str
-    diverged_at_s: float | None = None
-    diverged_near_m: tuple[float, float, float] | None = None
+    ended_at_s: float | None = None
+    ended_near_m: tuple[float, float, float] | None = None
+    reason: str = ""
+    remedy: str = ""
     system: str | None = None
     nodes: int | None = None
     time_step_s: float | None = None

@@ -23,6 +23,7 @@ from study.run.limits import (
 from study.run.posed import Posed, Posing
 from study.run.ready import set_up
 from study.run.stages import Stage, Stages
+from study.run.unfinished import moved, within
 from study.run.watched import thinned
 from study.scene import Scene
 from study.similarity.batch import compile_measures
@@ -46,6 +47,11 @@ class Moved:
     run: ModelRun
     rest: ReferenceAtRest | None = None
     why: str = ""
+
+
+def _finished(found: Moved) -> bool:
+    """Whether there is a motion, if one that diverged."""
+    return found.run.record.status != "not finished"
 
 
 @dataclass(frozen=True)
@@ -143,7 +149,7 @@ class Moving:
     def motions(self, posed: Posed) -> Motions:
         """What all stages gave, once they have ended."""
         given = self.stages.results()
-        moved: dict[str, Moved] = {name: given[name] for name in self.models}
+        ran: dict[str, Moved] = {name: given[name] for name in self.models}
         limits, notes = self._limits(given, posed)
         ways: dict[str, Mended] = {
             name: given[BUDGET.format(name)]
@@ -155,11 +161,11 @@ class Moving:
             notes.append(AT_REST_OF_ONE_LOAD)
         budgets = error_budgets(
             {name: way.found for name, way in ways.items() if way.found is not None},
-            {name: one.run for name, one in moved.items()},
-            {name: one.rest.field for name, one in moved.items() if one.rest is not None},
+            {name: one.run for name, one in ran.items()},
+            {name: one.rest.field for name, one in ran.items() if one.rest is not None},
             posed.response.volumes,
         )
-        runs = {name: one.run for name, one in moved.items()}
+        runs = {name: one.run for name, one in ran.items()}
         return Motions(runs, limits, budgets, tuple(dict.fromkeys(notes)))
 
     def _limits(
@@ -207,7 +213,8 @@ class Moving:
         stage = self._stage(name, Moved, work, mesh, model, at_rest, at_quarter)
         # Of a stage that is kept there are no fields of all nodes.
         readable = keeping is None or keeping.fields is None
-        return Wanted(replace(stage, readable=readable), (name,))
+        # What was not to be had may be had by another run, on a machine that is less busy.
+        return Wanted(replace(stage, readable=readable, lasting=_finished), (name,))
 
     def _of_budget(self, lattice: str, name: str, mesh: str) -> Wanted:
         """A lattice mended toward a reference, whatever its own stiffness is."""
@@ -239,15 +246,18 @@ class Moving:
         return self.prepared[name]
 
     def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> Moved:
-        model = self._prepare(name)
-        run = thinned(model.run(replace(self.watch, progress=progress)))
+        prepared, watch = self._prepare(name), self.watch
+        watch = replace(watch, progress=within(progress, self.stages.means.minutes))
+        run = thinned(moved(self.models[name], prepared, self.posing.problem, watch))
+        if run.record.status == "not finished":
+            return Moved(run, None, f"{name} is not finished")
         if not at_rest:
             return Moved(run)
         with progress.stage(f"{name}: at rest"):
             try:
-                return Moved(run, reference_at_rest(model, at_quarter=at_quarter))
+                return Moved(run, reference_at_rest(prepared, at_quarter=at_quarter))
             except ValueError as error:
-                return Moved(run, reference_at_rest(model, at_quarter=False), str(error))
+                return Moved(run, reference_at_rest(prepared, at_quarter=False), str(error))
 
     def _rest(self, seen: Scene, progress: Progress) -> Rested:
         with progress.stage(AT_REST):

@@ -28,13 +28,15 @@ T = TypeVar("T")
 class Means:
     """What a run may use: a store, read unless `fresh`, and so many processes side by side.
 
-    `mesh`: file to keep the tetrahedra in, if they are wanted.
+    `mesh`: file to keep the tetrahedra in, if they are wanted; `minutes`: most that a model may
+    take, None for no end.
     """
 
     store: Store | None = None
     fresh: bool = False
     workers: int = 1
     mesh: Path | None = None
+    minutes: float | None = None
 
 
 ALONE = Means()
@@ -45,7 +47,7 @@ ALONE = Means()
 class Stage(Generic[T]):
     """What gives a value of a kind, under the key of all it depends on, None if it has no such.
 
-    `readable`: whether what is kept will do.
+    `readable`: whether what is kept will do; `lasting`: whether a value is worth keeping.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Stage(Generic[T]):
     key: str | None
     work: Callable[[Progress], T]
     readable: bool = True
+    lasting: Callable[[T], bool] = lambda _: True
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ def _computed(stage: Stage[T], store: Store | None, progress: Progress) -> _Foun
     started = time.perf_counter()
     value = stage.work(progress)
     entry = Entry(None, {}, time.perf_counter() - started, time.time())
-    if store is not None and stage.key is not None:
+    if store is not None and stage.key is not None and stage.lasting(value):
         _keep(stage, value, store, entry.wall)
     return _Found(value, _record(stage.name, entry, kept=False))
 

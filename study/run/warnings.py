@@ -36,8 +36,13 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
         yield from _of_mesh(scene, record.elements)
     if record.status == "diverged":
         yield (
-            f"{record.name} diverged at {record.diverged_at_s:g} s: it has no scores. "
+            f"{record.name} diverged at {record.ended_at_s:g} s: it has no scores. "
             f"{_remedy(scene, record)}"
+        )
+    if record.status == "not finished":
+        yield (
+            f"{record.name} is not finished: {record.reason}. It has no scores. To have it run, "
+            f"{record.remedy}."
         )
     if record.inverted_cells:
         yield (

@@ -56,7 +56,7 @@ def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
         return Errors(status, message=outcome.message)
     found = restored(Observed, outcome.value)
     if found.field is None or found.curves is None:
-        return Errors("diverged", message=f"at {found.diverged_at_s:.3g} s")
+        return Errors("diverged", message=f"at {found.ended_at_s:.3g} s")
     if found.margin is not None and found.margin < 1.0:
         return Errors("unstable", message=f"step {1.0 / found.margin:.3g} times the critical one")
     if found.inverted_cells:

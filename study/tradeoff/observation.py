@@ -23,7 +23,7 @@ class Observed:
     `margin`: smallest ratio of the critical step to one it took, None without a critical step.
     """
 
-    diverged_at_s: float | None
+    ended_at_s: float | None
     inverted_cells: int
     margin: float | None
     step_s: float | None
@@ -43,7 +43,7 @@ def _observed(found: Simulation) -> Observed:
     run = found.trajectory
     whole = run.status == "finished" and bool(np.isfinite(run.volume_field[0]).all())
     return Observed(
-        diverged_at_s=run.diverged_at,
+        ended_at_s=run.ended_at,
         inverted_cells=found.inverted_cells,
         margin=found.margin if np.isfinite(found.margin) else None,
         step_s=found.step if np.isfinite(found.step) else None,

@@ -114,12 +114,12 @@ def fall(integrator: str, nu: float | None, weights: float) -> Finding:
         f"{found.smallest_step / limit:.2g} of the limit, strain {found.largest_strain:.2g}, "
         f"{found.inverted_cells} cells inverted"
     )
-    if found.trajectory.diverged_at is None:
+    if found.trajectory.ended_at is None:
         return _balanced(integrator, ledger.balance(interval), told)
-    finest = fixed[-1][0].trajectory.diverged_at
+    finest = fixed[-1][0].trajectory.ended_at
     if complete or finest is None:
         return Finding("error", message=f"lost by its step: {told}")
-    return value(finest, found.trajectory.diverged_at, told, "diverged")
+    return value(finest, found.trajectory.ended_at, told, "diverged")
 
 
 def _balanced(integrator: str, balance: Floats, message: str) -> Finding:

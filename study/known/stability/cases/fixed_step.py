@@ -68,12 +68,12 @@ def held(integrator: str, times: float) -> Finding:
         assembly, material, np.ones_like, seen, Fixed(dt), integrator=integrator, linear=True
     ).trajectory
     count, u = _march(_dense(integrator, assembly, material, dt), len(assembly.mass), far)
-    if found.diverged_at is None or found.diverged_near is None:
+    if found.ended_at is None or found.ended_near is None:
         return beside(u, found.displacement[-1], "bounded")
     node = int(np.abs(u).max(axis=1).argmax())
-    if not (assembly.lattice.nodes[node] == found.diverged_near).all():
-        return Finding("error", message=f"not at node {node} but near {found.diverged_near}")
-    return value(count * dt, found.diverged_at, f"step {count}, node {node}", "diverged")
+    if not (assembly.lattice.nodes[node] == found.ended_near).all():
+        return Finding("error", message=f"not at node {node} but near {found.ended_near}")
+    return value(count * dt, found.ended_at, f"step {count}, node {node}", "diverged")
 
 
 def asked(seconds: float | None = 0.0, hertz: float | None = None) -> Finding:

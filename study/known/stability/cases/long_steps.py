@@ -122,7 +122,7 @@ def called_lost(times: float) -> Finding:
     found = run(assembly, material, np.ones_like, seen, step, integrator="xpbd").trajectory
     lost = np.isnan(found.displacement).any(axis=(1, 2))
     first = int(lost.argmax()) * step.seconds
-    return value(first, found.diverged_at or 0.0, "first sample without a number", _ending(found))
+    return value(first, found.ended_at or 0.0, "first sample without a number", _ending(found))
 
 
 def _ending(found: Trajectory) -> Ending:

@@ -1,0 +1,84 @@
+"""Models that find in their run that they cannot: a result of each, and the others go on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from study.models.lattice import LatticeModel
+from study.models.model import Model, ModelRun, Prepared, Watch
+from study.problem.problem import Problem
+from study.problem.trajectory import empty_trajectory
+from study.problem.unfinished import UnfinishedError
+from study.progress import Advance, Progress
+from study.results.records import ModelRecord
+
+NO_MEMORY = UnfinishedError(
+    "the memory that this machine gave did not suffice",
+    "give it more, run fewer models side by side (--workers 1), or coarsen the model's mesh "
+    "(reference.element_size, lattice.spacing)",
+)
+
+
+def within(progress: Progress, minutes: float | None) -> Progress:
+    """What is told of a model, which ends it once it has taken so long; None for no end."""
+    return progress if minutes is None else _Timed(progress, minutes)
+
+
+class _Timed:
+    """Raises an UnfinishedError when a model tells how far it is, and is late."""
+
+    def __init__(self, progress: Progress, minutes: float) -> None:
+        self.progress, self.minutes = progress, minutes
+        self.end = time.monotonic() + 60.0 * minutes
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Advance]:
+        """See Progress."""
+        self._stop_late(name, 0.0)
+        with self.progress.stage(name) as advance:
+
+            def on_time(share: float) -> None:
+                advance(share)
+                self._stop_late(name, share)
+
+            yield on_time
+
+    def _stop_late(self, name: str, share: float) -> None:
+        if time.monotonic() > self.end:
+            raise UnfinishedError(
+                f"it took more than {self.minutes:g} min, with {100.0 * share:.0f} % done of the "
+                f"stage {name!r}",
+                "allow it more with --minutes, or coarsen its mesh (reference.element_size, "
+                "lattice.spacing)",
+            )
+
+
+def moved(model: Model, prepared: Prepared, problem: Problem, watch: Watch) -> ModelRun:
+    """The run of a model, or that it is not finished and why."""
+    try:
+        return prepared.run(watch)
+    except UnfinishedError as error:
+        return unfinished(model, problem, error)
+    except MemoryError:
+        return unfinished(model, problem, NO_MEMORY)
+
+
+def unfinished(model: Model, problem: Problem, why: UnfinishedError) -> ModelRun:
+    """A run that never came to a motion: no number in it, and no score of it."""
+    seen = problem.observation
+    nothing = empty_trajectory(seen, len(problem.rigid_tools))
+    record = ModelRecord(
+        name=model.name,
+        label=model.label,
+        system=model.system if isinstance(model, LatticeModel) else None,
+        simulated_s=float(seen.times[-1]),
+        status="not finished",
+        ended_at_s=float(seen.times[0]),
+        reason=why.reason,
+        remedy=why.remedy,
+        time_step_errors={},
+    )
+    return ModelRun(replace(nothing, status="not finished", ended_at=record.ended_at_s), record)
