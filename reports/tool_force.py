@@ -12,6 +12,7 @@ from study.results.records import ToolForce
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST_TOOLS = 4
 ROW_HEIGHT, LEGEND_HEIGHT = 1.95, 0.3
@@ -28,7 +29,8 @@ def force_figure(results: Results) -> bytes | None:
     shown = tools(results)[:MOST_TOOLS]
     if not shown:
         return None
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(LEGEND_HEIGHT + ROW_HEIGHT * len(shown))
         grid = figure.subplots(len(shown), 2, squeeze=False)
         for row, tool in zip(grid, shown, strict=True):
@@ -36,7 +38,9 @@ def force_figure(results: Results) -> bytes | None:
             row[0].set_title(short(tool), loc="left", fontweight="bold")
         handles, names = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper center", ncols=5)
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def _draw(row: list[Axes], results: Results, tool: str) -> None:
