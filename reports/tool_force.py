@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from reports import canvas
 from reports.appearance import labels, looks
 from reports.digits import DASH, Table, fixed, short, significant, with_error
+from reports.score_digits import UNKNOWN, decimals
 from study.results.folder import Results
 from study.results.records import ToolForce
 
@@ -81,8 +82,10 @@ def _force(one: ToolForce) -> str:
 def _scores(results: Results, one: ToolForce) -> str:
     """Relative L2 score against each reference."""
     named = labels(results)
+    error = None if one.relative_error is None else one.relative_error + (one.spacing_error or 0.0)
+    places = min(UNKNOWN, decimals(error))
     found = [
-        f"{fixed(row.score, 2)} ({named[row.reference]})"
+        f"{fixed(row.score, places)} ({named[row.reference]})"
         for row in results.tool_scores
         if (row.model, row.tool, row.measure) == (one.model, one.tool, "relative-l2")
     ]
