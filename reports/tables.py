@@ -19,6 +19,7 @@ from reports.digits import (
     percent,
     quantity,
     significant,
+    spread,
     words,
 )
 from reports.paper import TABLE_III
@@ -263,7 +264,11 @@ def paper_rows(results: Results) -> Table:
             else []
         )
         rows.append(
-            [f"Benchmark – {system_name(system)}", fixed(printed, 4), " to ".join(ends) or DASH]
+            [
+                f"Benchmark – {system_name(system)}",
+                fixed(printed, 4),
+                spread(ends) if ends else DASH,
+            ]
         )
     return rows
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reports import canvas
 from reports.appearance import labels, looks
 from reports.digits import DASH, Table, fixed, short, significant, with_error
-from reports.score_digits import UNKNOWN, decimals
+from reports.score_digits import LARGEST, NOT_RESOLVED, UNKNOWN, decimals
 from study.results.folder import Results
 from study.results.records import ToolForce
 
@@ -61,7 +61,7 @@ def force_rows(results: Results) -> Table:
         [
             short(one.tool),
             named[one.model],
-            _force(one),
+            printed_force(one),
             fixed(one.peak_at_s, 3),
             fixed(MILLI * one.peak_travel_m, 1),
             significant(MILLI * one.work_j),
@@ -71,8 +71,8 @@ def force_rows(results: Results) -> Table:
     ]
 
 
-def _force(one: ToolForce) -> str:
-    """With the error of the whole curve, which is relative to all of it."""
+def printed_force(one: ToolForce) -> str:
+    """Largest force [N] with the error of the whole curve, which is relative to all of it."""
     if one.relative_error is None:
         return significant(one.peak_n)
     error = one.relative_error + (one.spacing_error or 0.0)
@@ -83,9 +83,9 @@ def _scores(results: Results, one: ToolForce) -> str:
     """Relative L2 score against each reference."""
     named = labels(results)
     error = None if one.relative_error is None else one.relative_error + (one.spacing_error or 0.0)
-    places = min(UNKNOWN, decimals(error))
+    places = None if (error or 0.0) >= LARGEST else min(UNKNOWN, decimals(error))
     found = [
-        f"{fixed(row.score, places)} ({named[row.reference]})"
+        f"{NOT_RESOLVED if places is None else fixed(row.score, places)} ({named[row.reference]})"
         for row in results.tool_scores
         if (row.model, row.tool, row.measure) == (one.model, one.tool, "relative-l2")
     ]

@@ -63,7 +63,8 @@ def test_letters_of_a_further_font_are_printed_and_the_document_is_tagged(capsys
     assert capsys.readouterr().err == ""
 
 
-def test_a_document_that_does_without_has_the_same_bytes_where_more_fonts_are(no_fonts, request):
+@pytest.mark.usefixtures("no_fonts")
+def test_a_document_that_does_without_has_the_same_bytes_where_more_fonts_are(request):
     plain = made("Leber κ, ½, ≥")
     request.getfixturevalue("fonts")
     assert made("Leber κ, ½, ≥") == plain
@@ -91,5 +92,6 @@ def test_a_figure_is_drawn_again_in_further_fonts_only_where_its_own_lack_a_lett
     assert asked == [1]
 
 
-def test_fonts_are_made_known_to_matplotlib(fonts):
+@pytest.mark.usefixtures("fonts")
+def test_fonts_are_made_known_to_matplotlib():
     assert canvas.more_families() == ["DejaVu Sans"]

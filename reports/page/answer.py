@@ -22,13 +22,14 @@ from reports.digits import DASH, fixed, percent, significant, spread, with_error
 from reports.motion_figures import peak
 from reports.ranking import references, tool_probe
 from reports.summary import printed_peak
+from reports.tool_force import MOST_TOOLS, printed_force, tools
 from study.results.folder import Results
 from study.results.numerical import numerical_errors, whole_error
 from study.results.records import BudgetPart, ModelRecord
 
 MILLI = 1e3
-NEGLIGIBLE = 5e-4
-"""Relative error below which it shows in none of three digits."""
+NEGLIGIBLE = 5e-5
+"""Relative error below which it shows in none of four digits."""
 PEAK = "field-relative-l2-peak"
 FRAME_RATE = 60.0
 """Of a display [Hz], by whose frames a cost is told."""
@@ -232,8 +233,8 @@ def _whose(found: Nearest) -> str:
 
 
 def _stated(value: float, error: float) -> str:
-    """A number with its error, or to three digits where it is known to more."""
-    return significant(value) if error < NEGLIGIBLE * abs(value) else with_error(value, error)
+    """A number with its error, or to four digits where it is known to more."""
+    return significant(value, 4) if error < NEGLIGIBLE * abs(value) else with_error(value, error)
 
 
 def _at_the_tool(results: Results, found: Nearest) -> Iterator[str]:
@@ -243,6 +244,19 @@ def _at_the_tool(results: Results, found: Nearest) -> Iterator[str]:
         yield (
             f"At the control point {words(tool_probe(results))} it moves by {own} mm at most, "
             f"{reference_name(results, found.reference)} by {theirs} mm: {gap.told}."
+        )
+    yield from _forces(results, found)
+
+
+def _forces(results: Results, found: Nearest) -> Iterator[str]:
+    """Largest force on each tool that is moved, of the nearest model and of the reference."""
+    forces = {(one.model, one.tool): one for one in results.record.tools}
+    for tool in tools(results)[:MOST_TOOLS]:
+        pair = [forces.get((name, tool)) for name in (found.model.name, found.reference)]
+        own, theirs = ("not known" if one is None else printed_force(one) for one in pair)
+        yield (
+            f"The largest force on {words(tool)} is {own} N, of "
+            f"{reference_name(results, found.reference)} {theirs} N."
         )
 
 
@@ -262,7 +276,8 @@ class _Gap:
         if not self.is_resolved:
             return f"they are apart by less than their errors, {self.value}"
         caution = "" if self.is_known else ", by errors that are not all known"
-        return f"{self.value} ({self.share}) too {'far' if self.is_more else 'short'}{caution}"
+        too = "farther" if self.is_more else "less far"
+        return f"{self.value} ({self.share}) {too}{caution}"
 
 
 def _gap(results: Results, found: Nearest) -> _Gap:
