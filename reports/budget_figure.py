@@ -12,6 +12,7 @@ from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from study.results.records import ErrorBudget
 
@@ -25,14 +26,17 @@ def budget_figure(results: Results) -> bytes | None:
     if not found:
         return None
     seen = looks(results)
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(HEIGHT)
         panels = figure.subplots(1, len(found), sharey=True, sharex=True, squeeze=False)[0]
         for axes, budget in zip(panels, found, strict=True):
             waterfall(axes, budget)
             axes.set_title(seen[budget.model].label)
             axes.set_xlabel("relative L2 difference [%]")
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def waterfall(axes: Axes, budget: ErrorBudget) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
+from reports.letters import extra_files
 from study.folders import write_bytes
 
 if TYPE_CHECKING:
@@ -20,10 +23,13 @@ TEXT_WIDTH = 6.69
 RASTER_DPI = 200
 TEXT_SIZE = 8.0
 """Size of all text [point]: figures are printed as large as they are drawn."""
+FAMILIES = ("STIXGeneral", "DejaVu Sans")
+"""Like the text, and every glyph of the second."""
+NO_GLYPH = "Glyph .* missing"
+Drawn = TypeVar("Drawn")
 STYLE: dict[str, object] = {
     "svg.hashsalt": "liver-study",
     "text.parse_math": False,  # names come from users
-    "font.family": ["STIXGeneral", "DejaVu Sans"],  # like the text, and every glyph of the second
     "font.size": TEXT_SIZE,
     "axes.titlesize": TEXT_SIZE,
     "axes.labelsize": TEXT_SIZE,
@@ -45,16 +51,29 @@ STYLE: dict[str, object] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """The report's style while a figure is drawn and saved.
+def style(*families: str) -> Iterator[None]:
+    """The report's style while a figure is drawn and saved, with further fonts behind its own.
 
-    A name in a script that the font lacks is drawn as boxes, without a warning.
+    A name in a script that all of these lack is drawn as boxes, without a warning.
     """
     import matplotlib as mpl
 
-    with mpl.rc_context(STYLE), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
+    with mpl.rc_context(STYLE | {"font.family": [*FAMILIES, *families]}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=NO_GLYPH)
         yield
+
+
+def more_families() -> list[str]:
+    """Names of the fonts of `reports.letters`, made known to matplotlib."""
+    from matplotlib.font_manager import fontManager
+
+    files = [str(path) for path in extra_files()]
+    known = {entry.fname for entry in fontManager.ttflist}
+    for file in files:
+        if file not in known:
+            fontManager.addfont(file)
+    names = {entry.fname: entry.name for entry in fontManager.ttflist}
+    return list(dict.fromkeys(names[file] for file in files))
 
 
 def sheet(height: float, width: float = TEXT_WIDTH) -> Figure:
@@ -85,25 +104,45 @@ def pdf(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def drawn(draw: Callable[[], Figure]) -> bytes:
+    """What a function draws in the report's style as SVG."""
+    return _in_letters(lambda: svg(draw()))
+
+
 def picture(draw: Callable[[], Figure | None]) -> bytes | None:
     """What a function draws in the report's style as SVG; None where it draws nothing."""
-    with style():
-        figure = draw()
-        return None if figure is None else svg(figure)
+    return _in_letters(lambda: None if (figure := draw()) is None else svg(figure))
 
 
 def write(drawings: Mapping[Path, Callable[[], Figure | None]]) -> list[Path]:
     """Write what functions draw as SVG and PDF beside their stems; the files written."""
+
+    def both(draw: Callable[[], Figure | None]) -> dict[str, bytes]:
+        figure = draw()
+        return {} if figure is None else {".svg": svg(figure), ".pdf": pdf(figure)}
+
     files: dict[Path, bytes] = {}
-    with style():
-        for stem, draw in drawings.items():
-            figure = draw()
-            if figure is not None:
-                files |= {stem.with_suffix(".svg"): svg(figure)}
-                files |= {stem.with_suffix(".pdf"): pdf(figure)}
+    for stem, draw in drawings.items():
+        found = _in_letters(partial(both, draw))
+        files |= {stem.with_suffix(ending): content for ending, content in found.items()}
     for path, content in files.items():
         write_bytes(path, content)
     return list(files)
+
+
+def _in_letters(make: Callable[[], Drawn]) -> Drawn:
+    """What a function makes in the report's style, in more fonts where its own lack a letter.
+
+    Only there, so that other figures are the same bytes whether more fonts are installed or not.
+    """
+    with style(), warnings.catch_warnings(record=True) as told:
+        warnings.filterwarnings("always", message=NO_GLYPH)
+        made = make()
+    families = more_families() if any(re.match(NO_GLYPH, str(one.message)) for one in told) else []
+    if not families:
+        return made
+    with style(*families):
+        return make()
 
 
 def blank(axes: Axes) -> None:

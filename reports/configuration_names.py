@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from study.scene.schema import Reference
+
 CONTENDERS = {
     "springs": "springs alone",
     "volume-springs": "springs and volume term",
@@ -27,6 +29,10 @@ NAMES = {
     "xpbd": "XPBD",
     "runge-kutta-4": "Runge-Kutta",
 }
+LIVER_EDGE = Reference().element_size
+"""Elements of the scene's mesh [m], level 0, of the built-in liver on which was measured."""
+FINER = 4.0 / 3.0
+"""Ratio of the element sizes of a level of the built-in liver and the next finer one."""
 WORDS: dict[str, Callable[[str], str]] = {
     "spacing": lambda value: f"{1e3 * float(value):.3g} mm",
     "step_fraction": lambda value: f"{value} of the critical step",
@@ -47,20 +53,24 @@ def contender_name(contender: str) -> str:
     return CONTENDERS.get(contender, contender)
 
 
-def name_of(contender: str, settings: str) -> str:
-    """Name of a configuration in a sentence, from its settings "key=value key=value"."""
+def name_of(contender: str, settings: str, edge: float | None = None) -> str:
+    """Name of a configuration in a sentence, from its settings "key=value key=value".
+
+    `edge`: elements [m] of the mesh of level 0; where it is not known a mesh has its number.
+    """
     known = dict(part.split("=", 1) for part in settings.split())
     head = SPRINGS.get(known.pop("volume_term", ""), contender_name(contender))
-    return ", ".join([head, *(_said(key, value) for key, value in known.items())])
+    return ", ".join([head, *(_said(key, value, edge) for key, value in known.items())])
 
 
-def mark_of(settings: str) -> str:
+def mark_of(settings: str, edge: float | None = None) -> str:
     """The setting that tells configurations of one contender apart first: the spacing, the mesh."""
     known = dict(part.split("=", 1) for part in settings.split())
-    return ", ".join(
-        _said(key, known[key]) for key in ("spacing", "element", "level") if key in known
-    )
+    keys = (key for key in ("spacing", "element", "level") if key in known)
+    return ", ".join(_said(key, known[key], edge) for key in keys)
 
 
-def _said(key: str, value: str) -> str:
+def _said(key: str, value: str, edge: float | None) -> str:
+    if key == "level" and edge is not None:
+        return f"elements of {1e3 * edge / FINER ** int(value):.2g} mm"
     return WORDS[key](value) if key in WORDS else f"{key} {value}"

@@ -7,7 +7,7 @@ from reports.alternatives import alternatives
 from reports.certified import certified_rows
 from reports.cut_figure import section
 from reports.differences import finite_elements, own_error, resolved
-from reports.digits import Group, fixed, short, words
+from reports.digits import Group, fixed, short, symbols, words
 from reports.motion_figures import shown_probes
 from reports.page.answer import answer, question
 from reports.paper import TABLE_I, TABLE_III_SPREAD, sources
@@ -72,7 +72,7 @@ def document(results: Results) -> dict[str, object]:
         "certified": certified_rows(results),
         "reference": reference(results),
         "checks": tables.check_rows(results),
-        "assumptions": [words(text) for text in record.assumptions],
+        "assumptions": [words(symbols(text)) for text in record.assumptions],
         "notes": [words(text) for text in record.notes],
         "provenance": tables.provenance_rows(results),
         "table_i": {"header": TABLE_I[0], "rows": TABLE_I[1:]},

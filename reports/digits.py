@@ -20,8 +20,10 @@ class Group(TypedDict):
 PA_PER_KPA = 1e3
 DASH = "–"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 LONGEST_WORD = 20
 QUANTITY = re.compile(r"(-?\d[\d.]*(?:e[+-]?\d+)?)(?: (.+))?")
+RANGE = re.compile(r"(-?[\d.e+-]+) to (-?[\d.e+-]+) (\S+)")
 LARGER_UNITS = {"Pa": (1e3, 1e-3, "kPa"), "Pa/m": (1e6, 1e-6, "MPa/m")}
 SMALLER_UNITS = {"m": (1e3, "mm"), "m^3": (1e3, "L")}
 
@@ -85,6 +87,28 @@ def quantity(text: str) -> str:
         value *= factor
     unit = unit.replace("*", "·").replace("^2", "²").replace("^3", "³")
     return f"{value:.6g} {unit}".strip()
+
+
+def interval(text: str) -> str:
+    """A range in SI units as a reader would write it: "0.003 to 0.01 m" becomes "3 to 10 mm"."""
+    found = RANGE.fullmatch(text)
+    if found is None:
+        return text
+    low, high, unit = float(found[1]), float(found[2]), found[3]
+    if unit in SMALLER_UNITS and max(abs(low), abs(high)) < 0.5:
+        factor, unit = SMALLER_UNITS[unit]
+    elif unit in LARGER_UNITS and min(abs(low), abs(high)) >= LARGER_UNITS[unit][0]:
+        _, factor, unit = LARGER_UNITS[unit]
+    else:
+        return text
+    return f"{factor * low:.3g} to {factor * high:.3g} {unit}"
+
+
+def symbols(text: str) -> str:
+    """Text with the paper's symbols as they are printed there: "K_1 / h_0^2" as K₁ / h₀²."""
+    text = text.replace("gamma_", "γ_").replace("sqrt(2)", "√2")
+    text = re.sub(r"\b(\w)_(\d)", lambda m: m[1] + m[2].translate(SUBSCRIPTS), text)
+    return re.sub(r"\^(\d)", lambda m: m[1].translate(SUPERSCRIPTS), text)
 
 
 def words(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -189,8 +190,8 @@ def field_figures(views: Views, pictures: Pictures) -> list[bytes]:
     for sheet in views.sheets:
         last = first + len(sheet.panels)
         chosen = None if pictures.pixels is None else pictures.pixels[first:last]
-        with canvas.style():
-            figures.append(canvas.svg(_figure(views, sheet, replace(pictures, pixels=chosen))))
+        found = replace(pictures, pixels=chosen)
+        figures.append(canvas.drawn(partial(_figure, views, sheet, found)))
         first = last
     return figures
 

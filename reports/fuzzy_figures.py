@@ -14,6 +14,7 @@ from study.results.folder import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float64]
@@ -60,7 +61,8 @@ def draw_sets(arrays: Arrays, estimates: Mapping[str, float]) -> bytes:
     """Sets as SVG, from the arrays and the estimate [Pa] of each system."""
     names = variables(arrays)
     rows = -(-len(names) // COLUMNS)
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(rows * PANEL_HEIGHT)
         grid = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
         for axes, name in zip(grid, names, strict=False):
@@ -75,7 +77,9 @@ def draw_sets(arrays: Arrays, estimates: Mapping[str, float]) -> bytes:
         for axes in grid[::COLUMNS]:
             axes.set_ylabel("membership")
         figure.legend(handles=_legend(grid), loc="outside upper center", ncols=4)
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def _draw_sets(axes: Axes, arrays: Arrays, variable: str) -> None:
@@ -143,7 +147,8 @@ def draw_surfaces(arrays: Arrays, inputs: tuple[str, str]) -> bytes:
     names = systems(arrays)
     x, y, surfaces = _changing(arrays, names)
     scale = _scale(surfaces)
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(SURFACE_HEIGHT)
         grid = figure.add_gridspec(2, len(names), height_ratios=(1.25, 1.0))
         flat = []
@@ -158,7 +163,9 @@ def draw_surfaces(arrays: Arrays, inputs: tuple[str, str]) -> bytes:
             flat[-1].locator_params(nbins=TICKS)
             flat[-1].grid(visible=False)
         figure.colorbar(image, ax=flat, label="stiffness [kPa]")
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def _changing(arrays: Arrays, names: list[str]) -> tuple[Floats, Floats, list[Floats]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,8 +92,7 @@ def motion_figures(results: Results) -> Iterator[bytes]:
     for group in probe_groups(results):
         drawn = {probe: motions(results, probe) for probe in group}
         if any(drawn.values()):
-            with canvas.style():
-                yield canvas.svg(_figure(drawn))
+            yield canvas.drawn(partial(_figure, drawn))
 
 
 def _figure(drawn: dict[str, list[ProbeMotion]]) -> Figure:

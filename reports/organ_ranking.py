@@ -8,8 +8,8 @@ from itertools import groupby
 
 from reports.appearance import SYSTEM_NAMES
 from reports.benchmarks import Line, read
-from reports.digits import Table, count, fixed, percent, spread, words
-from reports.ranking_study import CLAIM, column, movers, share
+from reports.digits import Table, count, fixed, percent, spread
+from reports.ranking_study import CLAIM, column, movers, share, unknown_row
 
 NEAREST, DIFFERENCES, INDICES, FINER, UNKNOWNS = (
     "organ_nearest",
@@ -33,10 +33,7 @@ def organ_ranking(folder: Traversable | None = None) -> dict[str, object] | None
         "sentences": list(sentences(folder)),
         "systems": list(NAMES.values()),
         "nearest": nearest_rows(nearest, read(FINER, folder)),
-        "unknowns": [
-            [words(line[key].replace("_", " ")) for key in ("unknown", "range", "meaning")]
-            for line in read(UNKNOWNS, folder)
-        ],
+        "unknowns": [unknown_row(line) for line in read(UNKNOWNS, folder)],
     }
 
 

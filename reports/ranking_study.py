@@ -8,7 +8,7 @@ from itertools import groupby
 
 from reports.appearance import SYSTEM_NAMES, system_name
 from reports.benchmarks import Line, read
-from reports.digits import Table, count, fixed, percent, significant, words
+from reports.digits import Table, count, fixed, interval, percent, significant, symbols, words
 from reports.paper import TABLE_III
 from reports.tables import CURVE_NAMES, MEASURE_NAMES
 from study.results.folder import Results
@@ -51,11 +51,14 @@ def ranking_study(folder: Traversable | None = None) -> dict[str, object] | None
         "nearest": nearest_rows(nearest),
         "differences": difference_rows(read(DIFFERENCES, folder)),
         "table_iii": table_iii_rows(read(TABLE_THREE, folder)),
-        "unknowns": [
-            [words(line["unknown"].replace("_", " ")), words(line["range"]), words(line["meaning"])]
-            for line in read(UNKNOWNS, folder)
-        ],
+        "unknowns": [unknown_row(line) for line in read(UNKNOWNS, folder)],
     }
+
+
+def unknown_row(line: Line) -> list[str]:
+    """Name of an unknown, its range or alternatives, and what it is, in a reader's units."""
+    name = line["unknown"].replace("_", " ")
+    return [words(name), words(interval(line["range"])), words(symbols(line["meaning"]))]
 
 
 def sentences(folder: Traversable | None = None) -> Iterator[str]:

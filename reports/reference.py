@@ -24,6 +24,8 @@ SAFETY_ASSUMED = 3.0
 ASSUMED_ORDER = 2.0
 SAFETY_GRADED = 1.5
 LEAST_ORDER = 1.0
+REGULAR = 6.0 * 2.0**0.5
+"""Cube of the edge of a regular tetrahedron over its volume."""
 BEYOND = 0.5
 
 
@@ -40,7 +42,7 @@ def reference(results: Results) -> dict[str, object] | None:
     assumed = error.formal_order if error and graded else ASSUMED_ORDER
     return {
         "how": _how(results.scene, model, found),
-        "levels": [_level_row(level) for level in found.levels],
+        "levels": [_level_row(results, level) for level in found.levels],
         "errors": list(_error_rows(results, model, found)),
         "formal_order": f"{error.formal_order:g}" if error and by_three else "",
         "graded": graded,
@@ -83,13 +85,21 @@ def _motion(model: ModelRecord, found: ElementsRecord) -> str:
     )
 
 
-def _level_row(level: MeshLevel) -> list[str]:
+def _level_row(results: Results, level: MeshLevel) -> list[str]:
     return [
-        fixed(level.size, 2),
+        _edge(results, level),
         count(level.elements),
         count(level.unknowns),
         significant(level.wall_s, 2),
     ]
+
+
+def _edge(results: Results, level: MeshLevel) -> str:
+    """Edge [mm] of a regular tetrahedron as large as the mean one of a mesh."""
+    known = results.record.dimensionless
+    if known is None:
+        return DASH
+    return significant(1e3 * (REGULAR * known.volume_m3 / level.elements) ** (1.0 / 3.0))
 
 
 def _error_rows(results: Results, model: ModelRecord, found: ElementsRecord) -> Iterator[list[str]]:

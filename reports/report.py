@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from dataclasses import replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from threading import Event
-from typing import Literal, TypedDict
+from typing import Literal
 
 import numpy as np
 
@@ -23,12 +24,13 @@ from reports.cut_figure import cut_figure
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.first_figure import first_figure
 from reports.fuzzy_figures import sets_figure, surfaces_figure
+from reports.letters import boxes, extra_files, extra_fonts, without_shape
 from reports.motion_figures import motion_figures
 from reports.renders import Pictures, render_once
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
-from study.folders import FolderError, check_file, write_bytes
+from study.folders import FolderError, check_file, tell, write_bytes
 from study.progress import Progress, Silent
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
@@ -43,8 +45,8 @@ PARTS = ("style.typ", "paper.typ")
 """What a template includes."""
 STANDARD: Literal["ua-1"] = "ua-1"
 """PDF/UA-1: tagged, with alternative texts, a language and a title."""
-NO_GLYPH = "could not be displayed with font"
-"""In what typst says of a text that no font of its own has letters for."""
+NO_GLYPH = re.compile(r'the text `"(.*?)"` could not be displayed with font', re.DOTALL)
+"""What typst says of the first text that no font has letters for."""
 PROCESSES = 2
 """That draw plots at most: more of them wait for the dearest."""
 Figures = dict[str, list[bytes]]
@@ -140,7 +142,8 @@ def _kept_plots(results: Results) -> Figures:
             for i, svg in enumerate(drawn)
         }
 
-    found = made_once("plots", make, results, everything("reports"), modules=(__name__,))
+    fonts = [path.name for path in extra_files()]
+    found = made_once("plots", make, results, fonts, everything("reports"), modules=(__name__,))
     figures: Figures = {"motion": []}  # of a motion without a finite sample
     for name, svg in found.items():
         figures.setdefault(name.partition("/")[0], []).append(svg.tobytes())
@@ -189,40 +192,84 @@ def _with_pictures(
     return drawn, explain(seen) | {"renderer": found.renderer}
 
 
-class _How(TypedDict):
-    """What typst is given besides the document."""
-
-    root: str
-    ignore_system_fonts: bool
-
-
 def compile_pdf(content: dict[str, object], figures: Figures, name: str = TEMPLATE) -> bytes:
     """Tagged PDF of a template filled with text and figures.
+
+    Letters that typst's own fonts lack are taken from those of `reports.letters`; where these lack
+    them too, or are not installed, they are boxes, and the document and a line on stderr say which
+    and what helps.
 
     Raises ValueError for a number that is not finite, RuntimeError for a template that does not
     compile, for example because it refers to a label that is missing.
     """
-    import typst
-
     names = {place: [f"{place}-{i}.svg" for i in range(len(svg))] for place, svg in figures.items()}
-    text = json.dumps(content | {"figures": names}, allow_nan=False)
+    content = content | {"figures": names, "boxes": ""}
     with tempfile.TemporaryDirectory(prefix="liver-study-") as folder:
         root = Path(folder)
-        (root / "content.json").write_text(text, encoding="utf-8")
         for part in (name, *PARTS):
             (root / part).write_bytes(template(part))
         for place, drawn in figures.items():
             for file, svg in zip(names[place], drawn, strict=True):
                 (root / file).write_bytes(svg)
-        path = str(root / name)
-        how: _How = {"root": folder, "ignore_system_fonts": True}
-        try:
-            return bytes(typst.compile(path, pdf_standards=STANDARD, **how))
-        except typst.TypstError as error:
-            if NO_GLYPH not in str(error):
-                raise
-            # A name in a script that the fonts lack: tagged all the same, but for those letters.
-            return bytes(typst.compile(path, **how))
+        text = _fill(root, content)
+        for fonts in _fonts():
+            with suppress(_NoGlyphError):
+                return _compile(root / name, fonts)
+        said = boxes(without_shape(text, partial(_refused, root, fonts)))
+        tell(said)
+        _fill(root, content | {"boxes": said})
+        return _compile(root / name, fonts, standard=None)
+
+
+def _fill(root: Path, content: Mapping[str, object]) -> str:
+    """Write what a template prints; its text."""
+    text = json.dumps(content, allow_nan=False, ensure_ascii=False)
+    (root / "content.json").write_text(text, encoding="utf-8")
+    return text
+
+
+def _fonts() -> list[list[Path]]:
+    """Folders of fonts to try beside typst's own, so that most documents do with the first."""
+    more = extra_fonts()
+    return [[], more] if more else [[]]
+
+
+class _NoGlyphError(Exception):
+    """Some letters, as its text, have no shape in any font."""
+
+
+def _compile(
+    path: Path, fonts: list[Path], *, standard: Literal["ua-1"] | None = STANDARD
+) -> bytes:
+    import typst
+
+    try:
+        made = typst.compile(
+            str(path),
+            root=str(path.parent),
+            ignore_system_fonts=True,
+            font_paths=[str(folder) for folder in fonts],
+            pdf_standards=standard or [],
+        )
+    except typst.TypstError as error:
+        found = NO_GLYPH.search(str(error))
+        if found is None:
+            raise
+        raise _NoGlyphError(found[1]) from None
+    return bytes(made)
+
+
+def _refused(root: Path, fonts: list[Path], letters: str) -> str | None:
+    """Some of the letters that have no shape, None where all have one."""
+    path = root / "letters.typ"
+    apart = " ".join(letters)  # so that none is joined with its neighbour
+    head = '#set document(title: "letters")\n#set text(font: "Libertinus Serif", lang: "en")\n'
+    path.write_text(f"{head}#{json.dumps(apart, ensure_ascii=False)}\n", encoding="utf-8")
+    try:
+        _compile(path, fonts)
+    except _NoGlyphError as error:
+        return str(error)
+    return None
 
 
 def template(name: str = TEMPLATE) -> bytes:

@@ -58,12 +58,15 @@ def draw_rules(arrays: Arrays, kind: str) -> bytes:
     inputs = sorted(set(view["terms.input"].tolist()))
     count = len(view["rules.number"])
     height = FRAME_HEIGHT + ROW_HEIGHT * count + OUTPUT_HEIGHT
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(height)
         figure.set_layout_engine("none")  # a table of small panels, placed by hand
         _draw_table(figure, view, inputs, height)
         _draw_output(_output_axes(figure, height), view, kind)
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def _draw_table(figure: Figure, view: Arrays, inputs: list[int], height: float) -> None:

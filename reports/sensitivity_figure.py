@@ -15,6 +15,7 @@ from study.results.tables import SensitivityEntry
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINE_HEIGHT = 0.14
 FRAME_HEIGHT = 0.75
@@ -38,7 +39,8 @@ def sensitivity_figure(found: Sequence[SensitivityEntry]) -> bytes | None:
         return None
     lines, heads = layout(inner)
     bottom = lines[-1][0] + 0.8
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(FRAME_HEIGHT + LINE_HEIGHT * bottom)
         axes = figure.subplots()
         axes.set(xscale="log", ylim=(bottom, -0.9), xlim=(LEAST / 1.35, 1.6 * _most(inner)))
@@ -47,7 +49,9 @@ def sensitivity_figure(found: Sequence[SensitivityEntry]) -> bytes | None:
             _draw_line(axes, line)
         _label(axes, lines, heads)
         figure.legend(handles=_legend(inner, axes), loc="outside upper center", ncols=6)
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def layout(

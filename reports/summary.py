@@ -32,6 +32,7 @@ from reports.ranking import (
     times_first,
     tool_probe,
 )
+from reports.score_digits import decimals
 from study.results.folder import Results
 from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
@@ -256,9 +257,14 @@ def _winners(found: list[Lead], named: dict[str, str]) -> str:
     (first, most), *others = counts
     parts = [f"{named[first]} scores highest on {most} of {len(found)} measures"]
     parts += [f"{named[model]} on {times}" for model, times in others]
-    margins = [lead.margin for lead in found]
-    span = spread([fixed(margin, 4) for margin in (min(margins), max(margins))])
+    ends = min(found, key=lambda lead: lead.margin), max(found, key=lambda lead: lead.margin)
+    span = spread([printed_margin(lead) for lead in ends])
     return f"{', '.join(parts)}; leads over the next: {span}. {_resolution(found)}"
+
+
+def printed_margin(lead: Lead) -> str:
+    """A lead to the digits that its errors leave."""
+    return fixed(lead.margin, decimals(lead.error if lead.is_whole else None, lead.resampled))
 
 
 def _times_highest(found: list[Lead]) -> list[tuple[str, int]]:

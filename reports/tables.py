@@ -19,6 +19,7 @@ from reports.digits import (
     percent,
     quantity,
     significant,
+    spread,
     words,
 )
 from reports.paper import TABLE_III
@@ -31,7 +32,8 @@ from reports.ranking import (
     score_table,
     tool_probe,
 )
-from reports.summary import real_time_factor, status
+from reports.score_digits import printed_score, score_decimals
+from reports.summary import printed_margin, real_time_factor, status
 from study.results.folder import Results
 from study.results.records import CorrectionRecord, CurveErrors, ModelRecord, SystemEstimate
 from study.scene.file import resolved as resolved_scene
@@ -190,21 +192,26 @@ def similarity_tables(results: Results) -> list[dict[str, object]]:
 
 def _score_groups(results: Results, reference: str, heads: list[Column]) -> Iterator[Group]:
     """Scores by control point; a highest one bears a mark where its lead is resolved."""
-    named = labels(results)
+    named, places = labels(results), score_decimals(results)
     for probe in results.record.probes:
         scores = score_table(results, reference, probe)
         found = leads(results, reference, probe)
         winners = {(lead.best, lead.column) for lead in found if lead.is_resolved}
         rows = [
-            [named[model], *(_score(row.get(h), is_best=(model, h) in winners) for h in heads)]
+            [
+                named[model],
+                *(
+                    DASH
+                    if (value := row.get(head)) is None
+                    else printed_score(value, places, (model, reference, probe, *head))
+                    + (BEST if (model, head) in winners else "")
+                    for head in heads
+                ),
+            ]
             for model, row in scores.items()
         ]
         if rows:
             yield {"name": words(probe), "rows": rows}
-
-
-def _score(value: float | None, *, is_best: bool) -> str:
-    return DASH if value is None else fixed(value, 4) + (BEST if is_best else "")
 
 
 def lead_rows(results: Results) -> Table:
@@ -226,7 +233,7 @@ def _lead_row(lead: Lead, named: dict[str, str]) -> list[str]:
         MEASURE_NAMES.get(measure, measure),
         named[lead.best],
         named[lead.runner_up],
-        fixed(lead.margin, 4),
+        printed_margin(lead),
         f"± {tiny_too(max(lead.high - lead.margin, lead.margin - lead.low))}",
         tiny_too(lead.resampled),
         error if lead.is_whole or lead.error is None else f"≥ {error}",
@@ -241,13 +248,28 @@ def tiny_too(value: float) -> str:
 
 def paper_rows(results: Results) -> Table:
     """The paper's Table III beside this run's lowest and highest score against the benchmark."""
-    scores = score_table(results, "basafa", tool_probe(results))
-    tuned = {model.system: scores.get(model.name, {}) for model in results.record.models}
+    probe, places = tool_probe(results), score_decimals(results)
+    scores = score_table(results, "basafa", probe)
+    names = {model.system: model.name for model in results.record.models if model.system}
     rows = []
     for system, printed in TABLE_III.items():
-        ours = list(tuned.get(system, {}).values())
-        span = f"{fixed(min(ours), 4)} to {fixed(max(ours), 4)}" if ours else DASH
-        rows.append([f"Benchmark – {system_name(system)}", fixed(printed, 4), span])
+        name = names.get(system, "")
+        ours = sorted((value, head) for head, value in scores.get(name, {}).items())
+        ends = (
+            [
+                printed_score(value, places, (name, "basafa", probe, *head))
+                for value, head in (ours[0], ours[-1])
+            ]
+            if ours
+            else []
+        )
+        rows.append(
+            [
+                f"Benchmark – {system_name(system)}",
+                fixed(printed, 4),
+                spread(ends) if ends else DASH,
+            ]
+        )
     return rows
 
 

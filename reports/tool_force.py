@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 from reports import canvas
 from reports.appearance import labels, looks
 from reports.digits import DASH, Table, fixed, short, significant, with_error
+from reports.score_digits import LARGEST, NOT_RESOLVED, UNKNOWN, decimals
 from study.results.folder import Results
 from study.results.records import ToolForce
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST_TOOLS = 4
 ROW_HEIGHT, LEGEND_HEIGHT = 1.95, 0.3
@@ -28,7 +30,8 @@ def force_figure(results: Results) -> bytes | None:
     shown = tools(results)[:MOST_TOOLS]
     if not shown:
         return None
-    with canvas.style():
+
+    def draw() -> Figure:
         figure = canvas.sheet(LEGEND_HEIGHT + ROW_HEIGHT * len(shown))
         grid = figure.subplots(len(shown), 2, squeeze=False)
         for row, tool in zip(grid, shown, strict=True):
@@ -36,7 +39,9 @@ def force_figure(results: Results) -> bytes | None:
             row[0].set_title(short(tool), loc="left", fontweight="bold")
         handles, names = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper center", ncols=5)
-        return canvas.svg(figure)
+        return figure
+
+    return canvas.drawn(draw)
 
 
 def _draw(row: list[Axes], results: Results, tool: str) -> None:
@@ -56,7 +61,7 @@ def force_rows(results: Results) -> Table:
         [
             short(one.tool),
             named[one.model],
-            _force(one),
+            printed_force(one),
             fixed(one.peak_at_s, 3),
             fixed(MILLI * one.peak_travel_m, 1),
             significant(MILLI * one.work_j),
@@ -66,8 +71,8 @@ def force_rows(results: Results) -> Table:
     ]
 
 
-def _force(one: ToolForce) -> str:
-    """With the error of the whole curve, which is relative to all of it."""
+def printed_force(one: ToolForce) -> str:
+    """Largest force [N] with the error of the whole curve, which is relative to all of it."""
     if one.relative_error is None:
         return significant(one.peak_n)
     error = one.relative_error + (one.spacing_error or 0.0)
@@ -77,8 +82,10 @@ def _force(one: ToolForce) -> str:
 def _scores(results: Results, one: ToolForce) -> str:
     """Relative L2 score against each reference."""
     named = labels(results)
+    error = None if one.relative_error is None else one.relative_error + (one.spacing_error or 0.0)
+    places = None if (error or 0.0) >= LARGEST else min(UNKNOWN, decimals(error))
     found = [
-        f"{fixed(row.score, 2)} ({named[row.reference]})"
+        f"{NOT_RESOLVED if places is None else fixed(row.score, places)} ({named[row.reference]})"
         for row in results.tool_scores
         if (row.model, row.tool, row.measure) == (one.model, one.tool, "relative-l2")
     ]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 
 from reports import benchmarks
 from reports.benchmarks import Line
-from reports.configuration_names import name_of
+from reports.configuration_names import LIVER_EDGE, mark_of, name_of
 from reports.digits import Table, percent, with_error
+from reports.reference import is_built_in_liver
+from study.scene.file import validate
 
 NAME = "tradeoff"
 MILLI = 1e-3
@@ -47,7 +50,7 @@ class MeasuredConfiguration:
     none or it is not resolved; `bar`: own error of what it is compared with; `cost`: None for one
     that was not timed. `on_front`: whether
     the study found it on the Pareto front of all, `on_any_load_front` on that of those that follow
-    any load.
+    any load. `edge`: elements [m] of the scene's mesh, None where those of others are not known.
     """
 
     contender: str
@@ -61,11 +64,17 @@ class MeasuredConfiguration:
     bar: float
     cost: MeasuredCost | None
     of_force: bool = False
+    edge: float | None = None
 
     @property
     def name(self) -> str:
         """Name of the configuration: contender and settings in words."""
-        return name_of(self.contender, self.settings)
+        return name_of(self.contender, self.settings, self.edge)
+
+    @property
+    def mark(self) -> str:
+        """The setting that tells it apart from others of its contender first."""
+        return mark_of(self.settings, self.edge)
 
     @property
     def timing(self) -> MeasuredCost:
@@ -84,10 +93,22 @@ class MeasuredConfiguration:
 
 def configurations(folder: Traversable | None = None) -> list[MeasuredConfiguration]:
     """Configurations of a folder's table, or of that of the program; none if it is missing."""
-    return [_configuration(line) for line in benchmarks.read(NAME, folder)]
+    edge = _edge(folder)
+    return [_configuration(line, edge) for line in benchmarks.read(NAME, folder)]
 
 
-def _configuration(line: Line) -> MeasuredConfiguration:
+def _edge(folder: Traversable | None) -> float | None:
+    """Elements [m] of the mesh of a study's scene, None where its levels are not of one ratio."""
+    if folder is None:
+        return LIVER_EDGE
+    file = folder.joinpath("scene.toml")
+    if not file.is_file():
+        return None
+    scene = validate(tomllib.loads(file.read_text(encoding="utf-8")), "scene.toml")
+    return scene.reference.element_size if is_built_in_liver(scene) else None
+
+
+def _configuration(line: Line, edge: float | None) -> MeasuredConfiguration:
     judged = "force" if line.get("force_error_bar") else "field"
     return MeasuredConfiguration(
         contender=line["contender"],
@@ -101,6 +122,7 @@ def _configuration(line: Line) -> MeasuredConfiguration:
         bar=float(line[f"{judged}_error_bar"]),
         cost=_cost(line) if line["wall_per_s"] else None,
         of_force=judged == "force",
+        edge=edge,
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reports import canvas
 from reports.appearance import Style, series
-from reports.configuration_names import contender_name, mark_of
+from reports.configuration_names import contender_name
 from reports.digits import Table
 from reports.tradeoff import (
     MeasuredConfiguration,
@@ -109,7 +109,7 @@ def _draw_front(axes: Axes, chosen: Sequence[MeasuredConfiguration], dashes: str
     walls = [one.timing.quartiles[1] for one in by_cost]
     heights = [_height(one) for one in by_cost]
     axes.plot(walls, heights, drawstyle="steps-post", linestyle=dashes, **FRONT)
-    labels = [mark_of(one.settings) for one in by_cost]
+    labels = [one.mark for one in by_cost]
     named: tuple[float, float] | None = None
     for x, y, label, last in zip(walls, heights, labels, ["", *labels], strict=False):
         if dashes == "-" and label != last and not (named and _is_beside(named, (x, y))):

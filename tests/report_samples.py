@@ -151,8 +151,7 @@ def beforehand_pdf(figures: report.Figures | None = None) -> bytes:
 def printed(content: dict[str, Any], name: str = report.TEMPLATE) -> list[str]:
     """Every text in the figures and strong words of a document that typst lays out."""
 
-    def query(path: str, *, root: str, ignore_system_fonts: bool, pdf_standards: Any) -> bytes:
-        del pdf_standards
+    def query(path: str, *, root: str, ignore_system_fonts: bool, **_: Any) -> bytes:
         given: Any = {"root": root, "ignore_system_fonts": ignore_system_fonts}
         return "".join(typst.query(path, kind, **given) for kind in ("figure", "strong")).encode()
 

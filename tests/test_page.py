@@ -23,7 +23,7 @@ from reports.page.data import film, interpolation_error, page
 from study.commands.view import view
 from study.results import folder as results_folder
 from study.results.folder import ResultsError
-from study.results.records import BudgetPart, ErrorBudget
+from study.results.records import BudgetPart, CurveErrors, ErrorBudget
 from tests.report_samples import (
     MODELS,
     results_of,
@@ -200,6 +200,43 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
     assert "lattice.volume_term = true" in found
 
 
+def test_the_error_at_the_tool_is_told_with_the_errors_of_both():
+    found = answer(results_of())
+    assert "1.993 ± 0.002 mm at most" in said(results_of())
+    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) farther" in said(results_of())
+    assert found.numbers[1].value == "+1.00 ± 0.01 mm"
+
+
+def test_a_gap_at_the_tool_below_its_errors_is_not_resolved():
+    unsure = {name: CurveErrors(displacement=1.2, velocity=1.2) for name in ("tool", "far")}
+    found = with_mesh_error(by_probe=unsure)
+    assert "they are apart by less than their errors, 1.2 mm" in said(found)
+    assert answer(found).numbers[1].value == "< 1.2 mm"
+
+
+def test_a_gap_whose_errors_are_not_all_known_has_no_bar():
+    found = with_model(results_of(), "basafa", time_step_errors={})
+    assert "1.0 mm (100 %) farther, by errors that are not all known" in said(found)
+
+
+def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does_not():
+    assert "a frame at 60 Hz takes 8.3 of its 16.7 ms (50 %)" in said(results_of())
+    assert "Of those in time" not in said(results_of())
+    slow = with_model(results_of(), "basafa", wall_s=2.0)
+    assert "takes 33 of its 16.7 ms, and is not ready in time" in said(slow)
+    assert "Of those in time the nearest is MSM Mamdani: 40.0 % off" in said(slow)
+    for name in MODELS:
+        slow = with_model(slow, name, wall_s=2.0)
+    assert "No model that finished is ready in time here" in said(slow)
+
+
+def test_digits_of_the_table_of_motion_follow_the_error_of_the_curve():
+    """Of 1 mm and 3.1 mm/s known to 1 and 1.2 %, and of curves whose error is a thousandth."""
+    lines = {one.model: one for one in page(results_of()).probes[0].lines}
+    assert lines["fem"].decimals == (2, 2)
+    assert lines["basafa"].decimals == (3, 2)
+
+
 # --- what is drawn -------------------------------------------------------------------------------
 
 
@@ -326,11 +363,11 @@ def test_the_organ_turns_on_both_sides_and_shows_differences(moved):
 def test_the_surface_follows_the_time_and_the_sliders_move_each_other(moved):
     """Of the samples the surface is at rest at first, at its peak half way, and at a fifth last."""
     organ, peak = moved[0]["steps"]["organ"], 1e3 * np.abs(results_of().fields["fem"][0]).max()
-    assert f"Finite elements{0.2 * peak:#.4g}" in organ["end"]["table"]
+    assert f"Finite elements{0.2 * peak:#.3g}" in organ["end"]["table"]
     assert "at 1.000 s" in organ["end"]["table"]
     assert organ["end"]["other"] == "19"
     assert organ["end"]["cursor"] == pytest.approx(1.0)
-    assert f"Finite elements{0.5 * peak:#.4g}" in organ["middle"]["table"]
+    assert f"Finite elements{0.5 * peak:#.3g}" in organ["middle"]["table"]
     assert organ["middle"]["picture"] != organ["end"]["picture"]
 
 
@@ -343,7 +380,7 @@ def test_the_time_slider_moves_the_cursor_the_phase_plane_and_the_control_points
     assert motion["phase"][0] == pytest.approx([time, u], rel=1e-5)
     assert motion["phase"][2] == pytest.approx([u, v], rel=1e-5)
     assert motion["organMoved"]
-    assert f"{u:.4g}"[:4] in motion["table"]
+    assert f"Finite elements{u:.2f}{v:.2f}1.00" in motion["table"]  # known to 1 % of the largest
 
 
 def test_the_readings_move_estimates_sets_and_surface(moved):

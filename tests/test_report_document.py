@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+import zlib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typst
+from matplotlib.text import Text
 
-from reports import motion_figures, renders, report
+from reports import canvas, motion_figures, renders, report
 from reports.appearance import LOOKS, looks, other_look
 from reports.content import document
 from reports.field_figures import views
@@ -27,6 +31,7 @@ from tests.report_samples import (
     LABELS,
     MODELS,
     TITLE,
+    beforehand_pdf,
     known,
     results_of,
     whole,
@@ -100,6 +105,46 @@ def test_the_report_is_tagged_and_a_figure_without_a_text_is_refused(monkeypatch
     )
     with pytest.raises(typst.TypstError, match="alt"):
         report.pdf(results)
+
+
+SCRIPTS = {0.7 * 9.0, 0.5 * 9.0}
+"""Sizes [point] of sub- and superscripts of an equation in the text, and of theirs."""
+
+
+def sizes(made: bytes) -> set[float]:
+    """Sizes [point] of all text of a document that typst made, but for that in figures."""
+    found: set[float] = set()
+    for stream in re.finditer(rb"stream\r?\n(.*?)\r?\nendstream", made, re.DOTALL):
+        with suppress(zlib.error):
+            text = zlib.decompress(stream[1])
+            found |= {float(size) for size in re.findall(rb"/\w+ ([\d.]+) Tf", text)}
+    return found
+
+
+def test_no_text_is_below_8_point_but_scripts_of_equations():
+    """Negative control: a running text of 7.6 point is found."""
+    found = sizes(report.pdf(without_arrays()))
+    assert {8.0, 9.5} <= found
+    assert all(size >= 8.0 or any(abs(size - one) < 0.01 for one in SCRIPTS) for size in found)
+    assert min(sizes(beforehand_pdf())) >= 8.0
+    small = typst.compile(b"#set text(size: 7.6pt)\nsmall")
+    assert sizes(small) == {7.6}
+
+
+def test_no_text_of_a_figure_is_below_8_point(monkeypatch):
+    """Figures are printed as large as they are drawn."""
+    seen: list[float] = []
+    sound = canvas.svg
+
+    def measured(figure):
+        seen.extend(text.get_fontsize() for text in figure.findobj(Text) if text.get_text())
+        return sound(figure)
+
+    monkeypatch.setattr(canvas, "svg", measured)
+    monkeypatch.setattr(report, "available", lambda: 1)
+    report.draw(results_of())
+    assert len(seen) > 100
+    assert min(seen) >= canvas.TEXT_SIZE
 
 
 def test_every_figure_that_is_drawn_has_a_text_of_its_own():

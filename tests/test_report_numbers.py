@@ -329,8 +329,8 @@ def test_a_column_that_no_model_fills_is_left_out():
 
 
 def test_table_iii_stands_beside_the_range_of_all_measures():
-    score = fixed(score_of("msm-sugeno", "basafa"), 4)
-    assert ["Benchmark – Sugeno", "0.8549", f"{score} to {score}"] in paper_rows(results_of())
+    score = fixed(score_of("msm-sugeno", "basafa"), 2)  # whose error is not known
+    assert ["Benchmark – Sugeno", "0.8549", score] in paper_rows(results_of())
     assert pytest.approx(0.0049) == TABLE_III_SPREAD
     assert max(TABLE_III, key=TABLE_III.__getitem__) == "interval-type-2"
     assert SOFTNESS["msm-sugeno"] > SOFTNESS["msm-mamdani"]

@@ -49,8 +49,11 @@ def test_the_order_of_the_elements_bounds_that_of_the_error():
 
 
 def test_meshes_are_listed_from_coarse_to_fine():
-    assert found()["levels"][0] == ["2.00", "100", "1\u202f215", "0.90"]
-    assert found()["levels"][-1] == ["1.00", "800", "7\u202f803", "3.5"]
+    """By the edge [mm] of a regular tetrahedron, a³ / (6 √2), as large as their mean one."""
+    first, *_, last = found()["levels"]
+    assert first == ["24.2", "100", "1\u202f215", "0.90"]
+    assert last == ["12.1", "800", "7\u202f803", "3.5"]
+    assert pytest.approx(0.0121**3 / (6 * 2**0.5), rel=1e-2) == 1.667e-4 / 800
 
 
 def test_with_two_meshes_the_order_is_assumed():

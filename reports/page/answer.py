@@ -4,28 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from reports import budget
-from reports.appearance import labels, reference_name
-from reports.differences import ELEMENTS, elements, field_errors, finite_elements, own_error
-from reports.digits import DASH, percent, significant, spread, with_error, words
+from reports.appearance import labels, reference_name, system_name
+from reports.differences import (
+    ELEMENTS,
+    elements,
+    field_errors,
+    finite_elements,
+    own_error,
+    resolved,
+)
+from reports.digits import DASH, fixed, percent, significant, spread, with_error, words
 from reports.motion_figures import peak
 from reports.ranking import references, tool_probe
 from reports.summary import printed_peak, status
+from reports.tool_force import MOST_TOOLS, printed_force, tools
 from study.results.folder import Results
 from study.results.numerical import numerical_errors, whole_error
-from study.results.records import ModelRecord
+from study.results.records import BudgetPart, ModelRecord
 
 MILLI = 1e3
-NEGLIGIBLE = 5e-4
-"""Relative error below which it shows in none of three digits."""
+NEGLIGIBLE = 5e-5
+"""Relative error below which it shows in none of four digits."""
 PEAK = "field-relative-l2-peak"
-_KINDS = {
-    False: "± by the time steps, not of the model",
-    True: "the time steps' error shows in no digit",
+FRAME_RATE = 60.0
+"""Of a display [Hz], by whose frames a cost is told."""
+GLOSSES = {
+    "reading": ", springs of the stiffness that is read, without a fuzzy system",
+    "tissue": ", springs of the stiffness that the reference has",
+    "basafa": ", the nonlinear mass-spring model of the paper",
 }
+"""What models without a fuzzy system are, by name."""
+CHOOSE = (
+    "Which spacing, and so which error, your machine has time for: liver-study recommend SCENE "
+    '--rate "60 Hz".'
+)
 REMEDIES = {
     "stiffness": (
         "another estimate of stiffness (patient, fuzzy.knowledge) changes it; a finer lattice "
@@ -165,7 +182,10 @@ def _answers(results: Results, found: Nearest) -> Iterator[str]:
     yield _which(results, found)
     yield from _at_the_tool(results, found)
     yield _cost(results, found.model)
+    yield from _in_time(results, found)
     yield from _limit(results, found)
+    if found.is_field:
+        yield CHOOSE
 
 
 def _which(results: Results, found: Nearest) -> str:
@@ -186,9 +206,16 @@ def _which(results: Results, found: Nearest) -> str:
         else " That is a difference of two models: without finite elements it is no error."
     )
     return (
-        f"Nearest to {reference} is {found.model.label}: {what} differs by "
+        f"Nearest to {reference} is {found.model.label}{_gloss(found.model)}: {what} differs by "
         f"{_difference(found)}, relative L2.{alike}{caution}"
     )
+
+
+def _gloss(model: ModelRecord) -> str:
+    """What a model is, for whoever meets its name here first."""
+    if model.system is None:
+        return GLOSSES.get(model.name, "")
+    return f", springs of the stiffness that the fuzzy system {system_name(model.system)} estimates"
 
 
 def _difference(found: Nearest) -> str:
@@ -207,17 +234,67 @@ def _whose(found: Nearest) -> str:
 
 
 def _stated(value: float, error: float) -> str:
-    """A number with its error, or to three digits where it is known to more."""
-    return significant(value) if error < NEGLIGIBLE * abs(value) else with_error(value, error)
+    """A number with its error, or to four digits where it is known to more."""
+    return significant(value, 4) if error < NEGLIGIBLE * abs(value) else with_error(value, error)
 
 
 def _at_the_tool(results: Results, found: Nearest) -> Iterator[str]:
     own, theirs = (_peak(results, name) for name in (found.model.name, found.reference))
     if DASH not in {own, theirs}:
+        gap = _gap(results, found)
         yield (
             f"At the control point {words(tool_probe(results))} it moves by {own} mm at most, "
-            f"{reference_name(results, found.reference)} by {theirs} mm."
+            f"{reference_name(results, found.reference)} by {theirs} mm: {gap.told}."
         )
+    yield from _forces(results, found)
+
+
+def _forces(results: Results, found: Nearest) -> Iterator[str]:
+    """Largest force on each tool that is moved, of the nearest model and of the reference."""
+    forces = {(one.model, one.tool): one for one in results.record.tools}
+    for tool in tools(results)[:MOST_TOOLS]:
+        pair = [forces.get((name, tool)) for name in (found.model.name, found.reference)]
+        own, theirs = ("not known" if one is None else printed_force(one) for one in pair)
+        yield (
+            f"The largest force on {words(tool)} is {own} N, of "
+            f"{reference_name(results, found.reference)} {theirs} N."
+        )
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """How far the largest displacements at the tool are apart, printed with the errors of both."""
+
+    value: str
+    share: str
+    is_more: bool
+    is_resolved: bool
+    is_known: bool
+
+    @property
+    def told(self) -> str:
+        """As the end of a sentence."""
+        if not self.is_resolved:
+            return f"they are apart by less than their errors, {self.value}"
+        caution = "" if self.is_known else ", by errors that are not all known"
+        too = "farther" if self.is_more else "less far"
+        return f"{self.value} ({self.share}) {too}{caution}"
+
+
+def _gap(results: Results, found: Nearest) -> _Gap:
+    """Of two models that both moved."""
+    probe = tool_probe(results)
+    models = found.model, results.model(found.reference)
+    own, theirs = (MILLI * (peak(results, one.name, probe) or 0.0) for one in models)
+    errors = [curve_error(one, probe) for one in models]
+    gap, share = abs(own - theirs), abs(own - theirs) / theirs if theirs else 0.0
+    known = [e * u for e, u in zip(errors, (own, theirs), strict=True) if e is not None]
+    is_known, is_resolved = len(known) == len(errors), gap > sum(known)
+    if not is_resolved:
+        value = significant(sum(known), 2)
+    else:
+        value = _stated(gap, sum(known)) if is_known else significant(gap, 2)
+    return _Gap(f"{value} mm", _two_digits(share), own > theirs, is_resolved, is_known)
 
 
 def _peak(results: Results, name: str) -> str:
@@ -232,20 +309,63 @@ def _peak(results: Results, name: str) -> str:
     return _stated(MILLI * largest, MILLI * largest * error)
 
 
-def curve_error(model: ModelRecord, probe: str) -> float | None:
-    """Relative numerical error of a displacement curve, None where a part is not known."""
-    return whole_error(numerical_errors(model, [], probe, "displacement"))
+def curve_error(
+    model: ModelRecord, probe: str, curve: Literal["displacement", "velocity"] = "displacement"
+) -> float | None:
+    """Relative numerical error of a curve, None where a part is not known."""
+    return whole_error(numerical_errors(model, [], probe, curve))
 
 
 def _cost(results: Results, model: ModelRecord) -> str:
-    if not model.wall_s:
+    share = frame_share(model)
+    if share is None:
         return f"{model.label} was not timed."
-    factor = significant(model.simulated_s / model.wall_s, 2)
+    factor = significant(1.0 / share, 2)
     workers = results.record.workers
     beside = f", with {workers} stages at a time on this machine" if workers > 1 else ""
+    wall, simulated = significant(model.wall_s or 0.0, 2), significant(model.simulated_s)
     return (
-        f"It took {significant(model.wall_s, 2)} s for {significant(model.simulated_s)} s of "
-        f"motion, {factor} times as fast as real time; timed once{beside}."
+        f"It took {wall} s for {simulated} s of motion, {factor} times as fast as real time: in "
+        f"the mean a frame at 60 Hz takes {_frame(share)}; timed once{beside}."
+    )
+
+
+def frame_share(model: ModelRecord) -> float | None:
+    """Share of the time of a frame, at any rate, that the motion within it took in the mean."""
+    return model.wall_s / model.simulated_s if model.wall_s else None
+
+
+def _two_digits(share: float) -> str:
+    """A share as a percentage that is known to no more."""
+    return f"{significant(100.0 * share, 2)} %"
+
+
+def _frame(share: float) -> str:
+    """The time of a frame at 60 Hz and whether it is ready in time."""
+    period = MILLI / FRAME_RATE
+    taken = f"{significant(share * period, 2)} of its {fixed(period, 1)} ms"
+    if share > 1.0:
+        return f"{taken}, and is not ready in time"
+    return f"{taken} ({_two_digits(share)})"
+
+
+def _in_time(results: Results, found: Nearest) -> Iterator[str]:
+    """The nearest of the models that keep up, where the nearest of all does not."""
+    if (frame_share(found.model) or 0.0) <= 1.0 or not found.is_field:
+        return
+    shares = {
+        name: share
+        for name, share in _shares(results, found.reference).items()
+        if 0.0 < (frame_share(results.model(name)) or 0.0) <= 1.0
+    }
+    if not shares:
+        yield "No model that finished is ready in time here."
+        return
+    best = min(shares, key=lambda name: shares[name])
+    taken = frame_share(results.model(best)) or 0.0
+    yield (
+        f"Of those in time the nearest is {labels(results)[best]}: {percent(shares[best])} off, a "
+        f"frame takes {_frame(taken)}."
     )
 
 
@@ -266,8 +386,19 @@ def _limit(results: Results, found: Nearest) -> Iterator[str]:
             remedy = REMEDIES.get(largest.cause)
             yield (
                 f"What limits it most is the {cause}, {budget.signed(largest.contribution)} of "
-                f"{percent(one.total)}{': ' + remedy if remedy else ''}."
+                f"{percent(one.total)}{': ' + remedy if remedy else ''}{_left(results, largest)}."
             )
+
+
+def _left(results: Results, part: BudgetPart) -> str:
+    """What freeing the Poisson ratio leaves, where that is the cause and was tried."""
+    limits = results.record.lattice_limits
+    if part.cause != "Poisson ratio" or limits is None:
+        return ""
+    left = limits.relative_l2_with_volume_term
+    if left is None:
+        return ""
+    return f", and leaves {resolved(left, own_error(results))} at rest and with the exact modulus"
 
 
 # --- numbers -------------------------------------------------------------------------------------
@@ -284,19 +415,33 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
         is_seen = found.error >= NEGLIGIBLE * found.share
         kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} shows in no digit"
         yield Number(f"difference {what}", value, kind)
-    own = _peak(results, found.model.name)
-    if own != DASH:
-        error = curve_error(found.model, tool_probe(results))
-        kind = "error of the steps not known" if error is None else _KINDS[error < NEGLIGIBLE]
-        yield Number(f"largest displacement at {words(tool_probe(results))}", f"{own} mm", kind)
+    if DASH not in {_peak(results, name) for name in (found.model.name, found.reference)}:
+        yield _number_at_the_tool(results, found)
     yield from _third(results, found.model)
+
+
+def _number_at_the_tool(results: Results, found: Nearest) -> Number:
+    """How far the largest displacement is off that of the reference."""
+    gap, probe = _gap(results, found), tool_probe(results)
+    name = f"largest displacement at {words(probe)}, off by"
+    theirs = _peak(results, found.reference)
+    if not gap.is_resolved:
+        return Number(name, f"< {gap.value}", f"not resolved, of {theirs} mm")
+    sign = "+" if gap.is_more else "−"
+    kind = "" if gap.is_known else "; errors not all known"
+    return Number(name, f"{sign}{gap.value}", f"{gap.share} of {theirs} mm{kind}")
 
 
 def _third(results: Results, model: ModelRecord) -> Iterator[Number]:
     """How fast, or of a point, which is not timed, how stiff."""
-    if model.wall_s:
-        factor = significant(model.simulated_s / model.wall_s, 2)
-        yield Number("speed", f"{factor} × real time", "timed once: its spread is not known")
+    share = frame_share(model)
+    if share is not None:
+        period = MILLI / FRAME_RATE
+        value = f"{significant(share * period, 2)} ms of {fixed(period, 1)}"
+        kept = "in time" if share <= 1.0 else "not in time"
+        yield Number(
+            "a frame at 60 Hz", value, f"{kept}, in the mean; timed once, spread not known"
+        )
         return
     estimates = results.record.fuzzy.systems
     if model.system in estimates:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports import fuzzy_figures, tradeoff
 from reports.appearance import labels, looks, reference_name, system_colour, system_name
-from reports.digits import short, words
+from reports.digits import fixed, short, words
 from reports.field_figures import HELD, LOADED, drawable, exaggeration
 from reports.motion_figures import ProbeMotion, motions
-from reports.page.answer import nearest
+from reports.page.answer import curve_error, nearest
 from reports.ranking import columns, references, score_table, tool_probe
+from reports.score_digits import Key, printed_score, score_decimals
 from reports.tables import CURVE_NAMES, MEASURE_NAMES
 from study.results.folder import Results
 
@@ -24,6 +26,12 @@ Floats = NDArray[np.float64]
 KILO = 1e-3
 MILLI = 1e3
 MOST_SETS = 12
+INTERVAL = 3
+"""Decimals at most of the ends of an interval."""
+DECIMALS = 9
+ROUND = 1e-3
+"""Share of the largest value of a curve to which it is printed at the finest."""
+CURVES: tuple[Literal["displacement"], Literal["velocity"]] = ("displacement", "velocity")
 SHADES = 33
 STEPS = 2**15 - 1
 """Of a displacement, up to the largest."""
@@ -44,11 +52,14 @@ class Packed:
 class Line:
     """A model's motion at a control point: rows time [s], displacement [mm], velocity [mm/s].
 
-    `lower` and `upper`: the same of the runs at both ends of a stiffness interval, if any.
+    `decimals`: of a displacement and a velocity that the errors of the curves by mesh and steps
+    leave, three digits of the largest where they are not known. `lower` and `upper`: the motion of
+    the runs at both ends of a stiffness interval, if any.
     """
 
     model: str
     motion: Packed
+    decimals: tuple[int, int]
     lower: Packed | None
     upper: Packed | None
 
@@ -105,11 +116,14 @@ class Organ:
 
 @dataclass(frozen=True)
 class Cell:
-    """A score and the block interval of it, if it is known."""
+    """A score, for its shade, and as printed to the digits that its error leaves.
+
+    `interval`: over blocks of the motion, printed; empty where it is not known.
+    """
 
     score: float
-    low: float | None
-    high: float | None
+    printed: str
+    interval: str
 
 
 @dataclass(frozen=True)
@@ -252,15 +266,27 @@ def _scale() -> tuple[str, ...]:
 
 def _probe(results: Results, name: str) -> Probe:
     named = {model.label: model.name for model in results.record.models}
-    found = tuple(_line(named[one.look.label], one) for one in motions(results, name))
+    found = tuple(
+        _line(model, one, [curve_error(results.model(model), name, curve) for curve in CURVES])
+        for one in motions(results, name)
+        if (model := named[one.look.label])
+    )
     return Probe(name, found)
 
 
-def _line(model: str, one: ProbeMotion) -> Line:
+def _decimals(values: Floats, error: float | None) -> int:
+    """Decimals down to the first digit of an error that is relative to the largest value."""
+    largest = float(np.abs(values).max(initial=0.0))
+    known = largest * (ROUND if error is None else max(error, ROUND))
+    return DECIMALS if known == 0.0 else int(np.clip(-np.floor(np.log10(known)), 0, DECIMALS))
+
+
+def _line(model: str, one: ProbeMotion, errors: Sequence[float | None]) -> Line:
     lower, upper = one.bounds or (None, None)
     return Line(
         model,
         packed(one.motion),
+        (_decimals(one.motion[1], errors[0]), _decimals(one.motion[2], errors[1])),
         None if lower is None else packed(lower),
         None if upper is None else packed(upper),
     )
@@ -308,14 +334,16 @@ def _measure(curve: str, measure: str) -> str:
 
 
 def _matrices(results: Results) -> Iterator[Matrix]:
-    heads, named = columns(results), labels(results)
+    heads, named, places = columns(results), labels(results), score_decimals(results)
     intervals = {row[:5]: (row.low, row.high) for row in results.score_errors}
     for reference in references(results):
         for probe in results.record.probes:
             scores = score_table(results, reference, probe)
             rows = tuple(
                 tuple(
-                    _cell(row.get(head), intervals.get((model, reference, probe, *head)))
+                    None
+                    if (score := row.get(head)) is None
+                    else _cell(score, (model, reference, probe, *head), places, intervals)
                     for head in heads
                 )
                 for model, row in scores.items()
@@ -325,11 +353,16 @@ def _matrices(results: Results) -> Iterator[Matrix]:
                 yield Matrix(of, probe, tuple(named[name] for name in scores), rows)
 
 
-def _cell(score: float | None, interval: tuple[float, float] | None) -> Cell | None:
-    if score is None:
-        return None
-    low, high = interval or (None, None)
-    return Cell(*(None if x is None else float(f"{x:.6g}") for x in (score, low, high)))  # type: ignore[arg-type]
+def _cell(
+    score: float,
+    key: Key,
+    places: Mapping[Key, int | None],
+    intervals: Mapping[Key, tuple[float, float]],
+) -> Cell:
+    shown = places.get(key)
+    ends = () if shown is None else intervals.get(key, ())
+    interval = " to ".join(fixed(end, min(shown or 0, INTERVAL)) for end in ends)
+    return Cell(float(f"{score:.6g}"), printed_score(score, places, key), interval)
 
 
 # --- fuzzy systems -------------------------------------------------------------------------------

@@ -92,7 +92,7 @@
   // --- motion ------------------------------------------------------------------------------
 
   const motion = new Map(data.probes.map((probe) => [probe.name, probe.lines.map((line) => ({
-    model: line.model, rows: rows(line.motion),
+    model: line.model, decimals: line.decimals, rows: rows(line.motion),
     bounds: line.lower && [rows(line.lower), rows(line.upper)] }))]));
   const longest = [...motion.values()].flat().reduce(
     (best, one) => (one.rows[0].length > best.length ? one.rows[0] : best), new Float32Array(0));
@@ -160,6 +160,12 @@
     return { range: [low - room, high + room] };
   }
 
+  /** A number with so many decimals, and no sign where they are all nought. */
+  function fixed(x, decimals) {
+    const text = x.toFixed(decimals);
+    return Number(text) === 0 ? text.replace("-", "") : text;
+  }
+
   function tellMotion(found, time) {
     const told = time === undefined ? "" : `${time.toFixed(3)} s`;
     $("time-out").value = told;
@@ -168,9 +174,9 @@
       ["model", "displacement [mm]", "velocity [mm/s]", "largest displacement [mm]"],
       found.map((one) => {
         const over = state.sample >= one.rows[0].length;
-        const now = over ? ["lost", "lost"] : [1, 2].map((i) => one.rows[i][state.sample].toPrecision(4));
+        const now = over ? ["lost", "lost"] : [1, 2].map((i) => fixed(one.rows[i][state.sample], one.decimals[i - 1]));
         const peak = one.rows[1].reduce((most, u) => Math.max(most, Math.abs(u)), 0);
-        return [label(one.model), ...now, peak.toPrecision(4)];
+        return [label(one.model), ...now, fixed(peak, one.decimals[0])];
       }));
   }
 
@@ -341,8 +347,8 @@
     const of = data.organ.reference, against = of && displacement(of);
     const body = [...organ.films.keys()].filter((name) => displacement(name)).map((name) => {
       const u = displacement(name);
-      const off = against && name !== of ? largest(lengths(u, against)).toPrecision(4) : "–";
-      return [label(name), largest(lengths(u)).toPrecision(4), off];
+      const off = against && name !== of ? largest(lengths(u, against)).toPrecision(3) : "–";
+      return [label(name), largest(lengths(u)).toPrecision(3), off];
     });
     fill($("organ-table"), `At the vertices of the surface, which may miss the control points, at ${(longest[state.sample] || 0).toFixed(3)} s`, ["model", "largest displacement [mm]",
       of ? `largest difference to ${label(of)} [mm]` : "difference"], body);
@@ -414,10 +420,10 @@
   function score(cell) {
     const made = document.createElement("span");
     if (!cell) { made.textContent = "–"; return made; }
-    made.textContent = cell.score.toFixed(4);
-    if (cell.low !== null) {
+    made.textContent = cell.printed;
+    if (cell.interval) {
       const small = document.createElement("small");
-      small.textContent = `${cell.low.toFixed(3)} to ${cell.high.toFixed(3)}`;
+      small.textContent = cell.interval;
       made.append(small);
     }
     return made;

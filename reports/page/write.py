@@ -14,8 +14,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 
-from reports import summary
-from reports.digits import Table, words
+from reports import summary, tradeoff, tradeoff_answers
+from reports.digits import Table, symbols, words
 from reports.page.answer import Answer, answer, question
 from reports.page.data import page
 from reports.tables import provenance_rows
@@ -100,10 +100,11 @@ def _written(results: Results) -> Mapping[str, str]:
         "warnings": _warnings(results),
         "glance": _glance(results),
         "summary": _items(summary.sentences(results)),
+        "tradeoff": _items(tradeoff_answers.sentences(tradeoff.configurations())),
         "scene": markup.escape(write_scene(results.scene)),
         "provenance": table(("what", "which"), provenance_rows(results), "What made this run"),
         "notes": _items(words(text) for text in results.record.notes),
-        "assumptions": _items(words(text) for text in results.record.assumptions),
+        "assumptions": _items(words(symbols(text)) for text in results.record.assumptions),
     }
 
 

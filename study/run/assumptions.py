@@ -78,8 +78,8 @@ def _held(support: Support) -> str:
     )
     if support.kind == FOUNDATION:
         return (
-            f"The organ rests on an elastic foundation of {support.stiffness:.3g} Pa/m over "
-            f"{where}, the same field for every model and mesh, and so is the tool's traction."
+            f"The organ rests on an elastic foundation of {1e-6 * support.stiffness:.3g} MPa/m "
+            f"over {where}, the same field for every model and mesh, and so is the tool's traction."
         )
     how = "is clamped" if support.kind == CLAMPED else f"slides across the line to {support.side}"
     return (
