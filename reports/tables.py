@@ -396,6 +396,7 @@ def provenance_rows(results: Results) -> Table:
     rows = [["versions", versions]]
     keys = ["commit", "platform", "processor", "seed", "scene_sha256", "mesh_sha256"]
     keys += ["rule_base_sha256"] if found.rule_base_sha256 else []
+    keys += ["tissue_sha256"] if found.tissue_sha256 else []
     for key in keys:
         value = getattr(found, key)
         rows.append([key.replace("_", " "), DASH if value is None else words(str(value))])

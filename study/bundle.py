@@ -1,7 +1,7 @@
 """A run in one archive, from which another machine makes its reports again, for `bundle`.
 
 README.txt       what the archive holds      results/     the results folder with its reports
-credibility.md   in terms of ASME V&V 40     inputs/      scene, mesh and rule base that it names
+credibility.md   in terms of ASME V&V 40     inputs/      scene and the files that it names
 CITATION.cff     how to cite                 environment/ installed versions, the lock file
 SHA256SUMS       of all these
 
@@ -25,7 +25,13 @@ from study.folders import check_file, write_bytes
 from study.results import folder as results_folder
 from study.results import manifest
 from study.results.folder import Results, ResultsError
-from study.results.provenance import ROOT, mesh_sha256, rule_base_sha256
+from study.results.provenance import (
+    ROOT,
+    mesh_sha256,
+    rule_base_sha256,
+    tissue_files,
+    tissue_sha256,
+)
 from study.scene import Scene
 from study.scene.file import write_scene
 
@@ -97,6 +103,7 @@ def _check_inputs(found: Results) -> None:
     for key, digest, then in (
         ("organ.mesh", mesh_sha256(scene.organ.mesh), made_by.mesh_sha256),
         ("fuzzy.rule_base", rule_base_sha256(scene.fuzzy.rule_base), made_by.rule_base_sha256),
+        (" or ".join(tissue_files(scene)), tissue_sha256(scene), made_by.tissue_sha256),
     ):
         if digest != then:
             raise ValueError(
@@ -116,7 +123,30 @@ def _inputs(scene: Scene) -> dict[str, bytes]:
         name = f"rules{Path(rules).suffix}"
         found[f"inputs/{name}"] = Path(rules).read_bytes()
         scene = replace(scene, fuzzy=replace(scene.fuzzy, rule_base=name))
+    of_tissue, scene = _with_tissue(scene)
+    found |= of_tissue
     return found | {"inputs/scene.toml": write_scene(scene).encode()}
+
+
+def _with_tissue(scene: Scene) -> tuple[dict[str, bytes], Scene]:
+    """Meshes of inclusions and the map of stiffness, and the scene that names them so."""
+    found: dict[str, bytes] = {}
+
+    def kept(file: str, stem: str) -> str:
+        ends = Path(file).suffixes
+        name = stem + "".join(ends[-2:] if ends[-1:] == [".gz"] else ends[-1:])
+        found[f"inputs/{name}"] = Path(file).read_bytes()
+        return name
+
+    tissue = scene.tissue
+    inclusions = tuple(
+        one if one.mesh is None else replace(one, mesh=kept(one.mesh, f"inclusion-{number}"))
+        for number, one in enumerate(tissue.inclusion, 1)
+    )
+    image = tissue.stiffness_map
+    if image is not None:
+        image = replace(image, file=kept(image.file, "stiffness-map"))
+    return found, replace(scene, tissue=replace(tissue, inclusion=inclusions, stiffness_map=image))
 
 
 def _citation() -> bytes:

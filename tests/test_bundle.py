@@ -17,7 +17,9 @@ from study.commands.bundle import bundle as bundle_command
 from study.commands.report import report as report_command
 from study.results import folder as results_folder
 from study.results.folder import ResultsError
+from study.results.provenance import tissue_sha256
 from study.scene.file import read_scene, write_scene
+from study.scene.schema import Inclusion, OrganTissue, StiffnessMap
 from tests.report_samples import results_of, whole, with_mesh_error, with_model, with_record
 
 
@@ -153,6 +155,33 @@ def test_the_mesh_goes_with_the_run_and_must_be_that_of_it(tmp_path):
     bundle._check_inputs(found)
     mesh.write_text("solid other\nendsolid\n")
     with pytest.raises(ValueError, match=r"organ\.mesh: the file has changed since the run"):
+        bundle._check_inputs(found)
+
+
+def test_files_of_the_tissue_go_with_the_run_and_must_be_those_of_it(tmp_path):
+    shape, image = tmp_path / "a tumour.STL", tmp_path / "p.1.nii.gz"
+    shape.write_text("solid\nendsolid\n")
+    image.write_bytes(b"voxels")
+    base = whole()
+    tissue = OrganTissue(
+        inclusion=(Inclusion(youngs_modulus=2e4, mesh=str(shape), unit="mm"),),
+        stiffness_map=StiffnessMap(file=str(image), quantity="shear-modulus", unit="kPa"),
+    )
+    scene = replace(base.scene, tissue=tissue)
+    made_by = replace(base.record.provenance, tissue_sha256=tissue_sha256(scene))
+    found = with_record(replace(base, scene=scene), provenance=made_by)
+    inputs = bundle._inputs(found.scene)
+    assert inputs["inputs/inclusion-1.STL"] == shape.read_bytes()
+    assert inputs["inputs/stiffness-map.nii.gz"] == b"voxels"
+    assert str(tmp_path).encode() not in inputs["inputs/scene.toml"]
+    for name, data in inputs.items():
+        (tmp_path / name.removeprefix("inputs/")).write_bytes(data)
+    again = read_scene(str(tmp_path / "scene.toml")).tissue
+    assert again.inclusion[0].mesh == str(tmp_path / "inclusion-1.STL")
+    assert again.stiffness_map.file == str(tmp_path / "stiffness-map.nii.gz")
+    bundle._check_inputs(found)
+    image.write_bytes(b"other voxels")
+    with pytest.raises(ValueError, match=r"stiffness_map\.file: the file has changed since"):
         bundle._check_inputs(found)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
@@ -10,6 +12,7 @@ from fem_reference import model as fem
 from fem_reference.burden import Burden, laden
 from fem_reference.contact.law import Areas, dragged, forces
 from fem_reference.contact.motion import Pressed, at_peak, run
+from fem_reference.contact.patch import patch
 from fem_reference.contact.reduction import answered, krylov, reduced
 from fem_reference.elasticity import discretise
 from study.known import pressed
@@ -295,3 +298,18 @@ def test_steps_in_time_are_refused_under_a_moved_tool(tmp_path):
 def test_forces_of_spheres_and_punches_are_those_of_closed_form():
     for finding in indentation.findings():
         assert finding.difference < finding.limit, finding.quantity
+
+
+@pytest.mark.parametrize("radius", [1e-3, 0.1])
+def test_a_bonded_plate_holds_what_is_flush_with_it_whatever_its_radius(radius):
+    """Of a top that is flat for x > 30 mm and slopes down from there."""
+    mesh = block_mesh(SIZE, 0.015)
+    points = mesh.points * np.ones(3)
+    points[:, 2] *= 1.0 + 0.2 * np.clip(points[:, 0] / 0.03, 0.0, 1.0)
+    blunt, support = ToolPatch(points[-1], DOWN, 0.02, 0.0), Foundation(DOWN, 0.0, 1e-3, 1e7)
+    body = discretise(replace(mesh, points=points), TISSUE, support, blunt, "p2")
+    plate = RigidTool("tool", PLATE, radius, points[-1], DOWN, tool().travel, bonded=True)
+    held = patch(body, plate, np.linspace(0.0, 0.1, 5), 1e-3).points
+    assert held[:, 0].min() > 0.0298
+    assert np.ptp(held[:, 1]) > 0.05
+    assert np.abs(held[:, 2] - 0.036).max() < 0.061e-3

@@ -6,6 +6,7 @@ import pytest
 from fem_reference import model as fem
 from fem_reference.solvers import solve_static
 from study.check import describe_scene
+from study.mesh.tetrahedra import volumes
 from study.problem.varied import VariedTissue, of_tetrahedra
 from study.results.provenance import organ_sha256
 from study.scene.file import read_scene, validate, write_scene
@@ -89,6 +90,17 @@ def test_zeros_are_tissue_as_around_and_do_not_soften_what_is_beside_them(tmp_pa
     assert "20 kPa" in told[0]
     with pytest.raises(ValueError, match=r"has no value in it; set its elsewhere"):
         problem_of(scene_of(path, "tissue.stiffness_map.elsewhere=refused"))
+
+
+@pytest.mark.parametrize("shape", [(34, 24, 1), (34, 24, 2)])
+def test_an_image_goes_to_the_faces_of_its_outer_voxels(tmp_path, shape):
+    """Slices of 2 mm through a block of 30 mm have 2 mm of it each, half of them beyond centres."""
+    path = image(tmp_path / "map.nii", lambda p: np.full(p.shape[:-1], 20.0), shape, (2, 2, 12))
+    problem = problem_of(scene_of(path))
+    made = of_tetrahedra(problem.geometry.mesh, problem.tissue)
+    assert volumes(problem.geometry.mesh) @ made.mapped_share == pytest.approx(
+        shape[2] * 2e-3 * 0.06 * 0.04, rel=0.03
+    )
 
 
 @pytest.mark.parametrize(
@@ -185,6 +197,13 @@ def test_an_inclusion_that_is_none_is_refused(change, message):
     given = {key: value for key, value in (BALL | change).items() if value is not None}
     with pytest.raises(ValueError, match=message):
         problem_of(with_inclusions(given))
+
+
+def test_an_inclusion_that_later_ones_cover_is_refused_as_such():
+    small = BALL | {"radius": "8 mm"}
+    assert problem_of(with_inclusions(BALL, small))
+    with pytest.raises(ValueError, match=r"inclusion\.1: later inclusions, .*, cover all of it"):
+        problem_of(with_inclusions(small, BALL))
 
 
 def test_check_tells_of_a_scene_with_inclusions(tmp_path):

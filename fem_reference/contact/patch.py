@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from fem_reference.elasticity import Body, rows
-from study.problem.rigid import PLATE, SPHERE, RigidTool
+from study.problem.rigid import SPHERE, RigidTool
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -207,21 +207,11 @@ def _under(surface: Any, tool: RigidTool, times: Floats, margin: float) -> Bools
     facing = (normals @ tool.axis) < 0.0
     flat = points.reshape(-1, 3)
     if tool.bonded:
-        return np.asarray(facing & _held(flat, tool).reshape(facing.shape))
+        return np.asarray(tool.holds(flat, normals.reshape(-1, 3)).reshape(facing.shape))
     near = np.full(len(flat), np.inf)
     for time in times:
         near = np.minimum(near, tool.gap(flat, float(time))[0])
     return np.asarray(facing & (near.reshape(facing.shape) < margin))
-
-
-def _held(points: Floats, tool: RigidTool) -> Bools:
-    """Which points (n, 3) a bonded tool holds: within its radius of the axis, near its tip."""
-    offset = points - tool.tip
-    along = offset @ tool.axis
-    if tool.shape == PLATE:
-        return np.asarray(along < tool.radius)
-    across = np.linalg.norm(offset - along[:, None] * tool.axis, axis=1)
-    return np.asarray((across <= tool.radius) & (np.abs(along) < tool.radius))
 
 
 def directions(tool: RigidTool) -> Floats:

@@ -32,8 +32,8 @@ class Problem:
     each station of its way, the first tool at the first of them.
     `gravity` [m/s^2] (3,) acts on the tissue and on `weights`; with `given_loaded` the geometry is
     the shape at rest under it, and displacements count from there. `probes`: names of the control
-    points. Two problems are the same only if they are one object, so that what is assembled for
-    one is kept by it.
+    points; `of_tools`: what was found of rigid tools. Two problems are the same only if they are
+    one object, so that what is assembled for one is kept by it.
     """
 
     geometry: Geometry
@@ -50,6 +50,7 @@ class Problem:
     gravity: Floats = field(default_factory=lambda: np.zeros(3))
     weights: tuple[Weight, ...] = ()
     given_loaded: bool = False
+    of_tools: tuple[str, ...] = ()
 
     @property
     def is_burdened(self) -> bool:
@@ -91,8 +92,9 @@ class Problem:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was found or assumed of the organ, and how much of it is of other tissue."""
-        return (*self.geometry.notes, *notes_of(self.geometry.mesh, self.tissue))
+        """What was found or assumed of the organ, how much is of other tissue, and of tools."""
+        of_tissue = notes_of(self.geometry.mesh, self.tissue)
+        return (*self.geometry.notes, *of_tissue, *self.of_tools)
 
     @property
     def inclusions(self) -> Floats:

@@ -27,8 +27,13 @@ PACKAGES = (
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Provenance:
-    """Versions, commit, platform, and hashes of the scene and of the files that it names."""
+def provenance(
+    scene: str, mesh: str | None, rule_base: str | None = None, tissue: str | None = None
+) -> Provenance:
+    """Versions, commit, platform, and hashes of the scene and of the files that it names.
+
+    `tissue`: that of `tissue_sha256`.
+    """
     return Provenance(
         versions={p: _version(p) for p in PACKAGES} | {"python": platform.python_version()},
         commit=_commit(),
@@ -38,6 +43,7 @@ def provenance(scene: str, mesh: str | None, rule_base: str | None = None) -> Pr
         scene_sha256=hashlib.sha256(scene.encode()).hexdigest(),
         mesh_sha256=mesh_sha256(mesh),
         rule_base_sha256=rule_base_sha256(rule_base),
+        tissue_sha256=tissue,
     )
 
 
@@ -52,6 +58,13 @@ def organ_sha256(scene: Scene) -> str | None:
     That of the mesh alone where there is no other; None without any. ValueError if one cannot be
     read.
     """
+    own = mesh_sha256(scene.organ.mesh)
+    sums = _tissue_sums(scene)
+    return _joined((own, *sums)) if sums else own
+
+
+def tissue_files(scene: Scene) -> dict[str, str]:
+    """Files that a scene's tissue is made of, by their keys: meshes of inclusions, and the map."""
     named = {
         f"tissue.inclusion.{number}.mesh": one.mesh
         for number, one in enumerate(scene.tissue.inclusion, 1)
@@ -59,15 +72,25 @@ def organ_sha256(scene: Scene) -> str | None:
     }
     if scene.tissue.stiffness_map is not None:
         named["tissue.stiffness_map.file"] = scene.tissue.stiffness_map.file
-    own = mesh_sha256(scene.organ.mesh)
-    if not named:
-        return own
+    return named
+
+
+def tissue_sha256(scene: Scene) -> str | None:
+    """SHA-256 of all files of a scene's tissue, None without any. ValueError for an unreadable."""
+    sums = _tissue_sums(scene)
+    return _joined(sums) if sums else None
+
+
+def _tissue_sums(scene: Scene) -> tuple[str | None, ...]:
     refusal = "{key}: {{}} cannot be read ({{}}); name a file"
-    sums = [
+    return tuple(
         _sha256(path, f"{key}: {{}}: no such file", refusal.format(key=key))
-        for key, path in named.items()
-    ]
-    return hashlib.sha256(" ".join(map(str, (own, *sums))).encode()).hexdigest()
+        for key, path in tissue_files(scene).items()
+    )
+
+
+def _joined(sums: tuple[str | None, ...]) -> str:
+    return hashlib.sha256(" ".join(map(str, sums)).encode()).hexdigest()
 
 
 def rule_base_sha256(rule_base: str | None) -> str | None:

@@ -409,7 +409,10 @@ class ControlPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """What made the results; the study draws no random numbers, so `seed` is None."""
+    """What made the results; the study draws no random numbers, so `seed` is None.
+
+    `tissue_sha256`: of all files of inclusions and the map of stiffness, None without any.
+    """
 
     versions: dict[str, str | None]
     commit: str | None
@@ -419,6 +422,7 @@ class Provenance:
     scene_sha256: str
     mesh_sha256: str | None
     rule_base_sha256: str | None = None
+    tissue_sha256: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from study.problem.response import Response
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.results.folder import Arrays, Results
-from study.results.provenance import mesh_sha256, organ_sha256, provenance
+from study.results.provenance import mesh_sha256, organ_sha256, provenance, tissue_sha256
 from study.results.records import (
     ControlPoint,
     Dimensionless,
@@ -93,7 +93,8 @@ def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Resu
         stages = Stages(means, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.
-        made_by = provenance(write_scene(scene), scene.organ.mesh, scene.fuzzy.rule_base)
+        files = scene.organ.mesh, scene.fuzzy.rule_base, tissue_sha256(scene)
+        made_by = provenance(write_scene(scene), *files)
         if scene.is_point:
             found = _on_point(scene, stages, watch, made_by)
         else:

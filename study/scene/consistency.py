@@ -82,6 +82,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for number, tool in enumerate(scene.tools, 1):
         name = "tool" if number == 1 else f"tool.{number}"
         yield from _tool_contradictions(scene, name, tool)
+    yield from _gravity_contradictions(table)
     yield from _support_contradictions(scene)
     yield from _inclusion_contradictions(scene)
     yield from _feature_contradictions(scene)
@@ -317,6 +318,12 @@ def _path_contradictions(name: str, path: tuple[Waypoint, ...]) -> Iterator[str]
         yield f"{name}.path: give each point either travel or offset"
     elif path[0].travel or any(path[0].offset or ()):
         yield f"{name}.path: starts elsewhere than at its place; begin with 0 mm"
+
+
+def _gravity_contradictions(table: Table) -> Iterator[str]:
+    """A table of gravity that has none, but for one that says so."""
+    if _has(table, ("gravity",)) and not _has(table, ("gravity", "acceleration")):
+        yield 'gravity.acceleration: give it, for example "9.81 m/s^2"; without it there is none'
 
 
 def _support_contradictions(scene: Scene) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,10 +29,11 @@ from study.problem.supports import (
 from study.problem.trajectory import Observation
 from study.problem.way import full_share
 from study.scene.place import OUTWARD, resolve
-from study.scene.schema import END_POINT, TOOL_POINT, AttachedWeight, Organ, Scene, Tool
+from study.scene.schema import END_POINT, TOOL_POINT, Organ, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
 from study.scene.travel import travelling
+from study.scene.way import notes_on_misses, refuse_blocked
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +58,9 @@ def problem_of(scene: Scene) -> Problem:
     surface_rule = over_surface(surface, SURFACE_POINTS)
     volume_rule = over_volume(geometry.mesh, VOLUME_POINTS)
     _check_held(foundation, surface_rule)
-    _check_touch(tool, surface_rule)
+    _check_touch(tool, "tool", surface_rule)
+    further = tuple(_further_loads(scene, surface, surface_rule))
+    weights = tuple(_weights(scene, surface, surface_rule))
 
     if scene.tool.is_moved:  # its force is a result, and as a load it has none
         tool = replace(tool, force=0.0)
@@ -72,6 +75,8 @@ def problem_of(scene: Scene) -> Problem:
         volume_rule.points,
         surface.points,
     )
+    rigid = tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene))
+    refuse_blocked(rigid, foundation, surface_rule, times)
     return Problem(
         geometry,
         foundation,
@@ -82,11 +87,12 @@ def problem_of(scene: Scene) -> Problem:
         volume_rule,
         observation,
         tuple(places),
-        tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene)),
-        (*loads, *_further_loads(scene, surface)),
+        rigid,
+        (*loads, *further),
         scene.gravity.acceleration * OUTWARD[scene.gravity.towards],
-        tuple(_weight(one, n, surface) for n, one in enumerate(scene.weight, 1)),
+        weights,
         scene.gravity.given == "loaded",
+        tuple(notes_on_misses(rigid, surface_rule, times)),
     )
 
 
@@ -112,13 +118,14 @@ def _loads(tool: Tool, name: str, surface: SurfaceMesh) -> tuple[Load, ...]:
     return (Load(patch, tool.history.factor),)
 
 
-def _further_loads(scene: Scene, surface: SurfaceMesh) -> list[Load]:
-    return [
-        load
-        for n, one in enumerate(scene.further_tools, 2)
-        if not one.is_moved
-        for load in _loads(one, f"tool.{n}", surface)
-    ]
+def _further_loads(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Iterator[Load]:
+    """Further tools of a given force. ValueError naming one that touches nothing."""
+    for number, one in enumerate(scene.further_tools, 2):
+        if not one.is_moved:
+            name = f"tool.{number}"
+            for load in _loads(one, name, surface):
+                _check_touch(load.tool, name, rule)
+                yield load
 
 
 def _moved(scene: Scene) -> list[tuple[str, Tool]]:
@@ -175,9 +182,13 @@ def _travel(tool: Tool, direction: Floats) -> Callable[[Floats], Floats]:
     return lambda times: np.stack([np.interp(times, corners, column) for column in away.T], axis=1)
 
 
-def _weight(weight: AttachedWeight, number: int, surface: SurfaceMesh) -> Weight:
-    held = Tool(place=weight.place, radius=weight.radius, force=1.0)
-    return Weight(_tool(held, f"weight.{number}", surface), weight.mass)
+def _weights(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Iterator[Weight]:
+    """Attached weights. ValueError naming one that touches nothing."""
+    for number, one in enumerate(scene.weight, 1):
+        held = Tool(place=one.place, radius=one.radius, force=1.0)
+        patch = _tool(held, f"weight.{number}", surface)
+        _check_touch(patch, f"weight.{number}", rule)
+        yield Weight(patch, one.mass)
 
 
 def point_problem_of(scene: Scene) -> PointProblem:
@@ -287,9 +298,10 @@ def _check_held(support: Support, rule: SurfaceRule) -> None:
         )
 
 
-def _check_touch(tool: ToolPatch, rule: SurfaceRule) -> None:
-    if not (tool.profile(rule.points, rule.normals) > 0).any():
+def _check_touch(patch: ToolPatch, name: str, rule: SurfaceRule) -> None:
+    if not (patch.profile(rule.points, rule.normals) > 0).any():
+        turn = "" if name.startswith("weight") else f"turn {name}.direction "
         raise ValueError(
-            "tool: touches no surface that faces it; move tool.place, turn tool.direction or "
-            "enlarge tool.radius"
+            f"{name}: touches no surface that faces it; move {name}.place, {turn}or enlarge "
+            f"{name}.radius"
         )

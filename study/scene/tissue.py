@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,12 +92,19 @@ def _unmoved(place: Place) -> Place:
 def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> None:
     made = of_tetrahedra(mesh, tissue)
     assert made is not None  # noqa: S101 - of varied tissue
-    for region, share in zip(tissue.regions, made.share.T, strict=True):
-        if not share.any():
+    for number, (region, share) in enumerate(zip(tissue.regions, made.share.T, strict=True)):
+        if share.any():
+            continue
+        alone = replace(tissue, regions=(region,), mapped=None)
+        if number + 1 < len(tissue.regions) and _lies_in(mesh, alone):
             raise ValueError(
-                f"{region.name}: nothing of it lies in the organ, or it is far smaller than an "
-                "element; move its place, enlarge it or reduce reference.element_size"
+                f"{region.name}: later inclusions, which count where two meet, cover all of it; "
+                "put it behind them, or remove it"
             )
+        raise ValueError(
+            f"{region.name}: nothing of it lies in the organ, or it is far smaller than an "
+            "element; move its place, enlarge it or reduce reference.element_size"
+        )
     if table.stiffness_map is None:
         return
     if not made.mapped_share.any():
@@ -110,6 +118,11 @@ def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> N
             f"tissue.stiffness_map: {100 * share:.2g} % of the organ has no value in it; set its "
             "elsewhere to around, or give an image of all of the organ"
         )
+
+
+def _lies_in(mesh: TetrahedralMesh, tissue: VariedTissue) -> bool:
+    made = of_tetrahedra(mesh, tissue)
+    return made is not None and bool(made.share.any())
 
 
 def _mapped(given: StiffnessMap, tissue: Tissue) -> Distance:
@@ -142,8 +155,8 @@ class _Sampled:
         millimetres = 1e3 * points @ to_scene("RAS")  # which is its own inverse
         place = millimetres @ self.to_voxels[:3, :3].T + self.to_voxels[:3, 3]
         at = np.moveaxis(place, -1, 0)
-        known = map_coordinates(self.known, at, order=1, mode="constant", cval=0.0)
-        values = map_coordinates(self.values, at, order=1, mode="constant", cval=0.0)
+        known = map_coordinates(self.known, at, order=1, mode="grid-constant", cval=0.0)
+        values = map_coordinates(self.values, at, order=1, mode="grid-constant", cval=0.0)
         return np.where(known >= 0.5, values / np.maximum(known, 0.5), np.nan)
 
 
