@@ -83,6 +83,14 @@ def sheet(height: float, width: float = TEXT_WIDTH) -> Figure:
     return Figure(figsize=(width, height), dpi=RASTER_DPI, layout="constrained")
 
 
+def load() -> None:
+    """Load all that an SVG is drawn with, so that processes forked after this have it."""
+    with style():
+        figure = sheet(0.5)
+        figure.subplots().set_title("-")
+        svg(figure)
+
+
 def svg(figure: Figure) -> bytes:
     """The figure as SVG without a date.
 

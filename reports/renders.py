@@ -19,9 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.camera import Camera
-from study.stages.flat import Arrays
-from study.stages.once import made_once
-from study.sweep.program import everything
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -72,26 +69,6 @@ def render(job: Job, unwanted: Event | None = None) -> Pictures:
                 with np.load(target, allow_pickle=False) as found:
                     return Pictures(f"VTK, {found['renderer']}", found["pixels"])
     return FLAT
-
-
-def render_once(job: Job, unwanted: Event | None = None) -> Pictures:
-    """The pictures that VTK rendered of an equal job before, or renders now; flat ones stay not."""
-
-    def make() -> Arrays:
-        found = render(job, unwanted)
-        if found.pixels is None:
-            raise _FlatError
-        return {"pixels": found.pixels, "renderer": np.array(found.renderer)}
-
-    try:
-        kept = made_once("pictures", make, job, everything("reports"), modules=(__name__,))
-    except _FlatError:
-        return FLAT
-    return Pictures(str(kept["renderer"]), kept["pixels"])
-
-
-class _FlatError(Exception):
-    """What is to be drawn flat, and not kept: VTK may be mended."""
 
 
 def _write(job: Job, path: Path) -> None:

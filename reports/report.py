@@ -6,9 +6,8 @@ import json
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from contextvars import copy_context
 from dataclasses import replace
 from functools import partial
 from importlib import resources
@@ -18,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from reports import canvas
 from reports.budget_figure import budget_figure
 from reports.content import document
 from reports.cut_figure import cut_figure
@@ -26,7 +26,7 @@ from reports.first_figure import first_figure
 from reports.fuzzy_figures import sets_figure, surfaces_figure
 from reports.letters import boxes, extra_files, extra_fonts, without_shape
 from reports.motion_figures import motion_figures
-from reports.renders import Pictures, render_once
+from reports.renders import Pictures, render
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
@@ -36,7 +36,7 @@ from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
 from study.stages.flat import Arrays
 from study.stages.lanes import Job, available, lanes
-from study.stages.once import made_once
+from study.stages.once import kept, made_once
 from study.sweep.program import everything
 
 NAME = "report.pdf"
@@ -49,6 +49,8 @@ NO_GLYPH = re.compile(r'the text `"(.*?)"` could not be displayed with font', re
 """What typst says of the first text that no font has letters for."""
 PROCESSES = 2
 """That draw plots at most: more of them wait for the dearest."""
+RENDERER = "renderer"
+"""Name of what rendered the pictures of the organ, beside its figures."""
 Figures = dict[str, list[bytes]]
 Draw = Callable[[], Mapping[str, list[bytes] | bytes | None]]
 Drawing = dict[str, str] | None
@@ -87,19 +89,52 @@ def draw(results: Results) -> tuple[Figures, Drawing]:
     VTK renders in its own process while matplotlib draws the rest. What was drawn of the same
     motions before is taken from the store, if there is one.
     """
-    seen = views(results)
+    seen, plots = views(results), _drawn_of(results)
+    if seen is None:
+        return _kept_plots(plots), None
+    organ = kept(*_named(seen), modules=(__name__,))
+    if organ is None:
+        figures, organ = _plots_and_organ(plots, seen)
+    else:
+        figures = _kept_plots(plots)
+    scene, *others = (organ[str(i)].tobytes() for i in range(len(organ) - 1))
+    figures |= {"scene": [scene], "fields": others}
+    return figures, explain(seen) | {RENDERER: str(organ[RENDERER])}
+
+
+def _plots_and_organ(plots: Results, seen: Views) -> tuple[Figures, Arrays]:
+    """The plots, and the figures of the organ, whose pictures VTK renders meanwhile."""
     with ThreadPoolExecutor(1) as pool, _set_after_a_failure() as unwanted:
-        pictures = (
-            None
-            if seen is None
-            else pool.submit(copy_context().run, render_once, job(seen), unwanted)
-        )
-        figures = _kept_plots(_drawn_of(results))
-        if pictures is not None:
-            pictures.result()  # here, where a signal makes them unwanted
-    if seen is None or pictures is None:
-        return figures, None
-    return _with_pictures(figures, seen, pictures)
+        waiting = pool.submit(render, job(seen), unwanted)
+        figures = _kept_plots(plots)
+        pictures = waiting.result()  # here, where a signal makes them unwanted
+    return figures, _organ(seen, pictures)
+
+
+def _named(seen: Views) -> tuple[str, Views, list[str], str]:
+    """Name of the organ's figures, and all that they depend on."""
+    return "organ drawn", seen, _more_fonts(), everything("reports")
+
+
+def _more_fonts() -> list[str]:
+    """Names of the fonts that figures take letters from which their own lack."""
+    return [path.name for path in extra_files()]
+
+
+def _organ(seen: Views, pictures: Pictures) -> Arrays:
+    """The organ's figures by number, and what rendered them; flat ones are not kept."""
+
+    def make() -> Arrays:
+        figures = {
+            str(i): np.frombuffer(svg, np.uint8)
+            for i, svg in enumerate(field_figures(seen, pictures))
+        }
+        return figures | {RENDERER: np.array(pictures.renderer)}
+
+    if pictures.pixels is None:  # VTK may be mended
+        return make()
+    name, *given = _named(seen)
+    return made_once(name, make, *given, modules=(__name__,))
 
 
 @contextmanager
@@ -142,8 +177,8 @@ def _kept_plots(results: Results) -> Figures:
             for i, svg in enumerate(drawn)
         }
 
-    fonts = [path.name for path in extra_files()]
-    found = made_once("plots", make, results, fonts, everything("reports"), modules=(__name__,))
+    given = results, _more_fonts(), everything("reports")
+    found = made_once("plots", make, *given, modules=(__name__,))
     figures: Figures = {"motion": []}  # of a motion without a finite sample
     for name, svg in found.items():
         figures.setdefault(name.partition("/")[0], []).append(svg.tobytes())
@@ -153,6 +188,7 @@ def _kept_plots(results: Results) -> Figures:
 def _plots(results: Results) -> Figures:
     """All plots but pictures of the organ, drawn in two processes where there are processors."""
     drawings = _drawings(results)
+    canvas.load()
     with lanes(min(PROCESSES, available()), Silent()) as side_by_side:
         for number, draw in enumerate(drawings):
             side_by_side.start(Job(str(number), partial(_drawn, draw)))
@@ -181,15 +217,6 @@ def _drawings(results: Results) -> Iterator[Draw]:
         "tool_force": force_figure(results),
         "cut": cut_figure(results),
     }
-
-
-def _with_pictures(
-    figures: Figures, seen: Views, pictures: Future[Pictures]
-) -> tuple[Figures, Drawing]:
-    found = pictures.result()
-    scene, *others = field_figures(seen, found)
-    drawn = figures | {"scene": [scene], "fields": others}
-    return drawn, explain(seen) | {"renderer": found.renderer}
 
 
 def compile_pdf(content: dict[str, object], figures: Figures, name: str = TEMPLATE) -> bytes:

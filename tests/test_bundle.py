@@ -25,7 +25,7 @@ from tests.report_samples import results_of, whole, with_mesh_error, with_model,
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "render_once", lambda *_: NO_PICTURES)
+    monkeypatch.setattr(report, "render", lambda *_: NO_PICTURES)
     made = tmp_path / "run"
     made.mkdir()
     results_folder.write(whole(), made)

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports import renders
+from reports import renders, report
 from reports.camera import Camera, facing_tool
 from reports.field_figures import field_figures, job, views
 from reports.renders import FLAT, Job, Pictures, render
-from tests.report_samples import POINTS, results_of
+from study.stages.once import keeping_in
+from study.stages.store import Store
+from tests.report_samples import POINTS, results_of, whole
 
 PUSHES = [*np.eye(3), *-np.eye(3), np.array([1.0, 1.0, 1.0]) / np.sqrt(3.0)]
 
@@ -148,3 +150,31 @@ def _centroid(pixels: np.ndarray, camera: Camera) -> np.ndarray:
     x = (columns.mean() + 0.5) / width * 2.0 - 1.0
     y = 1.0 - (rows.mean() + 0.5) / height * 2.0
     return np.array([x * camera.half_width, y * camera.half_height])
+
+
+def test_what_was_drawn_before_is_drawn_again_only_of_other_results(tmp_path, monkeypatch):
+    results, drawn = whole(), []
+
+    def rendered(job, _):
+        drawn.append("organ")
+        height = round(200 * job.camera.half_height / job.camera.half_width)
+        return Pictures("test", np.zeros((len(job.points), height, 200, 3), np.uint8))
+
+    def plots(_):
+        drawn.append("plots")
+        return {"motion": [b"<svg/>"]}
+
+    monkeypatch.setattr(report, "render", rendered)
+    monkeypatch.setattr(report, "_plots", plots)
+    with keeping_in(Store(tmp_path)):
+        first = report.draw(results)
+        assert sorted(drawn) == ["organ", "plots"]
+        again = report.draw(replace(results, record=replace(results.record, title="another")))
+        assert len(drawn) == 2, "no figure shows the title"
+        assert again == first
+        moved = {**results.fields, "points": 1.01 * results.fields["points"]}
+        report.draw(replace(results, fields=moved))
+        assert len(drawn) == 4
+    with keeping_in(Store(tmp_path), readable=False):
+        assert report.draw(results) == first
+        assert len(drawn) == 6

@@ -4,9 +4,10 @@ import codecs
 import time
 from dataclasses import replace
 
+import pint
 import pytest
 
-from study.annotation.quantity import Quantity
+from study.annotation.quantity import USUAL, Quantity
 from study.scene.file import BUILT_IN, SceneError, read_scene, resolved, write_scene
 
 MESH = "lattice.springs=tetrahedra"
@@ -68,6 +69,13 @@ def test_a_pressure_needs_its_unit(text, value):
     else:
         assert pressure.read(text) == value
         assert pressure.read(pressure.text(value)) == value
+
+
+def test_units_converted_without_pint_are_as_pint_has_them():
+    registry = pint.UnitRegistry()
+    for unit, known in USUAL.items():
+        for name, size in known.items():
+            assert size == pytest.approx(registry.Quantity(1.0, name).to(unit).magnitude, rel=1e-15)
 
 
 @pytest.mark.parametrize(

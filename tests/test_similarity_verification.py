@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 import similaritymeasures
+from scipy.spatial.distance import cdist
 
 from study.problem.response import Motion
 from study.similarity import phase_plane
@@ -112,6 +113,16 @@ def test_parallel_lines_are_one_gap_apart(gap):
     assert phase_plane.frechet_distance(candidate, reference) == pytest.approx(gap, rel=1e-12)
     assert phase_plane.pcm_distance(candidate, reference) == pytest.approx(gap, rel=1e-12)
     assert phase_plane.area_distance(candidate, reference) == pytest.approx(gap, rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 37])
+def test_the_frechet_distance_is_that_of_similaritymeasures(count):
+    dice = np.random.default_rng(count)
+    for points in (1, 3, 40):
+        one, other = (dice.normal(size=(n, 2)).cumsum(axis=0) for n in (count, points))
+        for pair in ((one, other), (other, one), (one, one + 0.1)):
+            expected = similaritymeasures.frechet_dist(*pair)
+            assert phase_plane.leash(cdist(*pair)) == expected
 
 
 def test_concentric_circles():

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from study.models.table import MODELS
+from study.sweep import imports
 from study.sweep import program as programs
 from study.sweep.attempt import attempt
 from study.sweep.imports import reached
@@ -492,3 +493,42 @@ def test_an_interrupted_sweep_leaves_whole_results_and_no_process(store, log, nu
     in_flight = max(workers, 1)
     assert len(begun(log)) - in_flight <= len(list(store)) <= len(begun(log)) < 200
     assert len(list(store)) == len(list(store.folder.glob("*.json")))
+
+
+@pytest.fixture
+def anew(tmp_path, monkeypatch):
+    """Forgets what sources state, as another process does; what is kept is in a file here."""
+    file = tmp_path / "kept" / "imports.json"
+    monkeypatch.setattr(imports, "KEPT", file)
+
+    def forget():
+        for found in (imports._known, imports._named, imports._file):
+            found.cache_clear()
+        return file
+
+    yield forget
+    forget()
+
+
+def test_what_sources_import_is_parsed_once_for_all_processes(anew, tmp_path, monkeypatch):
+    for name, text in (("one", "import two"), ("two", ""), ("three", "")):
+        (tmp_path / f"{name}.py").write_text(text)
+    anew()
+    assert set(reached("one", (tmp_path,))) == {"one", "two"}
+    (tmp_path / "one.py").write_text("import three")
+    anew()
+    assert set(reached("one", (tmp_path,))) == {"one", "three"}, "a source that changed"
+    anew()
+    monkeypatch.setattr(imports, "_stated", None)
+    assert set(reached("one", (tmp_path,))) == {"one", "three"}
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff", b"[1]", b'{"a": 1}', b"{" * 10**5])
+def test_a_damaged_file_of_imports_is_made_again(content, anew, tmp_path):
+    (tmp_path / "one.py").write_text("import two")
+    (tmp_path / "two.py").touch()
+    file = anew()
+    file.parent.mkdir()
+    file.write_bytes(content)
+    assert set(reached("one", (tmp_path,))) == {"one", "two"}
+    assert set(json.loads(file.read_bytes())) > set()

@@ -58,8 +58,12 @@ class Combination(NamedTuple):
     def consequent(self, members: Sequence[float]) -> float:
         """Stiffness [kPa] concluded, within what the output's universe can show undisturbed."""
         p = parameters()
-        expected = exp(self.shift + self.power * sum(map(log, members)) / len(members))
-        return min(max(expected, p["concluded_low"]), p["concluded_high"])
+        return self.within(tuple(map(log, members)), p["concluded_low"], p["concluded_high"])
+
+    def within(self, logarithms: Sequence[float], low: float, high: float) -> float:
+        """The same from logarithms of the members' consequents, within this range [kPa]."""
+        expected = exp(self.shift + self.power * sum(logarithms) / len(logarithms))
+        return min(max(expected, low), high)
 
 
 class Placement(NamedTuple):
@@ -186,15 +190,21 @@ def _rules(
     placed: Placement, cells: Sequence[Cell], most: int
 ) -> Iterator[tuple[tuple[Term, ...], int, float]]:
     """Antecedent, level of the output set and weight of every rule."""
+    p = parameters()
+    members = {name: _members(name, placed.sets[name]) for name in placed.sets}
     for cell in cells:
         combination = placed.combinations[len(cell)]
-        weight = parameters()["outweighed"] ** (most - len(cell))
-        for members in product(*(tuple(enumerate(placed.sets[name])) for name in cell)):
-            terms = tuple(
-                Term(AETIOLOGIES.index(name), k) for name, (k, _) in zip(cell, members, strict=True)
-            )
-            expected = combination.consequent([one.consequent for _, one in members])
+        weight = p["outweighed"] ** (most - len(cell))
+        for chosen in product(*(members[name] for name in cell)):
+            terms, logarithms = zip(*chosen, strict=True)
+            expected = combination.within(logarithms, p["concluded_low"], p["concluded_high"])
             yield terms, level_of(expected), weight
+
+
+def _members(name: str, sets: Sequence[PlacedSet]) -> tuple[tuple[Term, float], ...]:
+    """Each set of an aetiology as a term, and the logarithm of what it alone concludes."""
+    i = AETIOLOGIES.index(name)
+    return tuple((Term(i, k), log(one.consequent)) for k, one in enumerate(sets))
 
 
 def level_of(stiffness: float) -> int:

@@ -4,7 +4,7 @@ One choice at a time is changed from the base settings. The change is taken at t
 and over a spread of readings, all in Pa.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -94,7 +94,11 @@ class _Case(NamedTuple):
     X: Array
     system: str
     settings: LiverSettings
-    present: Collection[str] = AETIOLOGIES
+    present: tuple[str, ...] = AETIOLOGIES
+
+
+_Answers = Callable[[_Case], tuple[Array, Array | None]]
+"""Stiffness and interval of a case, see `fuzzy.liver.stiffness.evaluate`."""
 
 
 def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 256) -> Screening:
@@ -107,6 +111,7 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
     ValueError as `estimate` does.
     """
     found: list[Sensitivity] = []
+    answers = _remembered()
     left_out: list[str] = []
     for system in SYSTEMS:  # so that faulty readings are not taken for a fault of an alternative
         evaluate(_patient(readings), system, base, readings)
@@ -115,10 +120,23 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
             if value == _value(base, axis.key) or _is_idle(axis.key, base):
                 continue
             try:
-                found += _changes(readings, base, axis, value, rows)
+                found += _changes(readings, base, axis, value, rows, answers)
             except ValueError as error:
                 left_out.append(f"{axis.key} {_label(value)}: {error}")
-    return Screening((*found, *_between_systems(readings, base, rows)), tuple(left_out))
+    return Screening((*found, *_between_systems(readings, base, rows, answers)), tuple(left_out))
+
+
+def _remembered() -> _Answers:
+    """Evaluates each case once, for the base is compared with every alternative."""
+    found: dict[tuple[object, ...], tuple[Array, Array | None]] = {}
+
+    def answers(case: _Case) -> tuple[Array, Array | None]:
+        key = (case.X.tobytes(), *case[1:])
+        if key not in found:
+            found[key] = evaluate(*case)
+        return found[key]
+
+    return answers
 
 
 def _value(settings: LiverSettings, key: str) -> Any:
@@ -148,7 +166,12 @@ def _changed(base: LiverSettings, key: str, value: Any) -> LiverSettings:
 
 
 def _changes(
-    readings: Mapping[str, float], base: LiverSettings, axis: Axis, value: Any, rows: int
+    readings: Mapping[str, float],
+    base: LiverSettings,
+    axis: Axis,
+    value: Any,
+    rows: int,
+    answers: _Answers,
 ) -> list[Sensitivity]:
     labels = axis.key, _label(_value(base, axis.key)), _label(value)
     if axis.key != "sampling":
@@ -165,12 +188,13 @@ def _changes(
             readings,
             _Case(X, system, base, present),
             _Case(X, system, other, present),
+            answers,
         )
         for system in axis.systems
     ]
 
 
-def _spread_over(readings: Mapping[str, float], base: LiverSettings) -> Collection[str]:
+def _spread_over(readings: Mapping[str, float], base: LiverSettings) -> tuple[str, ...]:
     """Aetiologies whose readings are spread: all, or those given where the others are silent."""
     return tuple(readings) if base.base.follows and readings else AETIOLOGIES
 
@@ -199,22 +223,28 @@ def _rows(base: LiverSettings, other: LiverSettings, rows: int) -> int:
 
 
 def _between_systems(
-    readings: Mapping[str, float], base: LiverSettings, rows: int
+    readings: Mapping[str, float], base: LiverSettings, rows: int, answers: _Answers
 ) -> Iterator[Sensitivity]:
     present = _spread_over(readings, base)
     X, base = spread_readings(rows, present), _sampled(base)
     for one, other in combinations(SYSTEMS, 2):
         labels = (SYSTEM, one, other)
         before, after = (_Case(X, system, base, present) for system in (one, other))
-        yield _difference(labels, readings, before, after)
+        yield _difference(labels, readings, before, after, answers)
 
 
 def _difference(
-    labels: tuple[str, str, str], readings: Mapping[str, float], first: _Case, second: _Case
+    labels: tuple[str, str, str],
+    readings: Mapping[str, float],
+    first: _Case,
+    second: _Case,
+    answers: _Answers,
 ) -> Sensitivity:
-    before, after = (evaluate(*case) for case in (first, second))
-    patients = (case._replace(X=_patient(readings), present=readings) for case in (first, second))
-    here = [float(evaluate(*patient)[0][0]) for patient in patients]
+    before, after = (answers(case) for case in (first, second))
+    patients = (
+        case._replace(X=_patient(readings), present=tuple(readings)) for case in (first, second)
+    )
+    here = [float(answers(patient)[0][0]) for patient in patients]
     change = after[0] - before[0]
     return Sensitivity(
         *labels,

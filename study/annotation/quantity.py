@@ -21,18 +21,21 @@ _TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>%|({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})
 _COMMA = re.compile(r"[+-]?\d+,\d")
 _LONGEST_TEXT = 80
 USUAL = {
-    "m": ("mm", "cm", "m", "um"),
-    "m^3": ("ml", "l", "L", "m^3", "mm^3", "cm^3"),
-    "kg": ("g", "kg", "mg"),
-    "N": ("mN", "N", "kN", "uN"),
-    "Pa": ("Pa", "kPa", "MPa"),
-    "Pa/m": ("Pa/m", "kPa/m", "MPa/m", "N/m^3"),
-    "s": ("s", "ms", "us", "min"),
-    "Hz": ("Hz", "kHz"),
-    "kg/m^3": ("kg/m^3", "g/cm^3"),
-    "byte": ("MB", "GB", "byte"),
+    "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "um": 1e-6},
+    "m^3": {"ml": 1e-6, "l": 1e-3, "L": 1e-3, "m^3": 1.0, "mm^3": 1e-9, "cm^3": 1e-6},
+    "kg": {"g": 1e-3, "kg": 1.0, "mg": 1e-6},
+    "N": {"mN": 1e-3, "N": 1.0, "kN": 1e3, "uN": 1e-6},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
+    "Pa/m": {"Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6, "N/m^3": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "Hz": {"Hz": 1.0, "kHz": 1e3},
+    "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3},
+    "byte": {"MB": 1e6, "GB": 1e9, "byte": 1.0},
 }
-"""Units that are suggested, by the SI unit."""
+"""Units that are suggested, and their sizes in the SI unit, by the SI unit.
+
+pint knows these too; to load it takes longer than all else about a scene, and few scenes need more.
+"""
 FRAMES = {"Hz": ("fps", "FPS")}
 """Frames per second, which pint takes for feet."""
 
@@ -113,6 +116,14 @@ def _parsed(text: str, unit: str) -> float:
 
 
 def _factor(name: str, unit: str, example: str) -> float:
+    """Size of a unit in the SI unit. ValueError for one that is unknown or of another dimension."""
+    if name == unit:  # as in every scene that a run has written
+        return 1.0
+    known = USUAL.get(unit, {}).get(name)
+    return _factor_of_pint(name, unit, example) if known is None else known
+
+
+def _factor_of_pint(name: str, unit: str, example: str) -> float:
     import pint
 
     registry = _registry()
@@ -133,7 +144,7 @@ def _factor(name: str, unit: str, example: str) -> float:
 
 def _near(name: str, unit: str) -> str:
     """The usual unit that a name is nearest to, first whatever the case, or nothing."""
-    usual = USUAL.get(unit, ())
+    usual = tuple(USUAL.get(unit, ()))
     same = [one for one in usual if one.lower() == name.lower()]
     near = same or difflib.get_close_matches(name, usual, n=1)
     return f", did you mean {near[0]!r}?" if near else ""
@@ -143,7 +154,7 @@ def _hint(text: str, unit: str) -> str:
     """For a value out of range: the usual unit that differs from its own by the case of letters."""
     match = _TEXT.fullmatch(text.strip())
     name = match["unit"] if match else ""
-    usual = USUAL.get(unit, ())
+    usual = tuple(USUAL.get(unit, ()))
     return _near(name, unit) if name not in usual and _differs_by_case(name, usual) else ""
 
 

@@ -16,10 +16,12 @@ def report(
     html: bool = True,
     out: Path | None = None,
     reference: Switch = False,
+    fresh: Switch = False,
 ) -> None:
     """Make report.pdf and report.html of a results folder or a bundle again, without simulating.
 
-    Of a bundle, exit code 1 if they have other bytes than those in it.
+    Figures that were drawn of the same results before are taken from the user's store. Those of a
+    bundle never are: exit code 1 if its reports have other bytes than those in it.
 
     Parameters
     ----------
@@ -33,6 +35,8 @@ def report(
     reference
         Make a document of what was measured beforehand instead, of no run: benchmarks,
         verification, validation, trade-off, stability and ranking.
+    fresh
+        Draw all figures anew.
     """
     if reference:
         _reference(target, out)
@@ -46,7 +50,12 @@ def report(
         return
     if out is not None:
         raise ValueError("--out: is for a bundle; the reports of a folder are made in it")
-    print("\n".join(str(path) for path in _of_folder(target, html=html)))
+    from study.stages.once import keeping_in
+    from study.stages.store import user_store
+
+    with keeping_in(user_store(), readable=not fresh):
+        made = _of_folder(target, html=html)
+    print("\n".join(str(path) for path in made))
 
 
 def _reference(target: Path | None, out: Path | None) -> None:

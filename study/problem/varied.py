@@ -162,6 +162,8 @@ def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
 
 def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
     """What each tetrahedron is made of; None for tissue that is the same everywhere."""
+    if not isinstance(tissue, VariedTissue):  # and SciPy's statistics take a while to load
+        return None
     corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
 

@@ -21,7 +21,6 @@ PACKAGES = (
     "pyvista",
     "scikit-fem",
     "scipy",
-    "similaritymeasures",
     "typst",
 )
 ROOT = Path(__file__).resolve().parents[2]

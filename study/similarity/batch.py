@@ -1,10 +1,10 @@
 """The measures of `study.similarity.score` compiled, for very many pairs of motions.
 
-Each function is its namesake's equal to rounding and takes well under a millisecond, where that of
-a library takes several. Motions are (samples,) on the same uniform times and finite.
+Each function is its namesake's equal to rounding and takes well under a millisecond, where those on
+whole arrays take several. Motions are (samples,) on the same uniform times and finite.
 
 The measures are written twice so that a score does not rest on one hand's work: there they read as
-their definitions do and Frechet's is a library's, here they are loops. Loops over plain numbers,
+their definitions do, on whole arrays, here they are loops. Loops over plain numbers,
 for what numba puts in the place of numpy's sorting, interpolation and array arithmetic takes longer
 to compile than all that is here.
 """

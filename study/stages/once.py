@@ -37,6 +37,15 @@ def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
         _CURRENT.reset(token)
 
 
+def kept(name: str, *given: object, modules: tuple[str, ...]) -> Arrays | None:
+    """What `made_once` would take from the store, None where it would make it."""
+    current, found = _CURRENT.get(), key(name, *given, modules=modules)
+    if current is None or found is None or not current.readable:
+        return None
+    entry = current.store.get(found)
+    return None if entry is None else entry.arrays
+
+
 def made_once(
     name: str, make: Callable[[], Arrays], *given: object, modules: tuple[str, ...]
 ) -> Arrays:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import ast
 import functools
+import hashlib
+import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
+
+from study.folders import write_text
 
 STATEMENTS = ("body", "orelse", "handlers", "finalbody", "cases")
 """Where a statement holds others."""
@@ -14,6 +19,11 @@ DYNAMIC = ("import_module", "__import__", "iter_modules", "walk_packages", "run_
 """A source with one of these words may load modules by a name that no source states."""
 TABLED = re.compile(r"""(["'])([a-z]\w*(?:\.\w+)*):[A-Z]\w*\1""")
 """A text such as "msm.integrators:INTEGRATORS", whose module is loaded when it is resolved."""
+
+KEPT = Path(__file__).parent / "__pycache__" / "imports.json"
+"""What sources import, by what is in them: to parse them takes longer than all else here."""
+MOST = 4_000
+"""Sources that are kept; where there are more, those of this process."""
 
 
 def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
@@ -30,6 +40,7 @@ def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
         if path is not None and name not in found:
             found[name] = path
             waiting |= set(_parents(name)) | _named(name, path)
+    _known().keep()
     return found
 
 
@@ -51,12 +62,68 @@ def _named(name: str, path: Path) -> frozenset[str]:
     """Names that a source imports, and those of its package if it may load any of them."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     text = path.read_text(encoding="utf-8")
-    tree = ast.parse(text, filename=str(path))
-    names = {found for node in _statements(tree) for found in _imported(node, package)}
-    names |= {found[2] for found in TABLED.finditer(text)}
+    names = set(_known().stated(package, text, str(path)))
     if any(word in text for word in DYNAMIC):
         names |= set(_members(package, path.parent))
     return frozenset(names)
+
+
+def _stated(package: str, text: str, file: str) -> list[str]:
+    """Names that a source of a package states, in order."""
+    tree = ast.parse(text, filename=file)
+    names = {found for node in _statements(tree) for found in _imported(node, package)}
+    return sorted(names | {found[2] for found in TABLED.finditer(text)})
+
+
+class _Known:
+    """Names that sources state, by SHA-256 of their text, of their package and of this module.
+
+    They are kept beside the compiled kernels, and made again where they are missing, unreadable or
+    of another text. A folder that cannot be written is left alone.
+    """
+
+    def __init__(self) -> None:
+        self.before = _read(KEPT)
+        self.used: dict[str, list[str]] = {}
+        self.is_kept = True
+        self.own = Path(__file__).read_text(encoding="utf-8")
+
+    def stated(self, package: str, text: str, file: str) -> list[str]:
+        """See `_stated`."""
+        key = hashlib.sha256("\0".join((self.own, package, text)).encode()).hexdigest()
+        names = self.before.get(key)
+        if names is None:
+            names, self.is_kept = _stated(package, text, file), False
+        self.used[key] = names
+        return names
+
+    def keep(self) -> None:
+        """Write what is new."""
+        if self.is_kept:
+            return
+        known = self.before | self.used
+        with suppress(OSError):
+            KEPT.parent.mkdir(exist_ok=True)
+            write_text(KEPT, json.dumps(self.used if len(known) > MOST else known))
+            self.is_kept = True
+
+
+def _read(path: Path) -> dict[str, list[str]]:
+    """What was kept, without what is not such."""
+    try:
+        found = json.loads(path.read_bytes())
+        return {
+            key: names
+            for key, names in found.items()
+            if isinstance(names, list) and all(isinstance(name, str) for name in names)
+        }
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return {}
+
+
+@functools.cache
+def _known() -> _Known:
+    return _Known()
 
 
 def _statements(node: ast.AST) -> Iterator[ast.stmt]:

@@ -26,7 +26,6 @@ LIBRARIES = (
     "scikit-fem",
     "scikit-fuzzy",
     "scipy",
-    "similaritymeasures",
     "typst",
     "vtk",
 )
