@@ -50,6 +50,13 @@ ROUNDING = 1e-9
 """Of lambda over mu, the difference of two moduli."""
 
 
+class Loaded(NamedTuple):
+    """The element that is meant, and scikit-fem's basis of one component on the facets."""
+
+    element: ElementName
+    surface: Any
+
+
 class Outline(NamedTuple):
     """A body's mesh and shape functions, by which fields on it are seen, without its matrices.
 
@@ -124,6 +131,17 @@ class Body:
         """Positions [m] (nodes, 3)."""
         return np.ascontiguousarray(self.nodes.doflocs.T)
 
+    def inertia(self, acceleration: Floats) -> Floats:
+        """Nodal forces [N] (n,) of an acceleration [m/s^2] (n,), the mass times it."""
+        if self._nodal is None:
+            return np.asarray(self.mass @ acceleration)
+        return np.asarray(self._nodal @ acceleration.reshape(-1, 3)).ravel()
+
+    @cached_property
+    def _nodal(self) -> csr_array | None:
+        """Mass of one component, a ninth of the whole; None where fixed ones tell them apart."""
+        return None if self.fixed is not None else csr_array(self.mass[::3, ::3])
+
     @cached_property
     def basis(self) -> Any:
         """scikit-fem's basis of displacements, whose unknowns are ordered as those here."""
@@ -138,14 +156,17 @@ def discretise(
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
+    loaded: Loaded | None = None,
 ) -> Body:
     """Assemble the body.
 
     With `project`, which takes points [m] (n, 3) to the exact surface, quadratic elements are
-    curved along it. ValueError if the tool or the support touches no surface, for a Poisson ratio
-    that no solid has, and for a tetrahedron without volume.
+    curved along it. `loaded`: what `loaded_surface` gave of the same, if it is known. ValueError if
+    the tool or the support touches no surface, for a Poisson ratio that no solid has, and for a
+    tetrahedron without volume.
     """
-    name, surface = loaded_surface(mesh, tissue, foundation, tool, element, project)
+    given = (mesh, tissue, foundation, tool, element, project)
+    name, surface = loaded or loaded_surface(*given)
     grid, one = surface.mesh, surface.elem
     support = by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
@@ -276,10 +297,10 @@ def loaded_surface(
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
-) -> tuple[ElementName, Any]:
-    """The element that is meant, and scikit-fem's basis of one component on the facets.
+) -> Loaded:
+    """What a body is loaded on.
 
-    All that `discretise` refuses is refused here, where next to nothing is computed.
+    All that `discretise` refuses is refused here, where little is computed.
     """
     name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
@@ -289,7 +310,7 @@ def loaded_surface(
     grid = straight(mesh) if bent is None else curved(mesh, bent)
     surface = skfem.FacetBasis(grid, kind.shapes(), mapping(grid), intorder=FACET_ORDER)
     _refuse_untouched(surface, foundation, tool)
-    return name, surface
+    return Loaded(name, surface)
 
 
 def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:

@@ -30,12 +30,17 @@ def threads(count: int) -> Iterator[None]:
         _ALLOWED.reset(token)
 
 
+def allowed() -> int:
+    """Threads that what is computed now may use."""
+    return _ALLOWED.get()
+
+
 def side_by_side(*parts: Callable[[], None]) -> None:
     """Compute parts that do not touch each other: all here, or the second in another thread.
 
     They are to release the interpreter's lock. Whatever a part raises is raised here.
     """
-    if len(parts) != 2 or _ALLOWED.get() < 2:
+    if len(parts) != 2 or allowed() < 2:
         for part in parts:
             part()
         return
