@@ -28,7 +28,7 @@ from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
 from fem_reference.forms import Gradients, Pattern, gradients, pattern, products
-from fem_reference.grid import Projection, curved, mapping, straight
+from fem_reference.grid import CurvedMapping, Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
@@ -172,6 +172,8 @@ def discretise(
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
     made = composed(nodes, tissue)
+    if isinstance(nodes.mapping, CurvedMapping):
+        nodes.mapping.forget()
     whole = by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)

@@ -69,6 +69,10 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
             kept = self._kept = _Derivatives(X, tind, self._derivatives(X, tind), None)
         return kept
 
+    def forget(self) -> None:
+        """Let go of the derivatives at the last points, once no shape function needs them."""
+        self._kept = None
+
     def _derivatives(self, X: Floats, tind: Any) -> Floats:
         """Of coordinate i by local coordinate j (i, j, cells, q); each shape is looked at once."""
         nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs

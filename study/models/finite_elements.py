@@ -175,11 +175,16 @@ class PreparedElements:
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
 
     def rest_at(self, poisson_ratio: float) -> Floats:
-        """The same at another Poisson ratio, on the mesh of the last run if there was one."""
+        """The same at another Poisson ratio, on the mesh of the last run if there was one.
+
+        The matrices of that run are let go of, as both would be more than a run takes.
+        """
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
-        own = self._best_body()
+        own, start = self._best_body(), None
         body = of_tissue(own, tissue, self.model.reference.element)
-        start = None if self.best is None else self.best.found.rest(own)
+        if self.best is not None:
+            start, self.best = self.best.found.rest(own), self.best.outlined
+        del own
         points = self.problem.observation.volume_points
         return at_points(evaluation(body, points), self._at_rest(body, start))
 
