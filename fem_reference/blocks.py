@@ -63,7 +63,15 @@ class Blocks:
 
     def add_product(self, x: Floats, total: Floats, share: float = 1.0) -> None:
         """Add a share of the product to a total."""
-        given = self.first, self.last, self.indices, self.data, share, x, total
+        given = (
+            self.first,
+            self.last,
+            self.indices,
+            self.data,
+            share,
+            np.ascontiguousarray(x),
+            total,
+        )
         side_by_side(*(partial(_add_product, *rows, *given) for rows in self._parts))
 
     def magnitudes(self, x: Floats) -> Floats:

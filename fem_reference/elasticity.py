@@ -28,7 +28,7 @@ from skfem.models.elasticity import lame_parameters
 
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
 from fem_reference.forms import Gradients, Pattern, gradients, pattern, products
-from fem_reference.grid import Projection, curved, mapping, straight
+from fem_reference.grid import CurvedMapping, Projection, curved, mapping, straight
 from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
@@ -48,6 +48,13 @@ ENTRIES = 2**16
 """Of a matrix that are made at once."""
 ROUNDING = 1e-9
 """Of lambda over mu, the difference of two moduli."""
+
+
+class Loaded(NamedTuple):
+    """The element that is meant, and scikit-fem's basis of one component on the facets."""
+
+    element: ElementName
+    surface: Any
 
 
 class Outline(NamedTuple):
@@ -132,6 +139,17 @@ class Body:
         """Positions [m] (nodes, 3)."""
         return np.ascontiguousarray(self.nodes.doflocs.T)
 
+    def inertia(self, acceleration: Floats) -> Floats:
+        """Nodal forces [N] (n,) of an acceleration [m/s^2] (n,), the mass times it."""
+        if self._nodal is None:
+            return np.asarray(self.mass @ acceleration)
+        return np.asarray(self._nodal @ acceleration.reshape(-1, 3)).ravel()
+
+    @cached_property
+    def _nodal(self) -> csr_array | None:
+        """Mass of one component, a ninth of the whole; None where fixed ones tell them apart."""
+        return None if self.fixed is not None else csr_array(self.mass[::3, ::3])
+
     @cached_property
     def basis(self) -> Any:
         """scikit-fem's basis of displacements, whose unknowns are ordered as those here."""
@@ -146,19 +164,24 @@ def discretise(
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
+    loaded: Loaded | None = None,
 ) -> Body:
     """Assemble the body.
 
     With `project`, which takes points [m] (n, 3) to the exact surface, quadratic elements are
-    curved along it. ValueError if the tool or the support touches no surface, for a Poisson ratio
-    that no solid has, and for a tetrahedron without volume.
+    curved along it. `loaded`: what `loaded_surface` gave of the same, if it is known. ValueError if
+    the tool or the support touches no surface, for a Poisson ratio that no solid has, and for a
+    tetrahedron without volume.
     """
-    name, surface = loaded_surface(mesh, tissue, foundation, tool, element, project)
+    given = (mesh, tissue, foundation, tool, element, project)
+    name, surface = loaded or loaded_surface(*given)
     grid, one = surface.mesh, surface.elem
     support = by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
     made = composed(nodes, tissue)
+    if isinstance(nodes.mapping, CurvedMapping):
+        nodes.mapping.forget()
     whole = by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)
@@ -284,10 +307,10 @@ def loaded_surface(
     tool: ToolPatch,
     element: str = AUTO,
     project: Projection | None = None,
-) -> tuple[ElementName, Any]:
-    """The element that is meant, and scikit-fem's basis of one component on the facets.
+) -> Loaded:
+    """What a body is loaded on.
 
-    All that `discretise` refuses is refused here, where next to nothing is computed.
+    All that `discretise` refuses is refused here, where little is computed.
     """
     name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
@@ -297,7 +320,7 @@ def loaded_surface(
     grid = straight(mesh) if bent is None else curved(mesh, bent)
     surface = skfem.FacetBasis(grid, kind.shapes(), mapping(grid), intorder=FACET_ORDER)
     _refuse_untouched(surface, foundation, tool)
-    return name, surface
+    return Loaded(name, surface)
 
 
 def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:

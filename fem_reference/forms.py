@@ -14,8 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fem_reference.blocks import kernel
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+CELLS = 2048
+"""Looked at at once: what all add to a matrix would be several times as large as that is."""
 
 
 class Pattern(NamedTuple):
@@ -68,13 +73,25 @@ def products(basis: Any, where: Pattern, density: Floats | None = None) -> csr_a
 def gradients(basis: Any, where: Pattern, density: Floats | None = None) -> Gradients:
     """Integrals of the products of all pairs of derivatives, times a density (cells,) if given."""
     weights = _weighed(basis, density)[..., None]
-    slopes = [np.stack([one[0].grad[i] for one in basis.basis], axis=-1) for i in range(3)]
-    found = np.empty((len(where.indices), 3, 3))
-    for i, tested in enumerate(slopes):
-        weighted = (tested * weights).mT
-        for j, tried in enumerate(slopes):
-            found[:, i, j] = where.summed(weighted @ tried)
+    found = np.zeros((len(where.indices), 3, 3))
+    for start in range(0, len(weights), CELLS):
+        cells = slice(start, start + CELLS)
+        slopes = [np.stack([one[0].grad[i][cells] for one in basis.basis], -1) for i in range(3)]
+        tested = [(one * weights[cells]).mT for one in slopes]
+        parts = np.array([[own @ tried for tried in slopes] for own in tested])
+        _add_parts(where.place[cells], parts, found)
     return Gradients(where.indptr, where.indices, found)
+
+
+@kernel  # type: ignore[untyped-decorator] # numba has no types
+def _add_parts(place: Ints, parts: Floats, total: Floats) -> None:
+    """Add parts (3, 3, cells, a, a) to the entries (entries, 3, 3) of their pairs of nodes."""
+    for cell in range(place.shape[0]):
+        for a in range(place.shape[1]):
+            for b in range(place.shape[2]):
+                for i in range(3):
+                    for j in range(3):
+                        total[place[cell, a, b], i, j] += parts[i, j, cell, a, b]
 
 
 def _weighed(basis: Any, density: Floats | None) -> Any:

@@ -69,6 +69,10 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
             kept = self._kept = _Derivatives(X, tind, self._derivatives(X, tind), None)
         return kept
 
+    def forget(self) -> None:
+        """Let go of the derivatives at the last points, once no shape function needs them."""
+        self._kept = None
+
     def _derivatives(self, X: Floats, tind: Any) -> Floats:
         """Of coordinate i by local coordinate j (i, j, cells, q); each shape is looked at once."""
         nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs
@@ -131,6 +135,61 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
         return local, np.abs(x - self.F(local, cells)).max(axis=0)
 
 
+class _Entities:
+    """Edges and facets of a mesh as scikit-fem numbers them, found in a fraction of its time.
+
+    It sorts rows of numbers, which numpy compares as bytes; here each row is one number.
+    """
+
+    @staticmethod
+    def build_entities(t: Any, indices: Any, sort: bool = True) -> Any:
+        """Entities (vertices, e) in order, and those of each cell, by local `indices`."""
+        count = int(t.max(initial=0)) + 1
+        if indices is None or not sort or count ** len(indices[0]) > np.iinfo(np.int64).max:
+            return skfem.MeshTet.build_entities(t, indices, sort)
+        rows = np.sort(np.hstack([t[one] for one in indices]), axis=0)
+        number = np.zeros(rows.shape[1], dtype=np.int64)
+        for row in rows:
+            number = count * number + row
+        found, which = np.unique(number, return_inverse=True)
+        ends = np.empty((len(rows), len(found)), dtype=t.dtype)
+        for k in reversed(range(len(rows))):
+            found, ends[k] = np.divmod(found, count)
+        return ends, which.reshape(len(indices), t.shape[1])
+
+    @staticmethod
+    def build_inverse(t: Any, mapping: Any) -> Any:
+        """First and last cell (2, e) of each entity, -1 for the last where it has one alone."""
+        cells, entities = np.tile(np.arange(t.shape[1]), len(mapping)), mapping.ravel()
+        found = np.zeros((2, mapping.max() + 1), dtype=np.int32)
+        found[0, entities[::-1]] = cells[::-1]  # of several the last one stays
+        found[1, entities] = cells
+        found[1, found[0] == found[1]] = -1
+        return found
+
+
+class StraightGrid(_Entities, skfem.MeshTet):  # type: ignore[misc] # scikit-fem has no types
+    """scikit-fem's tetrahedra with flat facets."""
+
+
+class CurvedGrid(_Entities, skfem.MeshTet2):  # type: ignore[misc] # scikit-fem has no types
+    """scikit-fem's tetrahedra with quadratic edges."""
+
+    def on(self, nodes: Floats) -> CurvedGrid:
+        """The same cells with other nodes [m] (3, n): neither edges nor facets are sought again."""
+        found = CurvedGrid(nodes, self.t)
+        _share(self, found)
+        found._dofs = self.dofs
+        return found
+
+
+def _share(known: Any, other: Any) -> None:
+    """Give a mesh the entities of another of the same cells."""
+    for name in ("_edges", "_t2e", "_facets", "_t2f", "_f2t"):
+        if hasattr(known, name):
+            setattr(other, name, getattr(known, name))
+
+
 def mapping(grid: Any) -> Any:
     """What takes the reference cell to a grid's cells."""
     if isinstance(grid, skfem.MeshTet2):
@@ -140,7 +199,7 @@ def mapping(grid: Any) -> Any:
 
 def straight(mesh: TetrahedralMesh) -> Any:
     """The mesh with flat facets."""
-    return skfem.MeshTet(
+    return StraightGrid(
         np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.tetrahedra.T)
     )
 
@@ -161,18 +220,15 @@ def curved(mesh: TetrahedralMesh, project: Projection) -> Any:
     cells = np.flatnonzero(np.isin(flat.t2e, edges).any(axis=0))  # the others are straight
     corners = flat.p[:, flat.t[:, cells]]
     volumes = np.abs(np.linalg.det(np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0)))
+    quadratic = CurvedGrid.from_mesh(flat)
+    _share(flat, quadratic)
     for attempt in range(HALVINGS + 1):
-        bent = _bent(flat, edges, middle + share[:, None] * move)
+        nodes = quadratic.doflocs.copy()
+        nodes[:, flat.p.shape[1] + edges] = (middle + share[:, None] * move).T
+        bent = quadratic.on(nodes)
         least = mapping(bent).detDF(_LOOKED_AT, cells).min(axis=1)
         distorted = cells[least < LEAST_JACOBIAN * volumes]
         if not len(distorted):
             return bent
         share[np.isin(edges, flat.t2e[:, distorted])] *= 0.5 if attempt < HALVINGS - 1 else 0.0
     return bent
-
-
-def _bent(flat: Any, edges: Ints, middle: Floats) -> Any:
-    quadratic = skfem.MeshTet2.from_mesh(flat)
-    nodes = quadratic.doflocs.copy()
-    nodes[:, flat.p.shape[1] + edges] = middle.T
-    return skfem.MeshTet2(nodes, quadratic.t)

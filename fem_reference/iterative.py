@@ -104,7 +104,7 @@ def iterative(body: Body, tolerance: float) -> Solver:
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
-        matrix = blocks_of(body.stiffness.matrix.tobsr(blocksize=(3, 3)))
+        matrix = body.stiffness.blocks
         return _solver(cg, matrix, inner, tolerance, guide=symmetric(matrix))
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size

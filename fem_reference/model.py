@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.dynamics import March, Oscillator, State, hermite, hht, march
-from fem_reference.elasticity import Body, discretise, loaded_surface
+from fem_reference.elasticity import Body, Loaded, discretise, loaded_surface
 from fem_reference.elements import AUTO
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
@@ -215,10 +215,15 @@ def build(
     element: str = AUTO,
     project: Projection | None = None,
     method: str = DEFAULT,
+    loaded: Loaded | None = None,
 ) -> Body:
-    """Discretised body. ValueError, before anything is assembled, if memory does not hold it."""
-    refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
-    return discretise(mesh, tissue, foundation, tool, element, project)
+    """Discretised body. ValueError, before anything is assembled, if memory does not hold it.
+
+    `loaded`: what `refuse` gave of the same, if it was asked.
+    """
+    if loaded is None:
+        refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
+    return discretise(mesh, tissue, foundation, tool, element, project, loaded)
 
 
 def refuse(
@@ -229,10 +234,13 @@ def refuse(
     element: str = AUTO,
     project: Projection | None = None,
     method: str = DEFAULT,
-) -> None:
-    """ValueError for all that `build` refuses, without what takes time in it."""
+) -> Loaded:
+    """ValueError for all that `build` refuses, without what takes most time in it.
+
+    The surface that is held and loaded, of which a body is made sooner.
+    """
     refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
-    loaded_surface(mesh, tissue, foundation, tool, element, project)
+    return loaded_surface(mesh, tissue, foundation, tool, element, project)
 
 
 def run(

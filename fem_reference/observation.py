@@ -15,6 +15,9 @@ Floats = NDArray[np.float64]
 LEAST_SHARE = 0.3
 """Of the largest squared norm of a strain, below which no principal strain is the largest."""
 
+CELLS = 4096
+"""Looked at at once, so that no field of strains stands beside that of gradients."""
+
 
 def evaluation(body: Body | Outline, points: Floats) -> csr_array:
     """Matrix that takes values at nodes to values at points [m] (q, 3)."""
@@ -47,18 +50,20 @@ def carried(vectors: Floats, body: Body | Outline, other: Body) -> Floats:
 
 def largest_strain(body: Body, u: Floats) -> float:
     """Largest absolute principal strain at the integration points."""
-    return _largest_strain(_gradient(body, u))
+    return strain_and_rotation(body, u)[0]
 
 
 def largest_rotation(body: Body, u: Floats) -> float:
     """Largest rotation [rad], as small ones go, at the integration points."""
-    return _largest_rotation(_gradient(body, u))
+    return strain_and_rotation(body, u)[1]
 
 
 def strain_and_rotation(body: Body, u: Floats) -> tuple[float, float]:
     """Both."""
     gradient = _gradient(body, u)
-    return _largest_strain(gradient), _largest_rotation(gradient)
+    parts = [gradient[start : start + CELLS] for start in range(0, len(gradient), CELLS)]
+    found = np.max([(_largest_strain(one), _largest_rotation(one)) for one in parts], axis=0)
+    return float(found[0]), float(found[1])
 
 
 def _largest_strain(gradient: Floats) -> float:

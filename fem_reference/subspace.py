@@ -92,8 +92,8 @@ def extended(body: Body, found: Subspace, vector: Floats) -> Subspace:
     """The subspace with one more vector, made orthogonal to the others in the mass."""
     V = found.vectors
     for _ in range(2):  # once is not enough in floating point
-        vector = vector - V @ (V.T @ (body.mass @ vector))
-        vector = vector / np.sqrt(vector @ (body.mass @ vector))
+        vector = vector - V @ (V.T @ body.inertia(vector))
+        vector = vector / np.sqrt(vector @ body.inertia(vector))
     pushed = body.stiffness @ vector
     column = V.T @ pushed
     stiffness = np.block([[found.stiffness, column[:, None]], [column[None], vector @ pushed]])
@@ -142,7 +142,7 @@ def ritz_subspaces(body: Body, near: Floats | None = None) -> Iterator[Subspace]
     tolerance = LOOSE
     while True:
         for _ in loads:  # each has its own sequence, a block of vectors to all of them
-            load = body.mass @ found.vectors[:, -len(loads)]
+            load = body.inertia(found.vectors[:, -len(loads)])
             found = extended(body, found, solve(load, tolerance, guesses.start(found, load)))
             yield found
         tolerance = min(LOOSENED * tolerance, LOOSEST)

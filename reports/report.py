@@ -37,6 +37,7 @@ from study.results.records import Provenance
 from study.stages.flat import Arrays
 from study.stages.lanes import Job, available, lanes
 from study.stages.once import kept, made_once
+from study.stages.threads import allowed
 from study.sweep.program import everything
 
 NAME = "report.pdf"
@@ -189,7 +190,7 @@ def _plots(results: Results) -> Figures:
     """All plots but pictures of the organ, drawn in two processes where there are processors."""
     drawings = _drawings(results)
     canvas.load()
-    with lanes(min(PROCESSES, available()), Silent()) as side_by_side:
+    with lanes(min(PROCESSES, allowed(available())), Silent()) as side_by_side:
         for number, draw in enumerate(drawings):
             side_by_side.start(Job(str(number), partial(_drawn, draw)))
         found = side_by_side.results()

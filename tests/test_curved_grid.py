@@ -7,6 +7,7 @@ import skfem
 from fem_reference.elasticity import discretise
 from fem_reference.grid import CurvedMapping, curved, mapping, straight
 from fem_reference.observation import at_points, evaluation
+from study.mesh.tetrahedra import edges
 from study.organ import liver
 from study.organ.isosurface_stuffing import stuff
 from study.organ.projection import onto_surface
@@ -36,6 +37,19 @@ def enclosed(grid):
 
 def to_ball(points):
     return onto_surface(ball, points)
+
+
+def test_edges_and_facets_are_those_of_scikit_fem():
+    mesh = ball_mesh(0.03)
+    own, other = straight(mesh), skfem.MeshTet(mesh.points.T.copy(), mesh.tetrahedra.T.copy())
+    bent = curved(mesh, to_ball)
+    for name in ("edges", "t2e", "facets", "t2f", "f2t"):
+        expected = getattr(other, name)
+        for grid in (own, bent):
+            assert np.array_equal(getattr(grid, name), expected), name
+            assert getattr(grid, name).dtype == expected.dtype
+    assert np.array_equal(bent.dofs.element_dofs, skfem.MeshTet2.from_mesh(other).dofs.element_dofs)
+    assert np.array_equal(edges(mesh.tetrahedra), other.edges.T)
 
 
 def test_points_move_onto_the_surface(rng):

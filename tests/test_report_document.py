@@ -26,6 +26,8 @@ from study import folders
 from study.commands.report import report as report_command
 from study.results.folder import Results, ResultsError, write
 from study.results.records import SCHEMA_VERSION
+from study.stages.lanes import available, lanes
+from study.stages.threads import threads
 from tests.report_samples import (
     FUZZY,
     LABELS,
@@ -57,6 +59,23 @@ def test_plots_are_the_same_bytes_in_one_process_or_two(monkeypatch):
     monkeypatch.setattr(report, "available", lambda: 1)
     assert report._plots(results) == two
     assert {"motion", "sets", "rules"} <= two.keys()
+
+
+def test_plots_take_no_more_processors_than_a_run_may_use(monkeypatch):
+    counts = []
+
+    def counted(count, progress):
+        counts.append(count)
+        return lanes(1, progress)
+
+    monkeypatch.setattr(report, "available", lambda: 2)
+    monkeypatch.setattr(report, "lanes", counted)
+    monkeypatch.setattr(report, "_drawings", lambda _: [])
+    for count in (1, 2):
+        with threads(count):
+            report._plots(results_of())
+    report._plots(results_of())
+    assert counts == [1, min(2, available()), 2]
 
 
 def kept(folder: Path) -> bytes:

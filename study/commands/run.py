@@ -64,7 +64,8 @@ def run(
     fresh
         Compute everything anew.
     workers
-        Processes that stages run in side by side, as many as processors by default; 1 for none.
+        Processors to use, all by default: stages run side by side in as many processes, the
+        products of the finite elements in two threads. With 1 all is done one after another.
     minutes
         Most that a model may take; one that needs longer is told as not finished, and the others
         go on.
@@ -224,7 +225,9 @@ def _report_failure(
 ) -> Exception | KeyboardInterrupt | None:
     """Make the reports; neither a fault in them nor a signal must cost a finished run."""
     from study.folders import claimed
+    from study.stages.lanes import available
     from study.stages.once import keeping_in
+    from study.stages.threads import threads
 
     if not (wanted.report or wanted.page):
         return None
@@ -233,6 +236,7 @@ def _report_failure(
             progress.stage("report"),
             claimed(how.folder),
             keeping_in(store, readable=not how.fresh),
+            threads(how.workers or available()),
         ):
             from study.commands.report import make
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import TetrahedralMesh
+from study.stages.threads import allowed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,7 +30,7 @@ def locate(mesh: TetrahedralMesh, points: Floats) -> tuple[Ints, Floats]:
 
     def best(points: Floats, count: int) -> tuple[Ints, Floats]:
         count = min(count, len(corner))
-        near = tree.query(points, k=count)[1].reshape(len(points), count)
+        near = tree.query(points, k=count, workers=allowed())[1].reshape(len(points), count)
         local = np.einsum("qcij,qcj->qci", inverse[near], points[:, None] - corner[near, 0])
         barycentric = np.concatenate([1.0 - local.sum(axis=2, keepdims=True), local], axis=2)
         chosen = barycentric.min(axis=2).argmax(axis=1)

@@ -40,7 +40,10 @@ def mean_edge(mesh: TetrahedralMesh) -> float:
 
 def edges(tetrahedra: Ints) -> Ints:
     """Distinct edges, shape (e, 2), the lower number first."""
-    return np.unique(np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+    pairs = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
+    count = int(pairs.max(initial=0)) + 1
+    # Sorted as one number each: numpy compares rows as bytes, which takes ten times as long.
+    return np.stack(np.divmod(np.unique(pairs @ np.array([count, 1])), count), axis=1)
 
 
 def smallest_dihedral_angle(mesh: TetrahedralMesh) -> Floats:

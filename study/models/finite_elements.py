@@ -13,7 +13,7 @@ from fem_reference import model as fem
 from fem_reference.burden import burden_of, laden
 from fem_reference.contact.motion import run as in_contact
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
-from fem_reference.elasticity import Body, of_tissue
+from fem_reference.elasticity import Body, Loaded, of_tissue
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
@@ -114,6 +114,7 @@ class PreparedElements:
     best: MeshSolution | None = field(default=None, init=False)
     _times: int = field(default=1, init=False)  # own steps, taken so many times as often
     _force_steps: Floats = field(default_factory=lambda: np.zeros(0), init=False)
+    _looked_at: tuple[Level, Loaded] | None = field(default=None, init=False)
 
     @property
     def critical_time_step(self) -> float:
@@ -131,8 +132,8 @@ class PreparedElements:
         """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
         self._refuse(self.own_level())
 
-    def _refuse(self, level: Level) -> None:
-        fem.refuse(level.mesh, *self._on(), self.model.reference.method)
+    def _refuse(self, level: Level) -> Loaded:
+        return fem.refuse(level.mesh, *self._on(), self.model.reference.method)
 
     def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
         """What a body is made of beside its mesh."""
@@ -151,8 +152,10 @@ class PreparedElements:
 
     def body(self, level: Level | None = None) -> Body:
         """The body on a level, that of the model by default. ValueError if there is no such."""
-        found = level or self.own_level()
-        built = fem.build(found.mesh, *self._on(), self.model.reference.method)
+        found, method = level or self.own_level(), self.model.reference.method
+        loaded = self._looked_at[1] if self._looked_at and self._looked_at[0] is found else None
+        self._looked_at = None  # its shape functions on the facets are large
+        built = fem.build(found.mesh, *self._on(), method, loaded)
         return laden(built, burden_of(self.problem))
 
     def simulate(self, longest: float | None = None) -> Simulation:
@@ -172,11 +175,16 @@ class PreparedElements:
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
 
     def rest_at(self, poisson_ratio: float) -> Floats:
-        """The same at another Poisson ratio, on the mesh of the last run if there was one."""
+        """The same at another Poisson ratio, on the mesh of the last run if there was one.
+
+        The matrices of that run are let go of, as both would be more than a run takes.
+        """
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
-        own = self._best_body()
+        own, start = self._best_body(), None
         body = of_tissue(own, tissue, self.model.reference.element)
-        start = None if self.best is None else self.best.found.rest(own)
+        if self.best is not None:
+            start, self.best = self.best.found.rest(own), self.best.outlined
+        del own
         points = self.problem.observation.volume_points
         return at_points(evaluation(body, points), self._at_rest(body, start))
 
@@ -356,7 +364,7 @@ class PreparedElements:
 
     def _is_usable(self, level: Level) -> bool:
         try:
-            self._refuse(level)
+            self._looked_at = level, self._refuse(level)
         except ValueError:  # too coarse to meet the tool, or too fine for the memory
             return False
         return True

@@ -15,14 +15,14 @@ from contextvars import ContextVar
 
 from study.stages.lanes import available
 
-_ALLOWED: ContextVar[int] = ContextVar("allowed", default=1)
+_ALLOWED: ContextVar[int | None] = ContextVar("allowed", default=None)
 _HELPERS: dict[int, ThreadPoolExecutor] = {}
 """The second thread of a process by its number: a fork has none of the threads before it."""
 
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """Let what is computed in the block use so many threads, or as many as there are processors."""
+    """Let what is done in the block use so many processors, or as many as there are."""
     token = _ALLOWED.set(max(1, min(count, available())))
     try:
         yield
@@ -30,12 +30,17 @@ def threads(count: int) -> Iterator[None]:
         _ALLOWED.reset(token)
 
 
+def allowed(otherwise: int = 1) -> int:
+    """Processors that what is done now may use, `otherwise` if it was not said."""
+    return _ALLOWED.get() or otherwise
+
+
 def side_by_side(*parts: Callable[[], None]) -> None:
     """Compute parts that do not touch each other: all here, or the second in another thread.
 
     They are to release the interpreter's lock. Whatever a part raises is raised here.
     """
-    if len(parts) != 2 or _ALLOWED.get() < 2:
+    if len(parts) != 2 or allowed() < 2:
         for part in parts:
             part()
         return
