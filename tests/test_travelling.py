@@ -8,6 +8,8 @@ import pytest
 
 from fem_reference.subspace import ritz_subspace
 from reports import field_figures
+from reports.page import data as page_data
+from reports.page.data import page
 from reports.renders import FLAT
 from study.models.table import model
 from study.plan import moved
@@ -243,8 +245,12 @@ def test_a_run_compares_all_that_follow(results):
 def test_results_keep_the_way_and_a_picture_draws_it(results, tmp_path):
     write(results, tmp_path)
     fields = read(tmp_path).fields
-    ((start, *_, end),) = fields["ways"]
+    (way,) = fields["ways"]
+    start, end = way[[0, -1]]
     np.testing.assert_allclose(end - start, [0.025, 0.0, 0.0], atol=1e-9)
+    dashes = page_data._dashes(fields["ways"])
+    np.testing.assert_allclose(dashes, way[:-1])  # whose pairs are drawn
+    assert page(results).organ.ways == page_data.packed(1e3 * dashes)
     drawn = field_figures.views(results)
     assert field_figures.explain(drawn)["travels"] == "1"
     picture = field_figures._scene(drawn, drawn.sheets[0], FLAT)
