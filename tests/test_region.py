@@ -148,6 +148,20 @@ MORE = {
         'tissue.inclusion=[{place={fraction=[0.5,0.5,0.5]},radius="9 mm",youngs_modulus="40 kPa"}]',
     ),
     "fixed-surfaces": ("support.kind=clamped",),
+    "weights": (
+        'weight=[{place={side="superior", at=[0.8, 0.5]}, mass="5 g", radius="8 mm"}]',
+        "gravity.acceleration=9.81 m/s^2",
+        "gravity.towards=inferior",
+        "gravity.given=loaded",
+    ),
+    "several-loads": (
+        'tool=[{place={side="superior", at=[0.5, 0.5]}, force="0.3 N", radius="10 mm"}, '
+        '{place={side="superior", at=[0.2, 0.5]}, force="0.2 N", radius="8 mm", '
+        'history={kind="sinusoid", frequency="5 Hz"}}]',
+    ),
+    "travelling-loads": (
+        'tool.path=[{time="0 s", offset=[0,0,0]}, {time="0.3 s", offset=["15 mm",0,0]}]',
+    ),
     "moved-tools": ("tool.shape=sphere", "tool.radius=8 mm", "tool.displacement=3 mm", *GRAVITY),
 }
 
@@ -176,9 +190,13 @@ def test_a_region_throughout_is_what_the_plain_lattice_is(what):
     if plain.burden is not None:
         np.testing.assert_allclose(whole.burden.dead, plain.burden.dead, rtol=1e-12, atol=1e-18)
         assert whole.burden.tools == plain.burden.tools
+        for name, has in (("attached", what == "weights"), ("loads", "loads" in what)):
+            one, other = getattr(plain.burden, name), getattr(whole.burden, name)
+            assert one.any() == has
+            np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-18)
 
 
-@pytest.mark.parametrize("what", ["inclusions", "fixed-surfaces", "moved-tools"])
+@pytest.mark.parametrize("what", sorted(set(MORE) - {"gravity"}))
 def test_a_region_follows_what_its_scene_has(what):
     """Closer to the uniform lattice than that is to one without."""
     plain, _, graded = following(what)

@@ -8,16 +8,21 @@ import pytest
 
 from fem_reference.subspace import ritz_subspace
 from reports import field_figures
+from reports.page import data as page_data
+from reports.page.data import page
 from reports.renders import FLAT
 from study.models.table import model
-from study.plan.plan import plan
+from study.plan import moved
+from study.plan.plan import measure, plan
 from study.problem import way
 from study.problem.way import Turn, stations, turns
 from study.progress import Silent
 from study.results.folder import read, write
+from study.robustness import organ_request
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
+from study.tradeoff.lineup import contenders_of
 from tests.benchmarks import travelling
 
 BLOCK = (
@@ -223,7 +228,8 @@ def test_after_its_way_the_tissue_settles_as_under_a_tool_that_was_always_there(
 
 @pytest.fixture(scope="module")
 def results(scene):
-    return run_study(replace(scene, tool=replace(scene.tool, force=0.3)))
+    given = replace(scene, models=("corrected",), tool=replace(scene.tool, force=0.3))
+    return run_study(given)
 
 
 def test_a_run_compares_all_that_follow(results):
@@ -239,8 +245,12 @@ def test_a_run_compares_all_that_follow(results):
 def test_results_keep_the_way_and_a_picture_draws_it(results, tmp_path):
     write(results, tmp_path)
     fields = read(tmp_path).fields
-    ((start, *_, end),) = fields["ways"]
+    (way,) = fields["ways"]
+    start, end = way[[0, -1]]
     np.testing.assert_allclose(end - start, [0.025, 0.0, 0.0], atol=1e-9)
+    dashes = page_data._dashes(fields["ways"])
+    np.testing.assert_allclose(dashes, way[:-1])  # whose pairs are drawn
+    assert page(results).organ.ways == page_data.packed(1e3 * dashes)
     drawn = field_figures.views(results)
     assert field_figures.explain(drawn)["travels"] == "1"
     picture = field_figures._scene(drawn, drawn.sheets[0], FLAT)
@@ -259,11 +269,67 @@ def test_a_small_load_that_travels_moves_the_corrected_lattice_as_the_elements(s
     assert np.linalg.norm(found - elements) < 2e-3 * np.linalg.norm(elements)
 
 
-def test_a_plan_knows_that_it_travels():
-    wanted = read_scene(
-        "block", (*BLOCK, WAY, 'require.quantities=["history"]', "require.error=90 %")
+WANTED = ('require.quantities=["history"]', "require.error=90 %", "tool.force=0.3 N")
+
+
+def looked(*more):
+    wanted = read_scene("block", (*BLOCK, WAY, *WANTED, *more))
+    posed = problem_of(wanted)
+    return wanted, moved.look(wanted, posed, measure(wanted.require, posed))
+
+
+def test_a_plan_foretells_lattices_and_corrected_ones():
+    wanted, seen = looked()
+    found = list(moved.corrected(wanted, seen))
+    assert {one.scene.models for one in found} == {("corrected",)}
+    parts = {
+        (one.scene.corrected.spacing, one.scene.reference.element_size): [
+            part.error for part in one.prediction.parts
+        ]
+        for one in found
+    }
+    left, mesh, _ = parts[0.01, 0.02]
+    coarser, _, _ = parts[0.02, 0.02]
+    finer = parts[0.01, 0.015][1]
+    assert coarser / left == pytest.approx(2.0**1.5)
+    assert mesh / finer == pytest.approx(1.0 / 0.75**2)
+    assert seen.spacing == 0.01
+    assert left < seen.apart  # which the error of this lattice alone is
+    with pytest.raises(ValueError, match=r"require\.error: .* nearest is"):
+        plan(replace(wanted, require=replace(wanted.require, error=1e-3)))
+
+
+def test_what_is_foretold_of_large_displacements_is_what_a_finer_lattice_finds(monkeypatch):
+    """No more, as it has a factor of two; by coarser lattices it is far less than what is found."""
+    wanted, seen = looked()
+    foretold = _left(wanted, seen, 0.01)
+    with monkeypatch.context() as coarser:
+        coarser.setattr(moved, "CORRECTED_LOOK", 1.25)
+        too_little = _left(*looked(), 0.01)
+    posed = problem_of(wanted)
+    known = model(wanted, "corrected")
+    fine, coarse = (
+        known.varied(spacing=h).prepare(posed).simulate().trajectory.displacement
+        for h in (0.005, 0.01)
     )
-    assert "mm" in next(one.choice for one in plan(wanted).decisions if one.about == "model")
+    off = np.linalg.norm(coarse - fine, axis=(0, 2)) / np.linalg.norm(fine, axis=(0, 2))
+    assert 0.2 * foretold < off.max() < foretold
+    assert off.max() > 2.0 * too_little
+
+
+def _left(wanted, seen, spacing):
+    """What is foretold that large displacements leave on a corrected lattice of a spacing."""
+    of_it = (o for o in moved.corrected(wanted, seen) if o.scene.corrected.spacing == spacing)
+    return next(of_it).prediction.parts[0].error
+
+
+def test_no_corrected_lattice_is_foretold_of_what_it_cannot_follow():
+    wanted, seen = looked("gravity.acceleration=9.81 m/s^2")
+    assert seen.beyond is None
+    assert not list(moved.corrected(wanted, seen))
+
+
+def test_rest_is_refused_of_a_tool_that_travels():
     with pytest.raises(SceneError, match="a blunt tool that travels"):
         read_scene("block", (*BLOCK, WAY, 'require.quantities=["rest"]'))
 
@@ -280,3 +346,17 @@ def test_the_sentence_on_stations_is_what_was_measured():
     for one in used:
         assert float(one["spline"]) < way.MEASURED
         assert float(one["hat"]) > 3.0 * way.MEASURED  # which is why they are not hats
+
+
+# --- in other studies -----------------------------------------------------------------------------
+
+
+def test_contenders_are_those_that_follow(scene):
+    found = contenders_of(scene)
+    assert {"corrected", "corrected-graded", "region", "finite-elements", "springs"} <= set(found)
+    assert "superposition" not in found
+
+
+def test_draws_of_a_patient_refuse_a_tool_that_travels(scene):
+    with pytest.raises(ValueError, match=r"robustness: .* travels; leave out its path"):
+        organ_request._refuse_moved(scene)

@@ -96,9 +96,9 @@ class Organ:
     """Surface at rest [mm], triangles, and its motion by model.
 
     `samples`: those of the curves that the frames are of; a model that diverged has the first of
-    them alone. `held` and `loaded`: numbers of triangles. `push`: direction of the tool; `probes`
-    [mm]; `factor`: by which displacements are exaggerated at first. `reference`: of the
-    differences, if there is one.
+    them alone. `held` and `loaded`: numbers of triangles. `ways` [mm] (2 k, 3): both ends of each
+    dash of the ways of tools. `push`: direction of the tool; `probes` [mm]; `factor`: by which
+    displacements are exaggerated at first. `reference`: of the differences, if there is one.
     """
 
     points: Packed
@@ -110,6 +110,7 @@ class Organ:
     samples: tuple[int, ...]
     held: Packed
     loaded: Packed
+    ways: Packed
     factor: float
     reference: str | None
 
@@ -310,9 +311,16 @@ def _organ(results: Results) -> Organ | None:
         samples=tuple(int(sample) for sample in fields["film"]),
         held=packed(np.flatnonzero(fields["held"] > HELD)),
         loaded=packed(np.flatnonzero(fields["loaded"] > LOADED)),
+        ways=packed(MILLI * _dashes(fields.get("ways", np.zeros((0, 0, 3))))),
         factor=_factor(fields["points"], [fields[name][0] for name in names]),
         reference=next((name for name in results.record.references if name in names), None),
     )
+
+
+def _dashes(ways: Floats) -> Floats:
+    """Both ends (2 k, 3) of dashes along ways (k, m, 3): of every other pair of places."""
+    pairs = [way[: 2 * (len(way) // 2)] for way in ways]
+    return np.concatenate(pairs) if pairs else np.zeros((0, 3))
 
 
 def _finite(frames: Floats) -> Floats:

@@ -215,7 +215,7 @@
   const organ = data.organ && {
     points: flat(data.organ.points), triangles: flat(data.organ.triangles), probes: flat(data.organ.probes),
     films: new Map(Object.entries(data.organ.films).map(([name, one]) => [name, { all: flat(one.values), unit: one.unit, frames: one.values.shape[0] }])),
-    held: flat(data.organ.held), loaded: flat(data.organ.loaded), most: new Map(),
+    held: flat(data.organ.held), loaded: flat(data.organ.loaded), ways: flat(data.organ.ways), most: new Map(),
     count: data.organ.points.shape[0] };
   const SIDES = ["left", "right"], KEYS = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10] };
   const INK = [0.84, 0.37, 0.0], RED = [0.8, 0.0, 0.0], BLUE = [0.0, 0.45, 0.7];
@@ -310,6 +310,7 @@
       const marks = [{ places: middles(organ.held, places), colour: BLUE, size: 4, kind: "on" },
         { places: middles(organ.loaded, places), colour: RED, size: 4, kind: "on" },
         { places: [...tip.map((x, d) => x - 0.45 * half * push[d]), ...tip], colour: RED, size: 1, kind: "line" },
+        { places: [...organ.ways], colour: RED, size: 1, kind: "line" },
         { places: probesOf(name).flat(), colour: INK, size: 9 }];
       view.values = values[k];
       view.draw({ places, shares: values[k].map((x) => x / limits[k]), marks },
@@ -338,7 +339,7 @@
   function tellOrgan(why) {
     const time = longest[state.sample];
     const at = Number.isFinite(time) ? ` Control points (orange) stand where their curves have them at ${time.toFixed(3)} s, along the push, whose line is red.` : "";
-    $("organ-note").textContent = `${why} The surface is kept at ${data.organ.samples.length} times and moves linearly in between. Blue dots: supports, red dots: where the surface is loaded. Displacements are drawn ${factor().toPrecision(3)} times as large.${at} Drag, or use the buttons or the arrow keys, to turn both; point at the surface to read it.`.trim();
+    $("organ-note").textContent = `${why} The surface is kept at ${data.organ.samples.length} times and moves linearly in between. Blue dots: supports, red dots: where the surface is loaded${organ.ways.length ? "; dashed: the way of the tool, on the organ at rest" : ""}. Displacements are drawn ${factor().toPrecision(3)} times as large.${at} Drag, or use the buttons or the arrow keys, to turn both; point at the surface to read it.`.trim();
     $("organ-factor-out").value = `× ${factor().toPrecision(3)}`;
     $("organ-time-out").value = Number.isFinite(time) ? `${time.toFixed(3)} s` : "";
   }

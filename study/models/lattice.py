@@ -318,9 +318,9 @@ class PreparedLattice:
         found = self._march(step)
         return Simulation(found.trajectory, found.smallest_step, found.margin, found.inverted_cells)
 
-    def moved(self) -> Run:
-        """The motion by the scene's steps with what it took, and without any error of it."""
-        return self._march(asked_step(self.model.lattice))
+    def moved(self, step: Step | None = None) -> Run:
+        """The motion by the scene's or given steps with what it took, without any error of it."""
+        return self._march(asked_step(self.model.lattice) if step is None else step)
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion, its error by halved steps, and the motion at both bounds of its stiffness."""

@@ -139,15 +139,22 @@ def _graded_at_rest(scene: Scene, problem: Problem) -> Iterator[GradedLook]:
 def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...], float]:
     found: list[ElementsLook] = []
     strain = 0.0
+    for level, size, prepared in meshes(scene, problem):
+        one, strain = _at_rest(prepared, level, size)
+        found.append(one)
+    return tuple(found), strain
+
+
+def meshes(scene: Scene, problem: Problem) -> Iterator[tuple[int, float, PreparedElements]]:
+    """Number, size and elements of each mesh that is looked at, from coarse to fine."""
+    found = 0
     for level in LEVELS:
         at = problem.geometry.level(level)
         element = chosen_element(scene.reference.element, problem.tissue.highest_poisson_ratio)
         if at is None or (found and unknowns(at.mesh, element) > MOST_UNKNOWNS):
             continue
-        prepared = reference_of(scene).varied(level=level).prepare(problem)
-        one, strain = _at_rest(prepared, level, at.size)
-        found.append(one)
-    return tuple(found), strain
+        found += 1
+        yield level, at.size, reference_of(scene).varied(level=level).prepare(problem)
 
 
 def _at_rest(prepared: PreparedElements, level: int, size: float) -> tuple[ElementsLook, float]:

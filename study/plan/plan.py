@@ -80,9 +80,10 @@ def plan(scene: Scene) -> Plan:
 
 
 def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
-    """Of a scene with moved tools, or more than one load: lattices, for others may not follow."""
+    """Of a scene with moved tools, or more than one load: lattices, corrected where they may be."""
     seen = moved.look(scene, problem, measure(required, problem))
-    chosen = choose(list(moved.lattices(scene, seen)), required)
+    offered = [*moved.lattices(scene, seen), *moved.corrected(scene, seen)]
+    chosen = choose(offered, required)
     return Plan(chosen.scene, tuple(_moved_decisions(scene, seen, chosen, required)), chosen)
 
 
@@ -181,7 +182,9 @@ def _moved_decisions(
     )
     yield Decision("model", chosen.name, _why(chosen, required))
     yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
-    yield Decision("reference", "none", "a run tells the error by a lattice of twice the spacing")
+    half = chosen.scene.models == ("corrected",)
+    other = "half the spacing, of meshes and vectors" if half else "twice the spacing"
+    yield Decision("reference", "none", f"a run tells the error by a lattice of {other}")
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
 
