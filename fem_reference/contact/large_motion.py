@@ -191,9 +191,10 @@ def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
     """
     found, n = unload(body.solid, load, body.free), body.solid.size
     if found.reached < 1.0:
+        part = f", but for {100.0 * found.reached:.2g} % of the load" if found.reached else ""
         raise UnfinishedError(
             "gravity.given: no shape without load is found from which the organ would sag into the "
-            f"given one, but for {100.0 * found.reached:.2g} % of the load",
+            f"given one{part}",
             'reduce gravity.acceleration, or set gravity.given to "unloaded"',
         )
     return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
