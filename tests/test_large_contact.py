@@ -192,6 +192,23 @@ def test_halved_steps_change_the_force_little(cycle):
     assert 0.0 < np.linalg.norm(whole - half) < 0.1 * np.linalg.norm(half)
 
 
+def test_what_a_tool_hits_moves_with_the_tool():
+    """A stage that starts off the tool makes up for what it missed by a velocity of its own."""
+    speed, step = 0.03, 0.0125
+    body, sphere = block(), tool(depth=speed * 0.1, corners=(0.0, 0.1))
+    given = pressed(body, TISSUE, (sphere,), DAMPING, np.zeros_like, np.array([0.0, 0.1]))
+    steps, contact, seen = Steps(given), given.body.contact, 0
+    for count, state in enumerate(steps.march(steps.start(), step)):
+        u, closed = given.body.given(state.w), state.force > 0.0
+        pushed = contact.derivative(u, state.time)[closed] @ state.v
+        nearer = (contact.gaps(u, state.time) - contact.gaps(u, state.time - 1e-6)) / 1e-6
+        assert pushed == pytest.approx(-nearer[closed], abs=0.01 * speed)
+        seen += int(closed.sum())
+        if count == 8:
+            break
+    assert seen > 2
+
+
 def test_a_tool_that_is_held_ends_at_rest():
     body, sphere, seen = block(), tool(corners=(0.0, 0.1, 1.0)), observed(1.0, 41, 40)
     given, found = moved(body, sphere, seen)

@@ -175,6 +175,22 @@ class Balance:
         self._answers = None
         raise UnbalancedError("no balance of forces")
 
+    def in_touch(self, state: Balanced, v: Floats, time: float, since: float) -> Floats:
+        """The velocity [m/s] (n,) nearest to another with which closed gaps stay closed.
+
+        Nearest by the last tangent. `since` [s]: a time shortly before, by which tools are seen to
+        move.
+        """
+        contact, u, answers = self.body.contact, self.body.given(state.w), self._answers
+        chosen = np.flatnonzero(contact.held | (state.force > 0.0))
+        if answers is None or not len(chosen):
+            return v
+        closing = (contact.gaps(u, time) - contact.gaps(u, since))[chosen] / (time - since)
+        pushed = contact.derivative(u, time)[chosen]
+        columns = answers.to(chosen)[: len(v)]
+        impulse = np.linalg.lstsq(pushed @ columns, -(closing + pushed @ v))[0]
+        return np.asarray(v + columns @ impulse)
+
     def _worn(self, demand: Demand, size: float, before: float) -> bool:
         """Whether the factors are of another system, or serve no longer."""
         known = self._answers

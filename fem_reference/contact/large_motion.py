@@ -54,6 +54,8 @@ MARGIN = 0.5
 """Round what a tool would meet of the surface at rest, over its radius, of a plate its travel."""
 LOOKS, MOST_LOOKS = 32, 1000
 """Places of a tool on its way at which the surface is looked at."""
+SHORTLY = 1e-3
+"""Of a stage's length, over which the speed of a tool at its end is seen."""
 FARTHEST = 0.5
 """Share of its radius that a tool may move in a step: it must not pass through a surface unseen."""
 
@@ -187,9 +189,10 @@ def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
     """
     found, n = unload(body.solid, load, body.free), body.solid.size
     if found.reached < 1.0:
+        part = f", but for {100.0 * found.reached:.2g} % of the load" if found.reached else ""
         raise UnfinishedError(
             "gravity.given: no shape without load is found from which the organ would sag into the "
-            f"given one, but for {100.0 * found.reached:.2g} % of the load",
+            f"given one{part}",
             'reduce gravity.acceleration, or set gravity.given to "unloaded"',
         )
     return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
@@ -288,7 +291,10 @@ class Steps:
         rest = step - length
         guess = _onward(now, first, goal)
         base = now.w[:n] + rest * first.v
-        return self._stage(goal, length, base, now.v + rest * acceleration, guess)
+        last = self._stage(goal, length, base, now.v + rest * acceleration, guess)
+        since = goal - SHORTLY * length
+        v = self.balance.in_touch(Balanced(last.w, last.force), last.v, goal, since)
+        return last._replace(v=v)
 
     def _stage(
         self, time: float, length: float, place: Floats, speed: Floats, guess: Balanced
