@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from reports import summary
 from reports.appearance import labels, system_name
 from reports.benchmarks import read
-from reports.differences import elements, finite_elements, own_error
-from reports.digits import PA_PER_KPA, fixed, percent, quantity, significant
+from reports.differences import elements, finite_elements, own_error, resolved
+from reports.digits import PA_PER_KPA, fixed, percent, quantity, significant, symbols
 from reports.page.answer import answer, curve_error, question
 from reports.ranking import tool_probe
+from reports.validation import validation
 from reports.verification import outcomes
 from study.results.folder import Results
 from study.results.records import ModelRecord
@@ -59,6 +60,10 @@ def _context(results: Results) -> Iterator[str]:
 
 
 def _code() -> Iterator[str]:
+    yield (
+        "Software quality: the program comes with its tests, types and import contracts, which "
+        "`.ci/run` repeats on a clean clone; environment/ has the versions that made the results."
+    )
     lines = read("verification")
     if not lines:
         yield "No table of verification was delivered with this version."
@@ -70,6 +75,11 @@ def _code() -> Iterator[str]:
 
 
 def _calculation(results: Results) -> Iterator[str]:
+    yield (
+        "Use error: inputs are refused before anything is computed where they cannot be meant "
+        "(`liver-study check`); inputs/ has the scene as it was run, with every default, and no "
+        "number of this summary was typed by hand."
+    )
     probe = tool_probe(results)
     for model in results.record.models:
         if model.status != "finished":
@@ -99,10 +109,22 @@ def _parts(model: ModelRecord) -> str:
 
 def _validation(results: Results) -> Iterator[str]:
     yield "No experiment is compared with in this run: the comparator is another model."
+    measured = validation()
+    if measured is not None:
+        yield (
+            f"Beside measurements on bodies of silicone at rest {measured['within']} differences "
+            "lie within twice the measurement's uncertainty and the model's own error. Not of this "
+            "run, and none is liver: `liver-study validate` repeats it."
+        )
     if finite_elements(results) is None:
         yield "It has no finite elements either: differences of its models are no errors."
         return
-    named = labels(results)
+    yield (
+        "Comparator: the finite elements of the same scene. Organ, support, tools, load and "
+        "damping are the same inputs; the modulus is the scene's own in the finite elements, and "
+        "in the other models what they are tuned by."
+    )
+    named, own = labels(results), own_error(results)
     rows = [
         row
         for row in results.field_differences
@@ -110,8 +132,8 @@ def _validation(results: Results) -> Iterator[str]:
     ]
     for row in sorted(rows, key=lambda row: row.value):
         yield (
-            f"{named[row.model]} against the finite elements: {percent(row.value)} of the field at "
-            "the peak, relative L2."
+            f"{named[row.model]} against the finite elements: {resolved(row.value, own)} of the "
+            "field at the peak, relative L2."
         )
 
 
@@ -139,6 +161,10 @@ def _uncertainty(results: Results) -> Iterator[str]:
 
 
 def _applicability(results: Results) -> Iterator[str]:
+    yield (
+        "Relevance to the context of use: the quantities are those compared; the comparison holds "
+        "for this organ, support, tools, load and duration, and is no evidence for others."
+    )
     model, limit = finite_elements(results), results.record.strain_limit
     is_linear = model is not None and model.elements is not None and model.elements.law is None
     if model is not None and is_linear and model.largest_strain is not None:
@@ -148,6 +174,6 @@ def _applicability(results: Results) -> Iterator[str]:
             f"{percent(limit)} up to which linear strain is trusted here."
         )
     for text in results.record.assumptions:
-        yield f"Assumed: {text}"
+        yield f"Assumed: {symbols(text)}"
     for warning in results.record.warnings:
         yield f"Warning of the run: {warning}"

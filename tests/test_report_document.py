@@ -162,7 +162,7 @@ def test_no_text_of_a_figure_is_below_8_point(monkeypatch):
     monkeypatch.setattr(canvas, "svg", measured)
     monkeypatch.setattr(report, "available", lambda: 1)
     report.draw(results_of())
-    assert len(seen) > 100
+    assert len(seen) > 50
     assert min(seen) >= canvas.TEXT_SIZE
 
 

@@ -48,8 +48,8 @@ TINY = 1e-300
 class Moving:
     """State at a time [s].
 
-    `q`, `v` (m,): in the subspace; `r`, `s` (c,): forces as the dents follow them, and their rates
-    [N/s]; `grip`: the forces under the tools.
+    `q`, `v` (m,): in the subspace; `r`, `s` (c + k,): forces under tools, and factors of the loads,
+    as the dents follow them, and their rates [N/s, 1/s]; `grip`: the forces under the tools.
     """
 
     time: float
@@ -86,24 +86,27 @@ class Stages:
         )
         self.delay = damping.stiffness / (damping.stiffness + length)
         lever = (self.shapes * (length**2 * self.damped)) @ body.pushed.T
-        self.lever = lever + (1.0 - self.delay) * self.residual
+        self.under_tools = len(body.pushed)
+        self.lever = lever + (1.0 - self.delay) * self.residual[:, : self.under_tools]
         compliance = np.asarray(given.touch.means @ self.lever)
         self.compliance = 0.5 * (compliance + compliance.T)
 
     def loaded(self, time: float) -> Floats:
-        """Forces of the loads on the modes at a time [s]."""
-        return np.asarray(self.body.loads @ np.atleast_1d(self.factors(np.array([time]))[0]))
+        """Factors (k,) of the loads at a time [s]."""
+        return np.atleast_1d(self.factors(np.array([time]))[0])
 
     def reached(self, time: float, q: Floats, v: Floats, r: Floats, grip: Grip) -> Moving:
         """The state at a time [s], from what the stage starts from, and the forces before."""
-        body, length = self.body, self.length
-        free = (v + length * (self.loaded(time) - body.squares * q)) * self.damped
-        left = self.delay * r
-        base = self.base + self.shapes @ (q + length * free) + self.residual @ left
+        body, length, count = self.body, self.length, self.under_tools
+        loaded = self.loaded(time)
+        free = (v + length * (body.loads @ loaded - body.squares * q)) * self.damped
+        dented = self.delay * r
+        dented[count:] += (1.0 - self.delay) * loaded
+        base = self.base + self.shapes @ (q + length * free) + self.residual @ dented
         answer = Answer(base, self.lever, self.compliance)
         found = self.given.touch.settled(answer, grip, time)
         speed = free + length * self.damped * (body.pushed.T @ found.force)
-        dented = left + (1.0 - self.delay) * found.force
+        dented[:count] += (1.0 - self.delay) * found.force
         rate = (dented - r) / length
         return Moving(time, q + length * speed, speed, dented, rate, found)
 
@@ -182,7 +185,8 @@ class Pressed:
         """At rest under what acts at all times, with the tools where they start."""
         grip = self.given.at_rest(self.base, self.given.free, np.zeros(1))
         q = (body.pushed.T @ grip.force) / body.squares
-        return Moving(0.0, q, np.zeros_like(q), grip.force, np.zeros_like(grip.force), grip)
+        dented = np.append(grip.force, np.zeros(self.given.body.loads.shape[1]))
+        return Moving(0.0, q, np.zeros_like(q), dented, np.zeros_like(dented), grip)
 
     def stages(self, body: Reduced) -> Stages:
         """Of this motion."""

@@ -69,6 +69,12 @@ class Answered:
         found = np.asarray(self.touch.means @ self.lever)
         return np.asarray(0.5 * (found + found.T))
 
+    @cached_property
+    def of_loads(self) -> Floats:
+        """Answers [m] (n, k) to the loads in full, nought where one is."""
+        loads = self.body.loads.T
+        return np.column_stack([self.solve(one) if one.any() else one for one in loads])
+
     def at_rest(self, displacement: Floats, start: Grip, times: Floats) -> Grip:
         """Forces at the last of times [s] on the way of the tools, without motion.
 
@@ -174,7 +180,8 @@ class Reduced:
     """A body in a subspace, with what is left of the answers beside it.
 
     `squares` [1/s^2] (m,) and `shapes` (n, m) of its modes, `pushed` (c, m): displacement means of
-    these, `loads` (m, k); `residual` [m/N] (n, c): of the answers.
+    these, `loads` (m, k); `residual` [m/N] (n, c + k): of the answers to forces under tools, then
+    of those to the loads.
     """
 
     squares: Floats
@@ -206,7 +213,7 @@ def krylov(given: Answered, generations: int) -> Subspace:
 
 
 def _of_loads(given: Answered) -> list[Floats]:
-    return [given.solve(load) for load in given.body.loads.T if load.any()]
+    return [answer for answer in given.of_loads.T if answer.any()]
 
 
 def _patterns(given: Answered) -> Floats:
@@ -230,15 +237,16 @@ def _with(body: Body, found: Subspace, vector: Floats) -> Subspace:
 def reduced(given: Answered, subspace: Subspace, highest: float) -> Reduced:
     """The body in the modes of a subspace below the `highest` angular frequency [1/s].
 
-    Those above follow their forces at once, as what is outside of the subspace does. At least one
-    is kept.
+    Those above follow their forces, of loads as of tools, at once, as what is outside of the
+    subspace does. At least one is kept.
     """
     squares, modes = eigh(subspace.stiffness)
     kept = max(1, int(np.searchsorted(squares, highest**2)))
     squares, shapes = squares[:kept], subspace.vectors @ modes[:, :kept]
     pushed = np.asarray(given.touch.pushes.T @ shapes)
     loads = shapes.T @ given.body.loads
-    residual = given.answers - (shapes / squares) @ pushed.T
+    answers = np.column_stack([given.answers, given.of_loads])
+    residual = answers - (shapes / squares) @ np.vstack([pushed, loads.T]).T
     return Reduced(squares, shapes, pushed, loads, residual)
 
 
