@@ -24,6 +24,7 @@ SCENE = [
     "time.samples=17",
     'models=["fem"]',
 ]
+MOVED = ("tool.shape=sphere", "tool.displacement=2 mm")
 E = Free("tissue.youngs_modulus", "Pa", 100.0, 1e6, 9.5e3)
 TIMES = np.linspace(0.1, 1.0, 12)
 
@@ -66,8 +67,12 @@ def test_what_a_curve_does_not_determine_is_refused():
         solve(lambda _: TIMES, curve(TIMES), [E])
     with pytest.raises(ValueError, match="does not tell them apart"):
         solve(lambda v: 5.0 * TIMES / (v[0] * v[1]) * 1e6, curve(TIMES * 1e-3), [E, other])
-    with pytest.raises(ValueError, match="wider than"):
+    with pytest.raises(ValueError, match="goes beyond"):
         solve(compliant, curve(compliant([6e3]), 1.0), [E])
+    # Below the range of a logarithm without a lower limit, but above the largest Poisson ratio.
+    ratio = Free("tissue.poisson_ratio", "", 1e-7, 0.49999, 0.4)
+    with pytest.raises(ValueError, match="goes beyond"):
+        solve(lambda v: TIMES * (1.0 - v[0]), curve(TIMES * 0.6, 0.6), [ratio])
     with pytest.raises(ValueError, match="no value between"):
         solve(compliant, curve(compliant([1e8]), 1e-9), [E])
     with pytest.raises(ValueError, match="cannot determine"):
@@ -80,6 +85,32 @@ def test_models_that_there_are_not_are_refused():
         fit(scene, curve(TIMES), ["tissue.youngs_modulus"], "nope", QUIET)
     with pytest.raises(ValueError, match=r"organ\.shape"):
         fit(read_scene("paper"), curve(TIMES), ["tissue.youngs_modulus"], "fem", QUIET)
+
+
+@pytest.mark.parametrize(
+    ("model", "overrides", "message"),
+    [
+        ("corrected", MOVED, "--model corrected: .*corrected cannot follow rigid tools"),
+        ("superposition", ('gravity={acceleration="9.81 m/s^2"}',), "cannot follow gravity"),
+        ("reading", ("patient={}",), "reading needs a reading"),
+        ("msm", (), "--model msm: stands for 3 models; name one system"),
+    ],
+)
+def test_a_model_that_cannot_follow_the_scene_or_is_several_is_refused(model, overrides, message):
+    scene = read_scene("block", (*SCENE, *overrides))
+    column = "force_N" if overrides is MOVED else "displacement_m"
+    given = curve(TIMES, column=column)
+    with pytest.raises(ValueError, match=message):
+        fit(scene, given, ["damping.ratio"], model, QUIET)
+
+
+def test_a_choice_of_the_computation_and_a_curve_of_zeros_are_refused():
+    scene = read_scene("block", SCENE)
+    for key in ("lattice.spacing", "reference.element_size", "time.duration"):
+        with pytest.raises(ValueError, match=f"{key}: is a choice of the computation"):
+            free_of(scene, key)
+    with pytest.raises(ValueError, match="zero throughout"):
+        fit(scene, curve(0.0 * TIMES), ["tissue.youngs_modulus"], "fem", QUIET)
 
 
 def test_only_positive_quantities_of_the_scene_are_free():
@@ -103,6 +134,8 @@ def write(path, header, rows):
         ("time_s,displacement_m", ["0,0", "1,nan", "2,1"], r"line 3: displacement_m"),
         ("time_s,displacement_m", ["0,0", "1", "2,1"], r"line 3: 1 cells"),
         ("time_s,displacement_m", ["0,0", "1,1", "1,2"], r"line 4: time_s does not grow"),
+        ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r"line 5: time_s does not grow"),
+        ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r"displacement_m stands there tw"),
         ("time_s,displacement_m", ["0,0"], r"give 3 or more"),
         ("time_s,displacement_m,force_N", ["0,0,0"], r"give one of the columns"),
         ("displacement_m", ["0", "1", "2"], r"time_s is missing"),
@@ -113,6 +146,47 @@ def write(path, header, rows):
 def test_a_curve_that_is_none_is_refused_by_line(tmp_path, header, rows, message):
     with pytest.raises(ValueError, match=message):
         read_curve(write(tmp_path / "c.csv", header, rows))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time_s;force_N\n0,0;0\n0,5;1,5e-3\n1,0;2\n",
+        "time_s\tforce_N\r\n0\t0\r\n0.5\t0,0015\r\n1\t2\r\n",
+        "\ufeff\n time_s , force_N\n0,0\n\n0.5,1.5e-3\n1,2\n,\n",
+    ],
+)
+def test_a_curve_is_read_as_spreadsheets_write_it(tmp_path, text):
+    path = tmp_path / "c.csv"
+    path.write_bytes(text.encode())
+    found = read_curve(path)
+    assert found.times.tolist() == [0.0, 0.5, 1.0]
+    assert found.values.tolist() == [0.0, 0.0015, 2.0]
+
+
+def test_every_csv_file_of_a_folder_counts_but_hidden_ones(tmp_path):
+    rows = ["0,0", "1,1", "2,2"]
+    for name in ("PRESS.CSV", "lift.csv", "notes.txt"):
+        write(tmp_path / name, "time_s,force_N", rows)
+    (tmp_path / "._lift.csv").write_bytes(b"\x00\x05\xff")
+    write(tmp_path / "Markers.csv", "x_m,y_m,z_m,ux_m,uy_m,uz_m", ["0,0,0,0,0,1"] * 3)
+    found = own_scene.read_folder(tmp_path)
+    assert sorted(found.curves) == ["PRESS", "lift"]
+    assert len(found.markers.places) == 3
+    write(tmp_path / "press.CSV", "time_s,force_N", rows)
+    write(tmp_path / "PRESS.csv", "time_s,force_N", rows)
+    with pytest.raises(ValueError, match=r"holds PRESS twice"):
+        own_scene.read_folder(tmp_path)
+
+
+def test_markers_outside_of_the_organ_are_refused_by_line(posed, tmp_path):
+    """In millimetres, or of another frame: models would be extrapolated to them."""
+    scene, _, _ = posed
+    rows = ["0.03,0.03,0.02,0,0,0", "", "0.03,0.03,20,0,0,0", "0.03,0.03,0.04,0,0,0"]
+    path = write(tmp_path / "markers.csv", "x_m,y_m,z_m,ux_m,uy_m,uz_m", rows)
+    found = own_scene.comparisons(scene, OwnData({}, read_markers(path)), QUIET)
+    with pytest.raises(ValueError, match=r"line 4: \(0.03, 0.03, 20\) m lies outside the organ"):
+        next(found)
 
 
 def test_files_that_are_not_there_or_no_text_are_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fem_reference import model as fem
 from fem_reference.solvers import solve_static
@@ -9,7 +10,7 @@ from study.check import describe_scene
 from study.mesh.tetrahedra import volumes
 from study.problem.varied import VariedTissue, of_tetrahedra
 from study.results.provenance import organ_sha256
-from study.scene.file import read_scene, validate, write_scene
+from study.scene.file import read_scene, resolved, validate, write_scene
 from study.scene.problem import problem_of
 
 nibabel = pytest.importorskip("nibabel")
@@ -57,6 +58,36 @@ def test_voxels_lie_where_their_affine_says(tmp_path, mirrored):
     found = problem.tissue.mapped(at)
     assert found[:2] == pytest.approx([5e3, 20e3])
     assert np.isnan(found[2])
+
+
+def test_an_image_that_lies_askew_is_read_where_it_lies(tmp_path):
+    """A field that is linear in place is what interpolation gives, whichever way voxels run."""
+
+    def linear(points):
+        return 50.0 + points @ [100.0, 200.0, -50.0]
+
+    middle = np.array([-30.0, -20.0, 15.0])  # of the block, in RAS
+    turned = STEP * Rotation.from_euler("xyz", [20.0, -35.0, 50.0], degrees=True).as_matrix()
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = turned, middle - turned @ np.full(3, 24.5)
+    index = np.stack(np.meshgrid(*[np.arange(50)] * 3, indexing="ij"), axis=-1)
+    points = 1e-3 * (index @ affine[:3, :3].T + affine[:3, 3]) * [-1.0, -1.0, 1.0]
+    nibabel.save(nibabel.Nifti1Image(linear(points), affine), tmp_path / "askew.nii")
+    found = problem_of(scene_of(tmp_path / "askew.nii")).tissue.mapped
+    at = np.array([[0.01, 0.02, 0.015], [0.05, 0.03, 0.02], [0.03, 0.01, 0.005]])
+    assert found(at) == pytest.approx(1e3 * linear(at))
+
+
+def test_an_inclusion_counts_before_the_map_and_no_part_twice(tmp_path):
+    path = image(tmp_path / "map.nii", lambda points: np.full(points.shape[:-1], 20.0))
+    table = resolved(scene_of(path))
+    table["tissue"]["inclusion"] = [BALL]
+    problem = problem_of(validate(table, "made"))
+    made = of_tetrahedra(problem.geometry.mesh, problem.tissue)
+    assert np.abs(made.around).max() < 1e-12
+    size, whole = volumes(problem.geometry.mesh), 4.0 / 3.0 * np.pi * 0.01**3
+    assert size @ made.share[:, 0] == pytest.approx(whole, rel=0.02)
+    assert size @ made.mapped_share == pytest.approx(size.sum() - whole, rel=0.02)
 
 
 def test_a_uniform_map_is_the_tissue_of_its_modulus(tmp_path):
@@ -128,8 +159,6 @@ def test_an_image_of_no_use_is_refused(tmp_path, make, unit, message):
 
 
 def with_inclusions(*given):
-    from study.scene.file import resolved
-
     table = resolved(read_scene("block", BLOCK))
     table["tissue"]["inclusion"] = list(given)
     return validate(table, "made")

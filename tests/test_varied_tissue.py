@@ -91,6 +91,16 @@ def test_shares_of_elements_and_cells_keep_the_volume_of_a_ball(radius, within):
     assert own == pytest.approx(exact, rel=within)
 
 
+@pytest.mark.parametrize("semi_axes", [(0.018, 0.004, 0.004), (0.016, 0.016, 0.003)])
+def test_shares_keep_the_volume_of_an_ellipsoid(semi_axes):
+    """Far from a ball: what lies near is not told by the longest of its axes."""
+    shape = Ellipsoid(CENTRE, np.array(semi_axes))
+    tissue = VariedTissue(regions=(Region(name="oval", distance=shape, youngs_modulus=E),))
+    mesh = block_mesh((0.04, 0.04, 0.04), 0.005)
+    own = float(volumes(mesh) @ of_tetrahedra(mesh, tissue).share[:, 0])
+    assert own == pytest.approx(4.0 / 3.0 * np.pi * np.prod(semi_axes), rel=0.02)
+
+
 def test_the_last_of_two_regions_counts_where_they_meet():
     two = (ball(2 * E, 0.015), ball(3 * E, 0.008))
     mesh = block_mesh((0.04, 0.04, 0.04), 0.005)

@@ -2,7 +2,7 @@
 
 Least squares in the logarithms of the quantities, by the model's motion at each; the interval is
 that of the linearised problem, with Student's t. A quantity that the curve does not determine is
-refused: one whose interval is wider than its allowed range, that ends at a limit of it, or that
+refused: one whose interval goes beyond its allowed range, that ends at a limit of it, or that
 another can take the place of.
 """
 
@@ -27,6 +27,7 @@ from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.scene import Scene
+from study.scene.consistency import contradictions
 from study.scene.problem import problem_of
 from study.validation.own_data import Curve
 from study.validation.own_scene import coarser, probe_number, refuse_unanswered, seen
@@ -42,6 +43,8 @@ AT_LIMIT = 1e-3
 """How near a logarithm lies to a limit that it is at."""
 LARGEST_CONDITION = 1e6
 MOST_RUNS = 60
+CHOSEN = ("lattice", "reference", "superposition", "corrected", "region", "time", "require")
+"""Tables of a scene whose quantities are those of a computation, and of no body."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,11 @@ def free_of(scene: Scene, key: str) -> Free:
             f"--free {key}: is no positive quantity of the scene; give for example "
             "tissue.youngs_modulus"
         )
+    if table in CHOSEN:
+        raise ValueError(
+            f"--free {key}: is a choice of the computation, which no measurement determines; give "
+            "a quantity of the body, for example tissue.youngs_modulus"
+        )
     low = max(quantity.low, 1e-6 * value, 1e-12)
     return Free(key, quantity.unit, low, quantity.high, value)
 
@@ -136,6 +144,11 @@ def fit(
         raise ValueError(f"--model {model}: is not one of {', '.join(MODELS)}")
     if scene.is_point:
         raise ValueError("organ.shape: a single point has no body to be fitted; give an organ")
+    asked = dataclasses.replace(scene, models=(model,))
+    for problem in contradictions(asked, {}):
+        raise ValueError(f"--model {model}: {problem}")
+    if not curve.values.any():
+        raise ValueError("--curve: is zero throughout, which any quantity fits; measure a load")
     free = [free_of(scene, key) for key in keys]
     if len({one.key for one in free}) < len(free) or not free:
         raise ValueError("--free: give each quantity once, one at least")
@@ -167,6 +180,11 @@ class _Runs:
         scene = changed(self.scene, dict(zip(self.keys, values, strict=True)))
         scene = dataclasses.replace(scene, models=(self.model,))
         found = list(models_of(scene, estimates(scene) if is_tuned(scene) else {}))
+        if len(found) > 1:
+            raise ValueError(
+                f"--model {self.model}: stands for {len(found)} models; name one system in "
+                "fuzzy.systems, or another model"
+            )
         return found[0], problem_of(scene)
 
     def predict(self, values: Floats) -> Floats:
@@ -246,15 +264,15 @@ def _refuse_undetermined(slope: Floats, free: Sequence[Free]) -> None:
 
 def _refuse_open(logs: Floats, half: Floats, limits: Floats, free: Sequence[Free]) -> None:
     for x, h, low, high, one in zip(logs, half, *limits, free, strict=True):
-        if not 2.0 * h < high - low:
-            raise ValueError(
-                f"--free {one.key}: the curve does not determine it: its 95 % interval is wider "
-                f"than {one.low:g} to {one.high:g} {one.unit}; measure more, or fit fewer"
-            )
         if min(x - low, high - x) < AT_LIMIT:
             raise ValueError(
                 f"--free {one.key}: no value between {one.low:g} and {one.high:g} {one.unit} fits "
                 "best; check the units of the curve and the scene's load"
+            )
+        if not (2.0 * h < high - low and x + h < high):
+            raise ValueError(
+                f"--free {one.key}: the curve does not determine it: its 95 % interval goes beyond "
+                f"{one.low:g} to {one.high:g} {one.unit}; measure more, or fit fewer"
             )
 
 

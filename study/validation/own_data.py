@@ -4,16 +4,18 @@ A curve has the columns `time_s` and either `displacement_m`, of a control point
 push, or `force_N`, with which a tool that is moved is pushed; `uncertainty`, in the unit of the
 curve and one standard uncertainty of each value, if it is known. `markers.csv` has `x_m`, `y_m`,
 `z_m`, where markers were before the load, and `ux_m`, `uy_m`, `uz_m`, how far they had moved when
-it was largest, and `uncertainty`.
+it was largest, and `uncertainty`. Columns are parted by commas, or by semicolons or tabs, where
+decimal commas are read too.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ CURVES = {"displacement_m": "m", "force_N": "N"}
 """Columns of curves, and their units."""
 PLACES, MOVES = ("x_m", "y_m", "z_m"), ("ux_m", "uy_m", "uz_m")
 FEWEST = 3
+DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True)
@@ -44,88 +47,114 @@ class Curve:
 
 @dataclass(frozen=True)
 class OwnMarkers:
-    """Places and displacements [m] (m, 3) of markers; their standard uncertainty [m] (m,)."""
+    """Places and displacements [m] (m, 3) of markers; their standard uncertainty [m] (m,).
+
+    `lines` (m,) of the file that they stand in, for messages.
+    """
 
     places: Floats
     moved: Floats
     uncertainty: Floats | None
+    lines: tuple[int, ...] = ()
 
 
 def read_curve(path: Path) -> Curve:
     """A curve from a CSV file; ValueError naming file, line and column for one that is none."""
-    columns = _header(path)
-    found = [name for name in CURVES if name in columns]
+    table = _table(path)
+    found = [name for name in CURVES if name in table.header]
     if len(found) != 1:
         raise ValueError(f"{path}: give one of the columns {' and '.join(CURVES)} beside {TIME}")
-    numbers = _read(path, (TIME, found[0]))
-    times = numbers[:, 0]
+    times, values = table.numbers((TIME, found[0])).T
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
-        raise ValueError(f"{path}: line {late[0] + 3}: {TIME} does not grow; sort the lines by it")
-    return Curve(found[0], times, numbers[:, 1], _uncertainty(path))
+        raise table.fault(int(late[0]) + 1, f"{TIME} does not grow; sort the lines by it")
+    return Curve(found[0], times, values, _uncertainty(table))
 
 
 def read_markers(path: Path) -> OwnMarkers:
     """Markers from a CSV file; ValueError naming file, line and column for a file without."""
-    numbers = _read(path, (*PLACES, *MOVES))
-    return OwnMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(path))
+    table = _table(path)
+    numbers = table.numbers((*PLACES, *MOVES))
+    return OwnMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(table), table.lines)
 
 
-def _uncertainty(path: Path) -> Floats | None:
-    if UNCERTAINTY not in _header(path):
+def _uncertainty(table: _Table) -> Floats | None:
+    if UNCERTAINTY not in table.header:
         return None
-    found = _read(path, (UNCERTAINTY,))[:, 0]
+    found = table.numbers((UNCERTAINTY,))[:, 0]
     wrong = np.flatnonzero(found <= 0.0)
     if len(wrong):
-        raise ValueError(f"{path}: line {wrong[0] + 2}: {UNCERTAINTY} must be above 0")
+        raise table.fault(int(wrong[0]), f"{UNCERTAINTY} must be above 0")
     return found
 
 
-def _header(path: Path) -> Sequence[str]:
-    reader = csv.reader(_text(path).splitlines())
-    return [name.strip() for name in next(reader, [])]
+class _Table(NamedTuple):
+    """Cells of a CSV file: its header, the rows that hold any, and the lines on which they end."""
 
+    path: Path
+    header: list[str]
+    rows: list[list[str]]
+    lines: tuple[int, ...]
+    decimal: str
 
-def _read(path: Path, columns: tuple[str, ...]) -> Floats:
-    """Numbers (lines, columns) of the named columns."""
-    header = _header(path)
-    lacking = [name for name in columns if name not in header]
-    if lacking:
-        raise ValueError(f"{path}: line 1: the column {lacking[0]} is missing; give {columns}")
-    places = [header.index(name) for name in columns]
-    rows = list(_rows(path, header, places))
-    if len(rows) < FEWEST:
-        raise ValueError(f"{path}: {len(rows)} lines of numbers; give {FEWEST} or more")
-    return np.array(rows)
+    def fault(self, row: int, what: str) -> ValueError:
+        """The error that blames a row."""
+        return ValueError(f"{self.path}: line {self.lines[row]}: {what}")
 
-
-def _rows(path: Path, header: Sequence[str], places: list[int]) -> Iterator[list[float]]:
-    lines = csv.reader(_text(path).splitlines())
-    next(lines)
-    for number, cells in enumerate(lines, 2):
-        if not cells:
-            continue
-        if len(cells) != len(header):
+    def numbers(self, columns: tuple[str, ...]) -> Floats:
+        """Numbers (rows, columns) of the named columns."""
+        for name in columns:
+            if self.header.count(name) != 1:
+                said = "stands there twice" if name in self.header else "is missing"
+                raise ValueError(f"{self.path}: line 1: the column {name} {said}; give {columns}")
+        if len(self.rows) < FEWEST:
             raise ValueError(
-                f"{path}: line {number}: {len(cells)} cells, the first line has {len(header)}"
+                f"{self.path}: {len(self.rows)} lines of numbers; give {FEWEST} or more"
             )
-        yield [_number(path, number, header[place], cells[place]) for place in places]
+        places = [self.header.index(name) for name in columns]
+        return np.array(
+            [[self._number(row, place) for place in places] for row in range(len(self.rows))]
+        )
+
+    def _number(self, row: int, place: int) -> float:
+        cells = self.rows[row]
+        if len(cells) != len(self.header):
+            raise self.fault(row, f"{len(cells)} cells, the first line has {len(self.header)}")
+        try:
+            found = float(cells[place].replace(self.decimal, "."))
+        except ValueError:
+            found = math.nan
+        if not math.isfinite(found):
+            name, text = self.header[place], cells[place].strip()
+            raise self.fault(row, f"{name}: {text!r} is not a finite number")
+        return found
 
 
-def _number(path: Path, line: int, column: str, text: str) -> float:
+def _table(path: Path) -> _Table:
+    """The cells, parted by commas, semicolons or tabs, whichever parts the header into most.
+
+    Where it is not commas, they may stand in numbers as decimal ones.
+    """
+    text = _text(path)
+    delimiter = max(DELIMITERS, key=text.partition("\n")[0].count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
-        raise ValueError(f"{path}: line {line}: {column}: {text.strip()!r} is not a finite number")
-    return found
+        filled = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise ValueError(f"{path}: line {reader.line_num}: {error}; export it again") from None
+    header = [name.strip() for name in filled[0][1]] if filled else []
+    rows = [row for _, row in filled[1:]]
+    decimal = "." if delimiter == "," else ","
+    return _Table(path, header, rows, tuple(line for line, _ in filled[1:]), decimal)
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            return file.read()
     except UnicodeDecodeError:
-        raise ValueError(f"{path}: not a text in UTF-8; save it as CSV") from None
+        raise ValueError(f"{path}: not a text in UTF-8; save it as CSV in UTF-8") from None
     except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
         raise ValueError(f"{path}: there is no such file; give a CSV file") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror}); give a CSV file") from None

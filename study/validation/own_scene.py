@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.error_estimate import discretisation_error
+from study.mesh.locate import locate
 from study.models.estimates import estimates
 from study.models.model import Model, Simulation
 from study.models.table import is_tuned, models_of
@@ -18,7 +19,7 @@ from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.scene import Scene
-from study.scene.problem import problem_of
+from study.scene.problem import OUTSIDE, problem_of
 from study.validation.own_data import Curve, OwnMarkers, read_curve, read_markers
 from study.validation.rows import ORDER, Comparison
 
@@ -42,15 +43,21 @@ def read_folder(folder: Path) -> OwnData:
     """All CSV files of a folder. ValueError for a folder without, or a file that is no such."""
     if not folder.is_dir():
         raise ValueError(f"--data {folder}: there is no such folder; give one with CSV files")
-    files = sorted(folder.glob("*.csv"))
+    shown = sorted(one for one in folder.iterdir() if not one.name.startswith("."))
+    files = [one for one in shown if one.suffix.lower() == ".csv"]
     if not files:
         raise ValueError(
             f"--data {folder}: holds no CSV file; put a curve in it (time_s, displacement_m or "
             f"force_N), or {MARKERS}"
         )
-    curves = {file.stem: read_curve(file) for file in files if file.name != MARKERS}
-    markers = folder / MARKERS
-    return OwnData(curves, read_markers(markers) if markers in files else None)
+    of_markers = [one for one in files if one.name.lower() == MARKERS]
+    curves = [one for one in files if one not in of_markers]
+    for found in ([one.stem for one in curves], [MARKERS for _ in of_markers]):
+        twice = {name for name in found if found.count(name) > 1}
+        if twice:
+            raise ValueError(f"--data {folder}: holds {min(twice)} twice; rename one of them")
+    markers = read_markers(of_markers[0]) if of_markers else None
+    return OwnData({one.stem: read_curve(one) for one in curves}, markers)
 
 
 def comparisons(
@@ -88,7 +95,24 @@ def comparisons(
 
 
 def _marked(problem: Problem, markers: OwnMarkers) -> Problem:
-    """The problem seen at the markers too, after its control points."""
+    """The problem seen at the markers too, after its control points.
+
+    ValueError naming the line of one outside of the organ, where models have nothing to say.
+    """
+    within = locate(problem.geometry.mesh, markers.places)[1].min(axis=1)
+    if (within < OUTSIDE).any():
+        worst = int(within.argmin())
+        line = f"line {markers.lines[worst]}: " if markers.lines else ""
+        place = ", ".join(f"{value:g}" for value in markers.places[worst])
+        low, high = (
+            problem.geometry.mesh.points.min(axis=0),
+            problem.geometry.mesh.points.max(axis=0),
+        )
+        extent = " x ".join(f"{a:.3g} to {b:.3g}" for a, b in zip(low, high, strict=True))
+        raise ValueError(
+            f"{MARKERS}: {line}({place}) m lies outside the organ, which is {extent} m; give "
+            "metres in the axes of the scene, and markers inside the organ"
+        )
     probes = np.concatenate([problem.observation.probes, markers.places])
     return replace(problem, observation=replace(problem.observation, probes=probes))
 
