@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -205,6 +206,7 @@ def test_commands_in_prose_exist_with_their_flags(page):
             assert re.search(rf"{flag}\b", shown), f"{name} has no {flag}"
 
 
+@cache
 def help_of(name):
     done = subprocess.run(
         [sys.executable, "-m", "study", name, "--help"],
