@@ -20,7 +20,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 Floats = NDArray[np.float64]
 
@@ -116,4 +115,6 @@ def observed_order(
 
     if excess(FLATTEST) > 0.0:
         return None
+    from scipy.optimize import brentq
+
     return float(brentq(excess, FLATTEST, STEEPEST)) if excess(STEEPEST) > 0.0 else STEEPEST

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import NoConvergence, anderson
 from scipy.sparse import csr_array
 
 from msm.kernel import kernel
@@ -56,6 +55,8 @@ def unloaded(law: Law, net: Network, dead: Floats) -> tuple[Network, Floats]:
     """
     if net.linear or not dead.any():
         return net, np.zeros_like(dead)
+    from scipy.optimize import NoConvergence, anderson  # here, as few runs need it
+
     entries = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
     support = csr_array(entries, shape=(len(dead), len(dead)))
 

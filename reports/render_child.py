@@ -46,12 +46,13 @@ def _draw(
 ) -> NDArray[np.uint8]:
     surface = pv.PolyData.from_regular_faces(points, triangles)
     surface["colours"] = colours
-    options = {"show_edges": True, "edge_color": "#303030", "edge_opacity": 0.18} | SHADING
-    actor = plotter.add_mesh(surface, scalars="colours", rgb=True, reset_camera=False, **options)
+    look = {"show_edges": True, "edge_color": "#303030", "edge_opacity": 0.18} | SHADING
+    quietly = {"reset_camera": False, "render": False}  # each change would be rendered
+    actor = plotter.add_mesh(surface, scalars="colours", rgb=True, **quietly, **look)
     plotter.reset_camera_clipping_range()
     plotter.render()
     pixels = np.array(plotter.screenshot(return_img=True))
-    plotter.remove_actor(actor)
+    plotter.remove_actor(actor, render=False)
     return pixels
 
 

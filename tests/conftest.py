@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+import warnings
+from dataclasses import dataclass
 
 # Two BLAS threads spin against each other on small factors; must be set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -11,6 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
+from study import signals
+from study.__main__ import main
 from study.problem.problem import Problem
 from study.run.study import run_study
 from study.scene import Scene
@@ -49,6 +54,37 @@ def _store_of_their_own(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIVER_STUDY_STORE", str(tmp_path_factory.mktemp("store")))
         yield
+
+
+@dataclass(frozen=True)
+class Ended:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def typed(monkeypatch, capsys, tmp_path):
+    """The program on words typed in an empty folder, without starting another Python."""
+
+    def enter(*words):
+        monkeypatch.setattr(sys, "argv", ["liver-study", *map(str, words)])
+        code = 0
+        with warnings.catch_warnings():
+            # Our words are where the program looks for them; the library expects arguments.
+            warnings.filterwarnings("ignore", message="Cyclopts application invoked without tokens")
+            try:
+                main()
+            except SystemExit as left:
+                code = left.code or 0
+        return Ended(code, *capsys.readouterr())
+
+    handlers = {number: signal.getsignal(number) for number in signals.numbers()}
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    monkeypatch.chdir(tmp_path)
+    yield enter
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")

@@ -7,15 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from study import progress, signals
-from study.__main__ import main
 from study.commands import EXIT_MACHINE
 from study.results import tables
 from study.scene.file import read_scene
@@ -44,37 +41,6 @@ def study(*arguments, cwd=None, **options):
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         **options,
     )
-
-
-@dataclass(frozen=True)
-class Ended:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def typed(monkeypatch, capsys, tmp_path):
-    """The program on words typed in an empty folder, without starting another Python."""
-
-    def enter(*words):
-        monkeypatch.setattr(sys, "argv", ["liver-study", *words])
-        code = 0
-        with warnings.catch_warnings():
-            # Our words are where the program looks for them; the library expects arguments.
-            warnings.filterwarnings("ignore", message="Cyclopts application invoked without tokens")
-            try:
-                main()
-            except SystemExit as left:
-                code = left.code or 0
-        return Ended(code, *capsys.readouterr())
-
-    handlers = {number: signal.getsignal(number) for number in signals.numbers()}
-    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
-    monkeypatch.chdir(tmp_path)
-    yield enter
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="module")

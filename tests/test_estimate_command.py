@@ -1,9 +1,6 @@
 """`liver-study estimate` and `rules`, as a person with a rule base of their own uses them."""
 
 import csv
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +17,6 @@ from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 from study.estimation import EstimationRequest, answer
 
 ROOT = Path(__file__).resolve().parent.parent
-
-
-def study(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "study", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
 
 
 def tipper(footprint=0.0):
@@ -88,11 +74,10 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_a_table_by_a_rule_base_of_ones_own(folder):
-    done = study(
+def test_a_table_by_a_rule_base_of_ones_own(typed, folder):
+    done = typed(
         *("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv"),
         *("--system", "mamdani", "--out", "out.csv"),
-        cwd=folder,
     )
     assert done.returncode == 0, done.stderr
     found = rows(folder / "out.csv")
@@ -110,11 +95,10 @@ def test_a_table_by_a_rule_base_of_ones_own(folder):
         (["--sugeno-aggregation", "max"], "sugeno", {"sugeno_aggregation": "max"}),
     ],
 )
-def test_a_table_is_evaluated_as_the_flags_say(folder, flags, kind, options):
-    done = study(
+def test_a_table_is_evaluated_as_the_flags_say(typed, folder, flags, kind, options):
+    done = typed(
         *("estimate", "--rule-base", "tipper.json", "--inputs", "in.csv"),
         *("--system", kind, "--out", "out.csv", *flags),
-        cwd=folder,
     )
     assert done.returncode == 0, done.stderr
     X = np.array([[2.0, 1.0], [4.0, 5.0], [7.0, 8.0]])
@@ -126,7 +110,7 @@ def test_a_table_is_evaluated_as_the_flags_say(folder, flags, kind, options):
         assert bounds == expected.interval.tolist()
 
 
-def test_a_reading_out_of_range_is_noted_with_its_line(folder):
+def test_a_reading_out_of_range_is_noted_with_its_line(typed, folder):
     (folder / "in.csv").write_text("food,service\n1,2\n11,2\n")
     arguments = (
         "estimate",
@@ -137,77 +121,76 @@ def test_a_reading_out_of_range_is_noted_with_its_line(folder):
         "--system",
         "sugeno",
     )
-    done = study(*arguments, "--out", "out.csv", cwd=folder)
+    done = typed(*arguments, "--out", "out.csv")
     assert "food: reading 11 (line 3) is outside 0-10; clamped to it" in done.stderr
-    refused = study(*arguments, "--out", "no.csv", "--out-of-range", "raise", cwd=folder)
+    refused = typed(*arguments, "--out", "no.csv", "--out-of-range", "raise")
     assert refused.returncode == 2
     assert "line 3" in refused.stderr
     assert not (folder / "no.csv").exists()
 
 
-def test_a_flag_of_the_liver_is_refused_beside_a_rule_base(folder):
-    done = study(
+@pytest.mark.usefixtures("folder")
+def test_a_flag_of_the_liver_is_refused_beside_a_rule_base(typed):
+    done = typed(
         *("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv", "--system", "mamdani"),
         *("--out", "out.csv", "--reading", "R2"),
-        cwd=folder,
     )
     assert done.returncode == 2
     assert "--reading: shapes the liver's rules only" in done.stderr
 
 
-def test_explain_names_rules_sets_and_switch_points(tmp_path):
-    done = study("estimate", "--hcv", "9.5", "--explain", "--knowledge", "severity", cwd=tmp_path)
+def test_explain_names_rules_sets_and_switch_points(typed):
+    done = typed("estimate", "--hcv", "9.5", "--explain", "--knowledge", "severity")
     assert done.returncode == 0, done.stderr
     assert "if hcv is F4 then severe" in done.stdout
     assert "bounds switch at" in done.stdout
     assert "share" in done.stdout
 
 
-def test_a_row_of_a_table_is_explained(folder):
+@pytest.mark.usefixtures("folder")
+def test_a_row_of_a_table_is_explained(typed):
     arguments = ("estimate", "--rule-base", "tipper.fis", "--inputs", "in.csv", "--explain")
-    done = study(*arguments, "--system", "mamdani", "--row", "3", cwd=folder)
+    done = typed(*arguments, "--system", "mamdani", "--row", "3")
     assert done.returncode == 0, done.stderr
     assert "mamdani: 20.34" in done.stdout
-    assert study(*arguments, "--system", "mamdani", "--row", "4", cwd=folder).returncode == 2
+    assert typed(*arguments, "--system", "mamdani", "--row", "4").returncode == 2
 
 
-def test_rules_are_audited(tmp_path):
-    done = study("rules", "--knowledge", "severity", cwd=tmp_path)
+def test_rules_are_audited(typed):
+    done = typed("rules", "--knowledge", "severity")
     assert done.returncode == 0, done.stderr
     assert "12 of 247 rules repeat an earlier rule" in done.stdout
     assert "236 of 247 rules change no answer" in done.stdout
 
 
-def test_the_liver_is_written_as_sugeno_too(tmp_path):
-    done = study(
-        *("rules", "--knowledge", "severity", "--out", "liver.fis", "--sugeno"), cwd=tmp_path
-    )
+def test_the_liver_is_written_as_sugeno_too(typed, tmp_path):
+    done = typed(*("rules", "--knowledge", "severity", "--out", "liver.fis", "--sugeno"))
     assert done.returncode == 0, done.stderr
     assert "without footprints" in done.stdout
     assert read_rule_base(tmp_path / "liver.fis").is_sugeno
 
 
-def test_a_table_with_a_reading_that_no_liver_has_is_refused(tmp_path):
+def test_a_table_with_a_reading_that_no_liver_has_is_refused(typed, tmp_path):
     (tmp_path / "in.csv").write_text("hcv,hbv,ald,cld,nafld\n9,4,4,4,4\n9500,4,4,4,4\n")
     arguments = ("estimate", "--inputs", "in.csv", "--system", "mamdani", "--out", "out.csv")
-    done = study(*arguments, cwd=tmp_path)
+    done = typed(*arguments)
     assert done.returncode == 2
     assert "in.csv:3: hcv: 9500 cannot be; give 0.5 to 150 kPa" in done.stderr
     assert not (tmp_path / "out.csv").exists()
 
 
-def test_a_missing_column_is_not_looked_for_under_another_disease(tmp_path):
+def test_a_missing_column_is_not_looked_for_under_another_disease(typed, tmp_path):
     (tmp_path / "in.csv").write_text("hcv [kPa],hbv,ald,cld,nafld\n9,4,4,4,4\n")
     arguments = ("estimate", "--inputs", "in.csv", "--system", "mamdani", "--out", "out.csv")
-    done = study(*arguments, cwd=tmp_path)
+    done = typed(*arguments)
     assert done.returncode == 2
     assert "no column 'hcv'" in done.stderr
     assert "did you mean 'hbv'" not in done.stderr
 
 
 @pytest.mark.parametrize("suffix", ["fis", "json"])
-def test_the_liver_is_written_and_read_back(tmp_path, suffix):
-    done = study("rules", "--knowledge", "severity", "--out", f"liver.{suffix}", cwd=tmp_path)
+def test_the_liver_is_written_and_read_back(typed, tmp_path, suffix):
+    done = typed("rules", "--knowledge", "severity", "--out", f"liver.{suffix}")
     assert done.returncode == 0, done.stderr
     liver, back = (
         liver_system(LiverSettings(knowledge="severity")),
@@ -219,11 +202,10 @@ def test_the_liver_is_written_and_read_back(tmp_path, suffix):
         assert back == type_1_of(liver)
 
 
-def test_figures_are_drawn_over_any_two_readings(tmp_path):
-    done = study(
+def test_figures_are_drawn_over_any_two_readings(typed, tmp_path):
+    done = typed(
         *("estimate", "--hcv", "9.5", "--figures", "out", "--surface", "ald", "nafld"),
         *("--system", "mamdani"),
-        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     names = {path.name for path in (tmp_path / "out").iterdir()}

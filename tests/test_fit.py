@@ -1,8 +1,6 @@
 """Own measurements: files refused by line, a scene beside them, quantities fitted or refused."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -251,15 +249,13 @@ def test_a_modulus_is_found_again_and_its_error_told(posed):
     assert json.loads(fit_table.as_json(found))["quantities"][0]["key"] == "tissue.youngs_modulus"
 
 
-def test_the_commands_refuse_with_exit_code_2(tmp_path):
+def test_the_commands_refuse_with_exit_code_2(typed, tmp_path):
     path = write(tmp_path / "c.csv", "time_s,displacement_m", ["0,0", "1,x", "2,1"])
     for command in (
         ["fit", "block", "--curve", str(path), "--free", "tissue.youngs_modulus"],
         ["validate", "block", "--data", str(tmp_path)],
         ["validate", "--data", str(tmp_path)],
     ):
-        done = subprocess.run(
-            [sys.executable, "-m", "study", *command], capture_output=True, text=True, check=False
-        )
+        done = typed(*command)
         assert done.returncode == 2
         assert "Traceback" not in done.stderr

@@ -1,9 +1,6 @@
 """The models there are: what each promises, how scenes name them, what studies ask of them."""
 
 import dataclasses
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -82,16 +79,8 @@ def test_a_model_that_no_code_runs_is_refused_with_those_there_are():
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
-def test_so_it_is_by_the_commands_with_exit_code_2(command, tmp_path):
-    words = [command, "block", "--set", 'models=["fem", "rods"]']
-    done = subprocess.run(
-        [sys.executable, "-m", "study", *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
+def test_so_it_is_by_the_commands_with_exit_code_2(command, typed, tmp_path):
+    done = typed(command, "block", "--set", 'models=["fem", "rods"]')
     assert done.returncode == 2
     assert all(repr(name) in done.stderr for name in MODELS)
     assert "Traceback" not in done.stderr

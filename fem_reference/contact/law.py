@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from fem_reference.contact.friction import relaxed
 
@@ -58,6 +57,8 @@ def forces(areas: Areas, start: Floats) -> Floats:
 
 def _by_least_squares(A: Floats, b: Floats, held: Bools, usable: Bools) -> Floats:
     """The same, the held forces eliminated, and the others from a problem of one sign."""
+    from scipy.optimize import nnls
+
     found = np.zeros(len(b))
     h, p = np.flatnonzero(held), np.flatnonzero(usable & ~held)
     own = np.linalg.solve(A[np.ix_(h, h)], np.column_stack([A[np.ix_(h, p)], b[h]]))

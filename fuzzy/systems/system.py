@@ -284,28 +284,31 @@ def firing_strengths(
     """
     degrees = _degrees(system, X, membership)
     others = degrees if opposite is None else _degrees(system, X, opposite)
+    sizes = [len(variable.sets) for variable in system.inputs]
+    starts = np.cumsum([0, *sizes[:-1]])
     strengths = np.empty((len(system.rules), len(X)))
     for group in system.rules_alike:
         join = _join(group.connective, system.operators)
-        terms = (_of_terms(*term, degrees, others) for term in group.terms)
+        terms = (
+            _of_terms(starts[inputs] + sets, negated, degrees, others)
+            for inputs, sets, negated in group.terms
+        )
         strengths[group.rules] = group.weights[:, None] * reduce(join, terms)
     return strengths
 
 
-def _degrees(system: FuzzySystem, X: Array, membership: Membership) -> list[Array]:
-    return [memberships(variable, X[:, i], membership) for i, variable in enumerate(system.inputs)]
+def _degrees(system: FuzzySystem, X: Array, membership: Membership) -> Array:
+    """Degrees (sets of all inputs, N), input by input."""
+    inputs = [(i, variable) for i, variable in enumerate(system.inputs) if variable.sets]
+    return np.concatenate([memberships(one, X[:, i], membership) for i, one in inputs])
 
 
-def _of_terms(
-    inputs: Indices, sets: Indices, negated: Booleans, degrees: list[Array], others: list[Array]
-) -> Array:
-    """Degree of one term of each of several rules, shape (rules, N)."""
-    found = np.empty((len(inputs), max(one.shape[-1] for one in degrees)))
-    for i in np.unique(inputs):
-        plain, opposed = (np.flatnonzero((inputs == i) & which) for which in (~negated, negated))
-        found[plain] = degrees[i][sets[plain]]
-        found[opposed] = 1.0 - others[i][sets[opposed]]
-    return found
+def _of_terms(sets: Indices, negated: Booleans, degrees: Array, others: Array) -> Array:
+    """Degree of one term of each of several rules, shape (rules, N); `sets` are rows of degrees."""
+    found = degrees[sets]
+    if negated.any():
+        found[negated] = 1.0 - others[sets[negated]]
+    return np.asarray(found)
 
 
 def _join(connective: Connective, operators: Operators) -> Callable[[Array, Array], Array]:

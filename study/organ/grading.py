@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from study.mesh.bisection import Bisection, cut_into
 from study.mesh.kinds import TetrahedralMesh
@@ -99,4 +98,6 @@ def _parts(weight: Floats, total: float) -> Floats:
     fewest, most = -float(some.max()), float(np.log(MOST_PARTS) - some.min())
     if parts(most).sum() <= total:
         return parts(most)
+    from scipy.optimize import brentq
+
     return parts(float(brentq(lambda x: parts(x).sum() - total, fewest, most, xtol=1e-9)))

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from study.similarity.enclosed_area import area_between
 
@@ -36,6 +35,8 @@ OFFSET_COUNT = 101
 
 def frechet_distance(candidate: Floats, reference: Floats) -> float:
     """Discrete Frechet distance: the shortest leash for two walkers who never turn back."""
+    from scipy.spatial.distance import cdist
+
     return leash(cdist(*comparable(candidate, reference)))
 
 
