@@ -8,7 +8,7 @@ from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.quadrature import over_surface, over_volume
 from study.mesh.tetrahedra import boundary, refined, smallest_dihedral_angle, volumes
-from study.organ import liver
+from study.organ import isosurface_stuffing, liver
 from study.organ.block import block_mesh
 from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import ImplicitBody, MeshBody
@@ -174,3 +174,46 @@ def test_tool_profile_is_that_of_its_radius():
     up = np.tile([0, 0, 1.0], (4, 1))
     assert tool.profile(points, up) == pytest.approx([1.0, 0.5625, 0.0, 0.0])
     assert not tool.profile(points, -up).any()
+
+
+def bisected(signed, inside, outside):
+    """By bisection alone."""
+    low, high = np.zeros(len(inside)), np.ones(len(inside))
+    for _ in range(isosurface_stuffing.BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_inside = signed(inside + middle[:, None] * (outside - inside)) < 0
+        low, high = np.where(is_inside, middle, low), np.where(is_inside, high, middle)
+    return inside + low[:, None] * (outside - inside)
+
+
+SHAPES = {
+    "smooth": lambda p: np.linalg.norm(p, axis=-1) - 1.0,
+    "flat": lambda p: p[..., 0] - 1.0,
+    "kinked": lambda p: np.abs(p).max(axis=-1) - 1.0,
+    "jumping": lambda p: np.sign(np.linalg.norm(p, axis=-1) - 1.0),
+    "steep": lambda p: np.expm1(40.0 * (np.linalg.norm(p, axis=-1) - 1.0)),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("guesses", [0, isosurface_stuffing.GUESSES])
+def test_a_crossing_is_the_one_of_bisection_to_the_bit(shape, guesses, rng, monkeypatch):
+    monkeypatch.setattr(isosurface_stuffing, "GUESSES", guesses)
+    ways = rng.normal(size=(200, 3))
+    inside, outside = (r * ways / np.linalg.norm(ways, axis=1)[:, None] for r in (0.4, 1.9))
+    ends = [SHAPES[shape](points) for points in (inside, outside)]
+    kept = (ends[0] < 0) & (ends[1] > 0)
+    found = isosurface_stuffing._crossing(SHAPES[shape], inside[kept], outside[kept])
+    assert np.array_equal(found, bisected(SHAPES[shape], inside[kept], outside[kept]))
+
+
+def test_a_crossing_takes_less_than_half_of_the_looks_of_bisection(rng):
+    looks = []
+
+    def counted(points):
+        looks.append(len(points))
+        return np.linalg.norm(points, axis=-1) - 1.0
+
+    ways = rng.normal(size=(200, 3))
+    isosurface_stuffing._crossing(counted, 0.1 * ways / 10.0, ways / 0.01)
+    assert sum(looks) < 0.5 * isosurface_stuffing.BISECTIONS * len(ways)
