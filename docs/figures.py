@@ -438,6 +438,49 @@ def corrected() -> Iterator[tuple[str, str]]:
     yield from _at_1_khz(costs)
 
 
+TRAVELLING_HEAD = (
+    *("largest strain", "places", "nonlinear part", "corrected, 20 mm", "15 mm", "10 mm", "8 mm"),
+    *("corrected at rest only, 20 mm", "lattice alone, 10 mm", "5 mm", "10 mm, held to 5 mm"),
+)
+TRAVELLING_STRAINS = (("5 %", 0.0, 0.1), ("20 %", 0.1, 1.0))
+
+
+def travelling() -> Iterator[tuple[str, str]]:
+    """A tool that travels: its stations, and corrected lattices under it."""
+    used = [one for one in measured("travelling_stations") if float(one["apart"]) == 0.25]
+    for name in ("spline", "hat"):
+        yield f"travelling-{name}", percent(max(float(one[name]) for one in used))
+    places = measured("travelling_places")
+    yield "travelling-count", str(len({(one["at_x"], one["at_z"]) for one in places}))
+    yield "travelling-vectors", span([float(one["vectors"]) for one in places], "{:.0f}".format)
+    rows = [_travelling(places, *one) for one in TRAVELLING_STRAINS]
+    yield "travelling-places", table(TRAVELLING_HEAD, rows)
+    price = {
+        (one["model"], _rounded(one["spacing_m"]), 0.0): float(one["per_second"])
+        for one in measured("travelling_cost")
+    }
+    for words, (_, above, up_to) in zip(("small", "large"), TRAVELLING_STRAINS, strict=True):
+        found = [one for one in places if above < float(one["strain"]) <= up_to]
+        gains, own = (
+            [gain for one in found if (gain := _gain(one, price, kind)) is not None]
+            for kind in ("uniform", "own")
+        )
+        yield f"travelling-met-{words}", f"{len(gains)} of {len(found)}"
+        yield f"travelling-gain-{words}", span(gains, "{:.2g}".format)
+        yield f"travelling-own-gain-{words}", span(own, "{:.2g}".format)
+    static = sum(float(one["static_20"]) > TOLERANCE for one in places)
+    yield "travelling-static-missed", f"{static} of {len(places)}"
+
+
+def _travelling(lines: list[Line], words: str, above: float, up_to: float) -> list[str]:
+    found = [line for line in lines if above < float(line["strain"]) <= up_to]
+    columns = (
+        *("nonlinear", "error_20", "error_15", "error_10", "error_8", "static_20"),
+        *("uniform_10", "uniform_5", "own_10"),
+    )
+    return [words, str(len(found)), *(_median_and_worst(found, name) for name in columns)]
+
+
 GRADED_HEAD = (
     *("largest strain", "places", "region for 2 %", "lattice of 10 mm", "8 mm"),
     *("corrected, 20 mm", "10 mm", "graded, to 0.6 radii", "to 1 radius"),
@@ -854,7 +897,7 @@ def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
-    models = (error_bar_livers, certified, tradeoff, corrected, graded, planned)
+    models = (error_bar_livers, certified, tradeoff, corrected, travelling, graded, planned)
     held = (verification, validation, stability, ranking, organ)
     groups = (*fuzzy, *lattice, *models, run_stages, *held)
     return {name: text for group in groups for name, text in group()}

@@ -24,6 +24,7 @@ from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
 from study.tradeoff.lineup import contenders_of
 from tests.benchmarks import travelling
+from tests.benchmarks.corrected_places import TOLERANCE
 
 BLOCK = (
     'organ.size=["80 mm", "40 mm", "30 mm"]',
@@ -346,6 +347,18 @@ def test_the_sentence_on_stations_is_what_was_measured():
     for one in used:
         assert float(one["spline"]) < way.MEASURED
         assert float(one["hat"]) > 3.0 * way.MEASURED  # which is why they are not hats
+
+
+def test_on_the_liver_small_strain_is_met_by_coarse_corrected_lattices():
+    """Beside it as controls the correction at rest alone and lattices without any."""
+    rows = list(travelling.kept().values())
+    small = [one for one in rows if one.strain <= 0.05]
+    assert (len(small), len(rows)) == (5, 10)
+    assert all(one.error_20 < TOLERANCE for one in small)
+    assert max(one.static_20 for one in small) > 5.0 * TOLERANCE
+    assert all(one.error_20 < 0.6 * one.own_10 for one in rows)
+    assert all(one.error_8 < one.error_20 for one in rows)
+    assert not any(one.inverted for one in rows)
 
 
 # --- in other studies -----------------------------------------------------------------------------

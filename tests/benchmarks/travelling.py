@@ -4,8 +4,9 @@
 
 writes reports/data/travelling_stations.csv, what stations a distance apart are off the tool itself,
 reports/data/travelling_cost.csv, what a simulated second takes, and then, a row for each place and
-strain, reports/data/travelling_places.csv. Tables and rows that are there are kept: started again,
-it goes on where it was stopped.
+strain, reports/data/travelling_places.csv, and of graded corrected lattices there
+reports/data/travelling_graded.csv. Tables and rows that are there are kept: started again, it goes
+on where it was stopped.
 
 The tool goes 30 mm in 0.7 s over the built-in liver, pressed in within 0.1 s. Errors are relative
 L2 differences over time of the displacement under the tool: that of the tissue at its stations,
@@ -50,13 +51,13 @@ from study.scene.schema import Waypoint
 from study.tradeoff.timing import in_turns
 from tests.benchmarks.corrected_places import by_frames, in_frame, written
 from tests.benchmarks.corrected_runs import LEVEL as FINER
-from tests.benchmarks.graded_places import known, placed
+from tests.benchmarks.graded_places import free, known, placed
 
 Floats = NDArray[np.float64]
 
 DATA = Path(__file__).parents[2] / "reports" / "data"
-STATIONS, COSTS, PLACES = (
-    DATA / f"travelling_{name}.csv" for name in ("stations", "cost", "places")
+STATIONS, COSTS, PLACES, GRADED = (
+    DATA / f"travelling_{name}.csv" for name in ("stations", "cost", "places", "graded")
 )
 LENGTH, SECONDS, RAMP, DURATION, SAMPLES = 0.03, 0.7, 0.1, 0.8, 65
 LEVEL = 0
@@ -72,7 +73,8 @@ LOOKED = 9
 CORRECTED = (0.02, 0.015, 0.01, 0.008)
 UNIFORM = (0.02, 0.015, 0.01, 0.008, 0.02 / 3, 0.005)
 FINEST = UNIFORM[-1]
-TOLERANCE, TURNS = 0.02, 5
+REACHES = (0.6, 1.0)
+TURNS = 5
 
 
 class Off(NamedTuple):
@@ -127,6 +129,23 @@ class Row(NamedTuple):
     own_8: float
     own_7: float
     inverted: bool
+
+
+class Graded(NamedTuple):
+    """A corrected lattice whose cells are of 5 mm within `reach` radii of the tool's way.
+
+    `error`: of what it adds to the elements against what the lattice of 5 mm throughout adds, over
+    the motion of that. `nodes`: that do not hang; `gain`: processor time of a simulated second of
+    the lattice of 5 mm alone over that of the corrected one.
+    """
+
+    at_x: float
+    at_z: float
+    strain: float
+    reach: float
+    nodes: int
+    error: float
+    gain: float
 
 
 class Cost(NamedTuple):
@@ -391,6 +410,41 @@ def costs() -> list[Cost]:
     ]
 
 
+# --- graded lattices ------------------------------------------------------------------------------
+
+
+def graded(start: dict[str, float], known: Sequence[Row]) -> Iterator[Graded]:
+    """Graded corrected lattices of a start, at strains whose forces are known."""
+    given = scene(start)
+    unit = watched(given)
+    both = corrected(given).varied(level=LEVEL, step_fraction=0.8)
+    whole = lattice(given, unit, FINEST)
+    for reach in REACHES:
+        radius = reach * start["radius_m"]
+        made = both.varied(coarse="graded", spacing=FINEST, radius=radius)
+        prepared = made.prepare(unit)
+        gain = ratio(whole, prepared)
+        for row in known:
+            problem = times_as_hard(unit, row.force_n)
+            parts = [by_steps(pressed(one, problem)) for one in (prepared.coarse, whole)]
+            near, far = (under(problem, one.added) for one in parts)
+            motion = under(problem, parts[1].run.trajectory.displacement)
+            error = float(np.linalg.norm(near - far) / np.linalg.norm(motion))
+            place = start["at_x"], start["at_z"], row.strain
+            yield Graded(*place, reach, free(prepared.coarse), error, gain)
+
+
+def ratio(one: Prepared, other: Prepared) -> float:
+    """Processor time of a simulated second of one over that of another, by frames in turns."""
+    steppers = [each.stepper() for each in (one, other)]
+    timings = in_turns([*map(by_frames, steppers)], TURNS, time.process_time)
+    dear, cheap = (
+        float(timing.walls.min(axis=0).mean()) / (in_frame(each) * each.step)
+        for each, timing in zip(steppers, timings, strict=True)
+    )
+    return dear / cheap
+
+
 # --- the tables -----------------------------------------------------------------------------------
 
 
@@ -409,6 +463,14 @@ def _value(text: str) -> float:
     return int(text) if text.isdigit() else float(text)
 
 
+def kept_graded() -> list[Graded]:
+    """Rows of graded lattices that are there."""
+    if not GRADED.exists():
+        return []
+    with GRADED.open(encoding="utf-8") as file:
+        return [Graded(**{k: _value(v) for k, v in one.items()}) for one in csv.DictReader(file)]
+
+
 def main() -> None:
     """Write what is missing of the tables."""
     if not STATIONS.exists():
@@ -424,6 +486,12 @@ def main() -> None:
             written(PLACES, list(done.values()))
             sys.stdout.write(f"{one}\n")
             sys.stdout.flush()
+    others = kept_graded()
+    for start in (starts[n] for n in WHERE):
+        place = start["at_x"], start["at_z"]
+        if place not in {(one.at_x, one.at_z) for one in others}:
+            others += graded(start, [done[*place, strain] for strain in STRAINS])
+            written(GRADED, others)
 
 
 if __name__ == "__main__":
