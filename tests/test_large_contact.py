@@ -253,33 +253,32 @@ def test_a_tool_through_the_body_ends_the_motion_and_says_when():
         at_rest(body, steady(0.2))
 
 
-def wrapped(given, side):
+def wrapped(given, side, radius=0.0145):
     """Displacement that lays the surface round a sphere from its lowest (-1) or highest point."""
     offset = given.body.solid.points - TOP
     away = np.linalg.norm(offset[:, :2], axis=1)
     angle = 1.7 * away / 0.015
-    across = 0.015 * np.sin(angle) / np.maximum(away, 1e-12)
+    across = radius * np.sin(angle) / np.maximum(away, 1e-12)
     centre = TOP + 0.015 * (DOWN * 1.2 - DOWN)
     moved = centre + np.column_stack(
-        [across[:, None] * offset[:, :2], side * 0.015 * np.cos(angle)]
+        [across[:, None] * offset[:, :2], side * radius * np.cos(angle)]
     )
     top = np.isclose(offset[:, 2], 0.0)
     return np.where(top[:, None], moved - given.body.solid.points, 0.0).ravel()
 
 
-def test_what_closes_round_a_sphere_is_not_behind_it():
-    """It pushes against its own axis there, which on its other side is the sign of a passage."""
+def test_what_closes_round_a_sphere_has_not_been_passed_by_it():
+    """It is pushed against the sphere's own axis there, as it is after a passage."""
     sphere = tool(depth=0.018, corners=(0.0, 1.0))
     given = pressed(block(), TISSUE, (sphere,), DAMPING, np.zeros_like, np.array([0.0, 1.0]))
-    contact = given.body.contact
-    force = np.ones(contact.patches[0].count)
+    contact, patch = given.body.contact, given.body.contact.patches[0]
     u = wrapped(given, -1.0)
-    patch = contact.patches[0]
     distance, normal = sphere.gap(patch.points + patch.shapes @ u.reshape(-1, 3), 1.0)
     assert (normal @ DOWN).min() < -0.1
-    assert np.abs(distance).max() < 0.3 * 0.015
-    assert not contact.behind(u, 1.0, force)
-    assert contact.behind(wrapped(given, 1.0), 1.0, force)
+    assert distance.max() < 0.0
+    assert not contact.through(u, 1.0)
+    assert contact.through(wrapped(given, 1.0), 1.0)
+    assert not contact.through(wrapped(given, 1.0, 0.025), 1.0)  # nothing is inside
 
 
 def test_normals_turn_with_the_body():

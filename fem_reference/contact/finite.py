@@ -29,6 +29,10 @@ Ints = NDArray[np.int64]
 NEAR = 0.05
 """Of a tool's radius, up to where the distance of a point counts."""
 
+BESIDE = -0.2
+"""Of the cosine between the normals of a tool and a surface in it, which are opposed, -1, where it
+is pushed back, and 0 where it passes the tool's middle."""
+
 
 class Touching(NamedTuple):
     """Distances [m] (q,) of points from a tool, and its normals (q, 3) there.
@@ -153,19 +157,19 @@ class FiniteContact:
                 found.append(-((force[part] @ patch.shares) * touch.slope) @ touch.normal)
         return np.array(found).reshape(-1, 3)
 
-    def behind(self, u: Floats, time: float, force: Floats) -> bool:
-        """Whether a tool pushes the surface from inside the body, having gone through it.
+    def through(self, u: Floats, time: float) -> bool:
+        """Whether some of the surface in a tool is about to pass its middle, or has passed it.
 
-        Against its own axis alone it may push: what a sphere has sunk in closes round it.
+        Beyond, the tool would push along the normal out of the body. Against its own axis alone it
+        may push: what a sphere has sunk in closes round it.
         """
-        for k, (patch, part) in enumerate(zip(self.patches, self._parts, strict=True)):
-            pushed = force[part] > 0.0
-            if patch.tool.bonded or not pushed.any():
+        for k, patch in enumerate(self.patches):
+            if patch.tool.bonded:
                 continue
             touch = self._touch(k, u, time)
             outward = self._seeing[k].outward(u.reshape(-1, 3)[self.nodes[k]])
-            inside = patch.shares @ (touch.slope * (touch.normal * outward).sum(axis=1))
-            if (inside[pushed] > 0.0).any():
+            along = (touch.normal * outward).sum(axis=1)
+            if (along[touch.distance < 0.0] > BESIDE).any():
                 return True
         return False
 

@@ -232,9 +232,9 @@ class Steps:
         return now
 
     def _kept_out(self, guess: Balanced, demand: Demand, scale: float) -> Balanced:
-        """The state that balances; an UnbalancedError if it is pushed by the back of a tool."""
+        """The state that balances; an UnbalancedError if a tool has gone through the surface."""
         found, body = self.balance.found(guess, demand, scale), self.pressed.body
-        if body.contact.behind(body.given(found.w), demand.time, found.force):
+        if body.contact.through(body.given(found.w), demand.time):
             raise UnbalancedError("a tool has gone through the surface")
         return found
 

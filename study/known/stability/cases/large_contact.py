@@ -39,10 +39,10 @@ FAMILY = Family("large strain in contact", __name__)
 
 def cases() -> Iterator[Case]:
     """Cases by what is extreme."""
-    for speed in (0.1, 1.0):
+    # Waves of the tissue are slower than the last: what is hit piles up in less than an element.
+    for speed in (0.1, 1.0, 10.0):
         yield _case(f"impact at {speed:g} m/s", {"speed": speed})
-    # Waves of the tissue are slower: what is hit piles up in less than an element.
-    yield _case("impact at 10 m/s", {"speed": 10.0}, lost=True)
+    yield _case("sphere sunk by more than its radius", {"depth": 0.02})
     yield _case("sphere through the body", {"speed": 1.0, "depth": 0.06}, lost=True)
     yield _case("zero gap, nothing pressed", {"depth": 1e-9}, quick=True)
     for contrast in (1e-3, 1e3):
