@@ -78,6 +78,8 @@ def differences(first: Results, second: Results) -> list[Difference]:
         *_tables("curves.csv", first.curves, second.curves, 2),
         *_tables("bands.csv", first.bands, second.bands, 2),
         *_tables("certified.csv", first.certified, second.certified, 2),
+        *_tables("tool_force.csv", first.tool_forces, second.tool_forces, 2),
+        *_tables("tool_similarity.csv", first.tool_scores, second.tool_scores, 5),
         *_tables("similarity.csv", first.scores, second.scores, 5),
         *_tables("iso_18571.csv", first.ratings, second.ratings, 4),
         *_tables("score_errors.csv", first.score_errors, second.score_errors, 5),

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from typing import get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from reports import canvas, several, several_pdf
 from study.commands.compare import compare as command
 from study.compare import differences, other_words
-from study.results.folder import write
+from study.results.folder import Results, write
 from study.similarity.time_history import relative_l2_distance
 from tests.report_samples import results_of, whole, with_model, with_record
 
@@ -55,6 +56,22 @@ def test_a_difference_of_a_curve_is_relative_to_the_largest_value_of_that_curve(
     assert found.where == f"basafa tool, sample {1 + int(curve.argmax())}"
     assert found.count == np.count_nonzero(curve)
     assert found.total == len(whole().curves)
+
+
+def rows_by_table():
+    """A row for each table of results, of texts and ones."""
+    for name, hint in get_type_hints(Results).items():
+        if get_origin(hint) is tuple:
+            row = get_args(hint)[0]
+            kinds = get_type_hints(row).values()
+            yield pytest.param(name, row(*["x" if kind is str else 1.0 for kind in kinds]), id=name)
+
+
+@pytest.mark.parametrize(("name", "row"), [*rows_by_table()])
+def test_no_table_of_results_is_left_out(name, row):
+    changed = row._replace(**{row._fields[-1]: 2.0})
+    one, other = (replace(results_of(), **{name: (found,)}) for found in (row, changed))
+    assert [found for found in differences(one, other) if found.quantity.endswith(row._fields[-1])]
 
 
 def test_rows_and_arrays_that_only_one_has_are_no_small_difference():

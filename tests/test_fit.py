@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from study.models.table import models_of
 from study.run.ready import QUIET
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.validation import fit_table, own_scene, table
-from study.validation.fitting import Free, fit, free_of, solve
+from study.validation.fitting import Free, _shifted, fit, free_of, solve
 from study.validation.own_data import Curve, read_curve, read_markers
 from study.validation.own_scene import OwnData
 
@@ -46,6 +47,43 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(rng):
     assert 88 <= held <= 100
     (one,) = solve(compliant, curve(compliant([6e3])), [E]).fit.quantities
     assert one.value == pytest.approx(6e3, rel=1e-5)
+
+
+def test_the_interval_is_students_and_the_shift_that_of_the_models_own_error():
+    """In the logarithm of a stiffness: the curve falls by as much as that rises."""
+    sigma, data = 2e-5, compliant([6e3])
+    found = solve(compliant, curve(data, sigma), [E])
+    (one,) = found.fit.quantities
+    half = student.ppf(0.975, len(TIMES) - 1) * sigma / np.linalg.norm(data)
+    assert np.log([one.low / 6e3, one.high / 6e3]) == pytest.approx([-half, half], rel=0.03)
+    (moved,) = _shifted(found, 0.01 * data, [E])
+    assert moved.numerical == pytest.approx(60.0, rel=0.03)
+    (moved,) = _shifted(solve(compliant, curve(data), [E]), 0.01 * data, [E])
+    assert moved.numerical == pytest.approx(60.0, rel=0.03)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e6])
+def test_the_unit_of_a_quantity_has_no_part_in_its_interval(unit):
+    """Of a model that rounds, which steps of a share of a logarithm would not see near 1."""
+    sigma = 1e-2
+    free = Free("tool.force", "N", 1e-4 * unit, 1e4 * unit, 1.3 * unit)
+    found = solve(lambda v: np.round(TIMES * unit / v[0], 5), curve(TIMES, sigma), [free])
+    (one,) = found.fit.quantities
+    half = student.ppf(0.975, len(TIMES) - 1) * sigma / np.linalg.norm(TIMES)
+    assert one.value == pytest.approx(unit, rel=1e-3)
+    assert np.log(one.high / one.low) == pytest.approx(2.0 * half, rel=0.01)
+
+
+def test_no_run_is_beyond_the_limits_of_a_quantity():
+    ratio, seen = Free("tissue.poisson_ratio", "", 0.01, 0.49999, 0.49), []
+
+    def predict(values):
+        seen.append(values[0])
+        return TIMES * (1.0 - values[0])
+
+    solve(predict, curve(TIMES * 0.52, 1e-6), [ratio])
+    assert max(seen) <= 0.49999 * (1.0 + 1e-12)
+    assert len(seen) == len(set(seen))
 
 
 def test_an_interval_widens_where_the_model_does_not_follow():

@@ -1,5 +1,7 @@
 """Maps of stiffness from images, and inclusions as a scene states them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -7,7 +9,10 @@ from scipy.spatial.transform import Rotation
 from fem_reference import model as fem
 from fem_reference.solvers import solve_static
 from study.check import describe_scene
-from study.mesh.tetrahedra import volumes
+from study.mesh.axes import to_scene
+from study.mesh.save import save
+from study.mesh.tetrahedra import boundary, volumes
+from study.organ.block import block_mesh
 from study.problem.varied import VariedTissue, of_tetrahedra
 from study.results.provenance import organ_sha256
 from study.scene.file import read_scene, resolved, validate, write_scene
@@ -193,9 +198,6 @@ def test_inclusions_are_read_placed_described_and_written():
 def test_a_closed_mesh_is_an_inclusion(tmp_path):
     import meshio
 
-    from study.mesh.tetrahedra import boundary
-    from study.organ.block import block_mesh
-
     shell = boundary(block_mesh((0.02, 0.02, 0.02), 0.01))
     path = tmp_path / "cube.stl"
     points = 1e3 * (shell.points + np.array([0.02, 0.01, 0.005]))
@@ -208,6 +210,68 @@ def test_a_closed_mesh_is_an_inclusion(tmp_path):
     before = organ_sha256(with_inclusions(cube))
     path.write_bytes(path.read_bytes() + b" ")
     assert organ_sha256(with_inclusions(cube)) != before
+
+
+def small_cube(path, corner, axes="LPS"):
+    """A cube of 20 mm as a file in millimetres whose axes point so, and as an inclusion."""
+    import meshio
+
+    shell = boundary(block_mesh((0.02, 0.02, 0.02), 0.01))
+    points = 1e3 * (shell.points + np.array(corner)) @ to_scene(axes)  # its inverse transposed
+    meshio.Mesh(points, [("triangle", shell.triangles)]).write(path)
+    return {"mesh": str(path), "unit": "mm", "axes": axes, "youngs_modulus": "40 kPa"}
+
+
+@pytest.mark.parametrize("axes", ["LPS", "y-up"])
+def test_a_small_inclusion_far_from_the_origin_stays_where_it_is(tmp_path, axes):
+    """Meshes are moved to the origin from ten times their size, which here is 0.35 m."""
+    organ, path = tmp_path / "organ.msh", tmp_path / "cube.stl"
+    corner = np.array([0.4, 0.3, -0.5])
+    mesh = block_mesh((0.06, 0.04, 0.03), 0.01)
+    save(replace(mesh, points=mesh.points + corner), organ)
+    cube = small_cube(path, corner + np.array([0.02, 0.01, 0.005]), axes)
+    table = resolved(with_inclusions(cube))
+    table["organ"] = {"mesh": str(organ), "unit": "m"}
+    (region,) = problem_of(validate(table, "made")).tissue.regions
+    at = corner + np.array([[0.03, 0.02, 0.015], [0.03, 0.02, 0.026], [0.01, 0.02, 0.015]])
+    assert region.distance(at) == pytest.approx([-0.01, 0.001, 0.01], abs=1e-6)
+    with pytest.raises(ValueError, match=r"inclusion\.1: nothing of it lies in the organ"):
+        problem_of(with_inclusions(cube))
+
+
+def test_an_organ_that_was_moved_to_the_origin_takes_its_files_along(tmp_path):
+    corner = np.array([3.0, 0.0, 0.0])
+    mesh = block_mesh((0.06, 0.04, 0.03), 0.01)
+    save(replace(mesh, points=mesh.points + corner), tmp_path / "organ.msh")
+    cube = small_cube(tmp_path / "cube.stl", corner + np.array([0.02, 0.01, 0.005]))
+    voxels = image(
+        tmp_path / "map.nii", lambda p: 5.0 + 100.0 * (p[..., 0] - 3.0), origin=(-2998, 2, -2)
+    )
+    table = resolved(scene_of(voxels))
+    table["organ"] = {"mesh": str(tmp_path / "organ.msh"), "unit": "m"}
+    table["tissue"]["inclusion"] = [cube]
+    tissue = problem_of(validate(table, "made")).tissue
+    middle = np.zeros((1, 3))  # of the organ, and of the cube
+    assert tissue.regions[0].distance(middle) == pytest.approx([-0.01], abs=1e-6)
+    assert tissue.mapped(middle) == pytest.approx([8e3])
+
+
+def test_what_is_wrong_with_the_mesh_of_an_inclusion_is_told_in_its_keys(tmp_path):
+    import meshio
+
+    cube = small_cube(tmp_path / "cube.stl", [0.02, 0.01, 0.005])
+    with pytest.raises(
+        ValueError, match=r"inclusion\.1\.mesh: .*correct `tissue\.inclusion\.1\.unit"
+    ):
+        problem_of(with_inclusions(cube | {"unit": "m"}))
+    with pytest.raises(ValueError, match=r"inclusion\.1\.unit: give the length unit"):
+        with_inclusions({key: value for key, value in cube.items() if key != "unit"})
+    shell = boundary(block_mesh((0.02, 0.02, 0.02), 0.01))
+    points = np.vstack([shell.points, np.array([0.03, 0.0, 0.0]) + shell.points])
+    triangles = np.vstack([shell.triangles, shell.triangles + len(shell.points)])
+    meshio.Mesh(1e3 * points, [("triangle", triangles)]).write(tmp_path / "cube.stl")
+    with pytest.raises(ValueError, match="give each piece as an inclusion of its own"):
+        problem_of(with_inclusions(cube))
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,17 @@ def lattice_at_rest(support):
     return body, springs.material, static_displacement(body, springs.material)
 
 
+def test_a_fixed_surface_is_what_faces_its_side_within_its_depth():
+    """Not the walls above it, which reach as far down, nor what faces the side further up."""
+    below = FixedSurface(Foundation(DOWN, 0.0, 0.01, 1.0), ALL)
+    points = np.array([[0.0, 0.0, z] for z in (0.0, 0.009, 0.011, 0.005, 0.005, 0.005)])
+    lean = np.array([0.8, 0.0, -0.6])
+    normals = np.array([DOWN, DOWN, DOWN, lean, [1.0, 0.0, 0.0], -DOWN])
+    held = below.fixed(points, normals)
+    assert held.all(axis=1).tolist() == [True, True, False, True, False, False]
+    assert not held[[2, 4, 5]].any()
+
+
 # The limit of a stiff foundation ---------------------------------------------------------------
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 
@@ -76,7 +76,8 @@ class Geometry:
     `cut`: cuts a background along its
     surface, None where the meshes have none; `body`: the exact shape if it is known, else the mesh;
     `project`: onto its surface, if it is known and curved; `volume` [m^3] of `mesh`; `notes`: what
-    was found, repaired or assumed; `is_file`: of a user's file.
+    was found, repaired or assumed; `is_file`: of a user's file; `offset` [m] (3,): what was
+    subtracted from the coordinates of that, which may lie far from the origin.
     """
 
     mesh: TetrahedralMesh
@@ -88,6 +89,7 @@ class Geometry:
     project: Projection | None = None
     cut: Cut | None = None
     is_file: bool = False
+    offset: Floats = field(default_factory=lambda: np.zeros(3))
 
 
 def block(size: tuple[float, float, float], element_size: float) -> Geometry:
@@ -252,8 +254,10 @@ def _from_file(
     loaded, report = load_mesh(path, unit, axes, pieces)
     notes = (*report.notes, axes_note(axes))
     if isinstance(loaded, SurfaceMesh):
-        return replace(enclosed(loaded, element_size, notes), is_file=True)
-    return replace(_refined(loaded, element_size, notes), is_file=True)
+        found = enclosed(loaded, element_size, notes)
+    else:
+        found = _refined(loaded, element_size, notes)
+    return replace(found, is_file=True, offset=np.asarray(report.offset))
 
 
 def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]) -> Geometry:

@@ -354,8 +354,11 @@ def _inclusion_contradictions(scene: Scene) -> Iterator[str]:
             )
         if one.mesh is None:
             yield from _place_of_inclusion(name, one)
-        elif one.place is not None:
+            continue
+        if one.place is not None:
             yield f"{name}.place: a mesh lies where it lies; remove it"
+        if one.unit is None:
+            yield f"{name}.unit: give the length unit of its mesh: m, dm, cm, mm, um or in"
         if one.axes is not None and one.mesh is not None:
             yield from _axes_problems(one.axes, f"{name}.axes")
 

@@ -82,7 +82,7 @@ def problem_of(scene: Scene) -> Problem:
         foundation,
         tool,
         factor,
-        tissue_of(scene.tissue, geometry.mesh, surface),
+        tissue_of(scene.tissue, geometry),
         surface_rule,
         volume_rule,
         observation,

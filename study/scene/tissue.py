@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from study.mesh.axes import to_scene
 from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.signed_distance import SignedDistance
 from study.mesh.tetrahedra import boundary, volumes
+from study.organ.geometry import Geometry
 from study.problem.tissue import Tissue
 from study.problem.varied import OUTLINE, Ellipsoid, Region, VariedTissue, of_tetrahedra
 from study.scene.place import resolve
@@ -23,13 +25,16 @@ Distance = Callable[[Floats], Floats]
 
 PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
 """By the units that a map may be in."""
+PIECES = re.compile(r"keep one piece \(`organ\.pieces`[^)]*\), or join them")
+"""What is said of an organ of several pieces."""
 RANGE = (10.0, 1e9)
 """Young's moduli [Pa] that a map may have."""
 
 
-def tissue_of(table: OrganTissue, mesh: TetrahedralMesh, surface: SurfaceMesh) -> Tissue:
+def tissue_of(table: OrganTissue, geometry: Geometry) -> Tissue:
     """The tissue with what differs in it; a plain one where nothing does.
 
+    Files lie in the frame of the organ's file, from wherever that was moved to the origin.
     ValueError naming an inclusion that lies outside the organ, or what is wrong with a file.
     """
     base = Tissue(
@@ -44,17 +49,19 @@ def tissue_of(table: OrganTissue, mesh: TetrahedralMesh, surface: SurfaceMesh) -
         poisson_ratio=base.poisson_ratio,
         density=base.density,
         regions=tuple(
-            _region(one, f"tissue.inclusion.{number}", surface)
+            _region(one, f"tissue.inclusion.{number}", geometry)
             for number, one in enumerate(table.inclusion, 1)
         ),
-        mapped=None if table.stiffness_map is None else _mapped(table.stiffness_map, base),
+        mapped=None
+        if table.stiffness_map is None
+        else _mapped(table.stiffness_map, base, geometry.offset),
     )
-    _check(found, table, mesh)
+    _check(found, table, geometry.mesh)
     return found
 
 
-def _region(one: Inclusion, name: str, surface: SurfaceMesh) -> Region:
-    distance, outline = _shape(one, name, surface)
+def _region(one: Inclusion, name: str, geometry: Geometry) -> Region:
+    distance, outline = _shape(one, name, geometry)
     return Region(
         name=name,
         distance=distance,
@@ -65,23 +72,31 @@ def _region(one: Inclusion, name: str, surface: SurfaceMesh) -> Region:
     )
 
 
-def _shape(one: Inclusion, name: str, surface: SurfaceMesh) -> tuple[Distance, Floats]:
+def _shape(one: Inclusion, name: str, geometry: Geometry) -> tuple[Distance, Floats]:
     """Distance from an inclusion, and points of its surface."""
     if one.mesh is not None:
         from study.mesh.load import load_mesh
 
         try:
-            loaded, _ = load_mesh(one.mesh, one.unit, one.axes)
+            loaded, report = load_mesh(one.mesh, one.unit, one.axes)
         except ValueError as error:
-            raise ValueError(f"{name}.mesh: {error}") from error
-        closed = loaded if isinstance(loaded, SurfaceMesh) else boundary(loaded)
+            raise ValueError(f"{name}.mesh: {_of_inclusion(str(error), name)}") from error
+        shell = loaded if isinstance(loaded, SurfaceMesh) else boundary(loaded)
+        # A small shape is soon far from the origin, for its size, and then is moved there.
+        closed = replace(shell, points=shell.points + (report.offset - geometry.offset))
         some = np.linspace(0, len(closed.points) - 1, OUTLINE).astype(int)
         return SignedDistance(closed), closed.points[some]
     assert one.place is not None  # noqa: S101 - as was checked with the scene
-    centre, _ = resolve(_unmoved(one.place), surface)
+    centre, _ = resolve(_unmoved(one.place), geometry.surface)
     semi_axes = one.semi_axes or (one.radius, one.radius, one.radius)
     shape = Ellipsoid(centre, np.array(semi_axes, dtype=float))
     return shape, shape.outline
+
+
+def _of_inclusion(message: str, name: str) -> str:
+    """What is wrong with a mesh file, in the keys of an inclusion; it has no `pieces`."""
+    one_each = PIECES.sub("give each piece as an inclusion of its own", message)
+    return one_each.replace("`organ.", f"`{name}.")
 
 
 def _unmoved(place: Place) -> Place:
@@ -125,8 +140,11 @@ def _lies_in(mesh: TetrahedralMesh, tissue: VariedTissue) -> bool:
     return made is not None and bool(made.share.any())
 
 
-def _mapped(given: StiffnessMap, tissue: Tissue) -> Distance:
-    """Young's modulus [Pa] at points of the scene, NaN where the image has none."""
+def _mapped(given: StiffnessMap, tissue: Tissue, offset: Floats) -> Distance:
+    """Young's modulus [Pa] at points of the scene, NaN where the image has none.
+
+    `offset` [m] (3,): what was subtracted from the coordinates of the organ's file.
+    """
     voxels, affine = _image(Path(given.file))
     of_young = 1.0 if given.quantity == "youngs-modulus" else 2.0 * (1.0 + tissue.poisson_ratio)
     modulus = voxels * PASCALS[given.unit] * of_young
@@ -139,20 +157,21 @@ def _mapped(given: StiffnessMap, tissue: Tissue) -> Distance:
             f"{high:g}; give the unit of the image"
         )
     inverse = np.asarray(np.linalg.inv(affine), dtype=np.float64)
-    return _Sampled(np.where(known, modulus, 0.0), known.astype(np.float64), inverse)
+    return _Sampled(np.where(known, modulus, 0.0), known.astype(np.float64), inverse, offset)
 
 
 class _Sampled:
     """Values of voxels between their centres: the mean of those that are known round a point."""
 
-    def __init__(self, values: Floats, known: Floats, to_voxels: Floats) -> None:
+    def __init__(self, values: Floats, known: Floats, to_voxels: Floats, offset: Floats) -> None:
         self.values, self.known, self.to_voxels = values, known, to_voxels
+        self.offset = offset
 
     def __call__(self, points: Floats) -> Floats:
         """At points [m] (..., 3), NaN where less than half of a voxel's weight is known."""
         from scipy.ndimage import map_coordinates
 
-        millimetres = 1e3 * points @ to_scene("RAS")  # which is its own inverse
+        millimetres = 1e3 * (points + self.offset) @ to_scene("RAS")  # which is its own inverse
         place = millimetres @ self.to_voxels[:3, :3].T + self.to_voxels[:3, 3]
         at = np.moveaxis(place, -1, 0)
         known = map_coordinates(self.known, at, order=1, mode="grid-constant", cval=0.0)

@@ -41,7 +41,7 @@ def lines(fit: Fit) -> Iterator[str]:
         yield f"{one.key} = {one.value:.4g}{unit} (95 %: {one.low:.4g} to {one.high:.4g}{own})"
     size = float(np.sqrt((fit.curve.values**2).mean()))
     left = f"rms {fit.rms:.3g} {fit.curve.unit}, {100 * fit.rms / size:.2g} % of it"
-    yield f"left of the curve: {left}, after {fit.runs} steps of the fit"
+    yield f"left of the curve: {left}, after {fit.runs} runs"
     yield _about_scatter(fit)
 
 

@@ -214,6 +214,44 @@ class Solved:
     scatter: Floats
 
 
+class _Left:
+    """What a prediction leaves of a curve, over its scatter, at logarithms of the quantities.
+
+    Runs are counted, and none is repeated; none is beyond `limits` (2, quantities).
+    """
+
+    def __init__(self, predict: Predict, curve: Curve, scatter: Floats, limits: Floats) -> None:
+        self.predict, self.curve, self.scatter, self.limits = predict, curve, scatter, limits
+        self._known: dict[bytes, Floats] = {}
+
+    @property
+    def runs(self) -> int:
+        """How many there were."""
+        return len(self._known)
+
+    def __call__(self, logs: Floats) -> Floats:
+        """Residuals (k,)."""
+        name = logs.tobytes()
+        if name not in self._known:
+            found = (self.predict(np.exp(logs)) - self.curve.values) / self.scatter
+            self._known[name] = np.where(np.isfinite(found), found, 1e6)
+        return self._known[name]
+
+    def slope(self, logs: Floats, *, both_ways: bool = False) -> Floats:
+        """Derivative (k, quantities) by differences over STEP, the same in every unit.
+
+        Of first order on the way, of second where `both_ways` are looked.
+        """
+        low, high = self.limits
+        columns = []
+        for step in STEP * np.eye(len(logs)):
+            up, back = np.minimum(logs + step, high), np.maximum(logs - step, low)
+            if not both_ways and (up != logs).any():
+                back = logs
+            columns.append((self(up) - self(back)) / (up - back).sum())
+        return np.stack(columns, axis=1)
+
+
 def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
     """Least squares of a prediction. ValueError if the curve does not determine the quantities."""
     scatter = np.ones_like(curve.values) if curve.uncertainty is None else curve.uncertainty
@@ -221,20 +259,18 @@ def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
     if len(curve.values) <= len(free):
         raise ValueError(f"--curve: {len(curve.values)} values cannot determine {len(free)}")
 
-    def left(logs: Floats) -> Floats:
-        found = (predict(np.exp(logs)) - curve.values) / scatter
-        return np.where(np.isfinite(found), found, 1e6)
-
     limits = np.log([[one.low for one in free], [one.high for one in free]])
+    left = _Left(predict, curve, scatter, limits)
     start = np.clip(np.log([one.start for one in free]), limits[0] + STEP, limits[1] - STEP)
     best = least_squares(
-        left, start, bounds=limits, diff_step=STEP, x_scale=1.0, xtol=1e-6, max_nfev=MOST_RUNS
+        left, start, left.slope, bounds=limits, x_scale=1.0, xtol=1e-6, max_nfev=MOST_RUNS
     )
+    slope = left.slope(best.x, both_ways=True)
     freedom = len(curve.values) - len(free)
     variance = float((best.fun**2).sum()) / freedom
     known = curve.uncertainty is not None
-    _refuse_undetermined(best.jac, free)
-    spread = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
+    _refuse_undetermined(slope, free)
+    spread = np.sqrt(np.diag(np.linalg.inv(slope.T @ slope)))
     # A model that does not follow the curve makes the interval wider, never narrower.
     spread *= np.sqrt(max(1.0, variance) if known else variance)
     half = float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * spread
@@ -247,8 +283,8 @@ def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
     )
     found = best.fun * scatter + curve.values
     rms = float(np.sqrt(((found - curve.values) ** 2).mean()))
-    whole = Fit(quantities, curve, found, rms, known, np.sqrt(variance), int(best.nfev))
-    return Solved(whole, np.exp(best.x), best.jac, scatter)
+    whole = Fit(quantities, curve, found, rms, known, np.sqrt(variance), left.runs)
+    return Solved(whole, np.exp(best.x), slope, scatter)
 
 
 def _refuse_undetermined(slope: Floats, free: Sequence[Free]) -> None:
