@@ -21,6 +21,7 @@ Indices = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 Membership = Callable[[FuzzySet, Array], Array]
 Connective = Literal["and", "or"]
+CONNECTIVES = get_args(Connective)
 
 
 class Merge(NamedTuple):
@@ -102,7 +103,7 @@ class Rule:
             raise ValueError(
                 f"rule weight {self.weight}: give a number from 0 to 1, as MATLAB asks"
             )
-        if self.connective not in get_args(Connective):
+        if self.connective not in CONNECTIVES:
             raise ValueError(f"rule connective {self.connective!r}: use and, or")
 
 
