@@ -470,6 +470,12 @@ def travelling() -> Iterator[tuple[str, str]]:
         yield f"travelling-own-gain-{words}", span(own, "{:.2g}".format)
     static = sum(float(one["static_20"]) > TOLERANCE for one in places)
     yield "travelling-static-missed", f"{static} of {len(places)}"
+    graded = [one for one in measured("travelling_graded") if float(one["reach"]) < 1.0]
+    yield "travelling-graded-count", str(len({(one["at_x"], one["at_z"]) for one in graded}))
+    for words, (_, above, up_to) in zip(("small", "large"), TRAVELLING_STRAINS, strict=True):
+        errors = [float(x["error"]) for x in graded if above < float(x["strain"]) <= up_to]
+        yield f"travelling-graded-{words}", percent(max(errors))
+    yield "travelling-graded-gain", span([float(one["gain"]) for one in graded], "{:.2g}".format)
 
 
 def _travelling(lines: list[Line], words: str, above: float, up_to: float) -> list[str]:
