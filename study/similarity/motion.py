@@ -35,8 +35,8 @@ def _check_samples(role: str, motion: Motion) -> None:
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))  # true for NaN as well
         if bad.size:
             raise ValueError(
-                f"{role} {name} is {values[bad[0]]} at sample {bad[0]}: a run that did not finish "
-                "has no score; report when it ended instead"
+                f"{role} {name} is {values[bad[0]]} at sample {bad[0]}: a run that diverged or is "
+                "not finished has no score; report when it ended instead"
             )
 
 
