@@ -13,7 +13,7 @@ from study.mesh.axes import to_scene
 from study.mesh.save import save
 from study.mesh.tetrahedra import boundary, volumes
 from study.organ.block import block_mesh
-from study.problem.varied import VariedTissue, of_tetrahedra
+from study.problem.varied import VariedTissue, barycentric_samples, of_tetrahedra
 from study.results.provenance import organ_sha256
 from study.scene.file import read_scene, resolved, validate, write_scene
 from study.scene.problem import problem_of
@@ -297,6 +297,16 @@ def test_an_inclusion_that_later_ones_cover_is_refused_as_such():
     assert problem_of(with_inclusions(BALL, small))
     with pytest.raises(ValueError, match=r"inclusion\.1: later inclusions, .*, cover all of it"):
         problem_of(with_inclusions(small, BALL))
+
+
+def test_an_inclusion_that_a_point_tells_by_chance_is_refused():
+    """Of 20 um about a point that tells shares, which counts for more than it has."""
+    mesh = problem_of(read_scene("block", BLOCK)).geometry.mesh
+    at = barycentric_samples()[100] @ mesh.points[mesh.tetrahedra[50]]
+    tiny = BALL | {"place": {"point": at.tolist()}, "radius": 2e-5}
+    with pytest.raises(ValueError, match=r"inclusion\.1: .* far smaller than an element"):
+        problem_of(with_inclusions(tiny))
+    assert problem_of(with_inclusions(tiny | {"radius": 1e-3}))
 
 
 def test_check_tells_of_a_scene_with_inclusions(tmp_path):

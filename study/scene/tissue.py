@@ -16,7 +16,7 @@ from study.mesh.signed_distance import SignedDistance
 from study.mesh.tetrahedra import boundary, volumes
 from study.organ.geometry import Geometry
 from study.problem.tissue import Tissue
-from study.problem.varied import OUTLINE, Ellipsoid, Region, VariedTissue, of_tetrahedra
+from study.problem.varied import OUTLINE, SAMPLES, Ellipsoid, Region, VariedTissue, of_tetrahedra
 from study.scene.place import resolve
 from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
 
@@ -27,6 +27,8 @@ PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
 """By the units that a map may be in."""
 PIECES = re.compile(r"keep one piece \(`organ\.pieces`[^)]*\), or join them")
 """What is said of an organ of several pieces."""
+FEWEST = 8
+"""Points that tell shares of elements, in an inclusion: with fewer its volume is chance."""
 RANGE = (10.0, 1e9)
 """Young's moduli [Pa] that a map may have."""
 
@@ -108,7 +110,7 @@ def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> N
     made = of_tetrahedra(mesh, tissue)
     assert made is not None  # noqa: S101 - of varied tissue
     for number, (region, share) in enumerate(zip(tissue.regions, made.share.T, strict=True)):
-        if share.any():
+        if share.sum() * SAMPLES >= FEWEST:
             continue
         alone = replace(tissue, regions=(region,), mapped=None)
         if number + 1 < len(tissue.regions) and _lies_in(mesh, alone):
@@ -137,7 +139,7 @@ def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> N
 
 def _lies_in(mesh: TetrahedralMesh, tissue: VariedTissue) -> bool:
     made = of_tetrahedra(mesh, tissue)
-    return made is not None and bool(made.share.any())
+    return made is not None and bool(made.share.sum() * SAMPLES >= FEWEST)
 
 
 def _mapped(given: StiffnessMap, tissue: Tissue, offset: Floats) -> Distance:
