@@ -87,8 +87,8 @@ def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
     cells = tool.radius / scene.lattice.spacing
     if tool.shape != "plate" and cells < FINE:
         yield (
-            f"A tool of radius {1e3 * tool.radius:.3g} mm spans {cells:.2g} spacings of the "
-            f"lattice; below {FINE:g} its force is that of the lattice's own facets. Reduce "
+            f"The radius of a tool, {1e3 * tool.radius:.3g} mm, is {cells:.2g} times the spacing "
+            f"of the lattice; below {FINE:g} its force is that of the lattice's own facets. Reduce "
             "lattice.spacing."
         )
 
