@@ -98,5 +98,5 @@ def test_a_scene_without_rigid_tools_has_none_of_it(small_results, tmp_path):
 
 
 def test_a_small_tool_on_a_coarse_lattice_is_told(results):
-    assert any("spacings of the lattice" in text for text in results.record.warnings)
+    assert any("the spacing of the lattice" in text for text in results.record.warnings)
     assert np.isfinite([m.tool_overlap_m for m in results.record.models]).all()
