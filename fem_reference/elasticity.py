@@ -147,8 +147,10 @@ class Body:
 
     @cached_property
     def _nodal(self) -> csr_array | None:
-        """Mass of one component, a ninth of the whole; None where fixed ones tell them apart."""
-        return None if self.fixed is not None else csr_array(self.mass[::3, ::3])
+        """Mass of one component, a third of the whole; None where they are not alike."""
+        own, found = self.mass.diagonal().reshape(-1, 3), csr_array(self.mass[::3, ::3])
+        alike = self.mass.nnz == 3 * found.nnz and bool((own == own[:, :1]).all())
+        return found if alike else None
 
     @cached_property
     def basis(self) -> Any:
@@ -271,6 +273,12 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
     pressure = body.stiffness.pressure
     own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
     return replace(body, element=name, stiffness=_held(own, body.support, body.fixed))
+
+
+def bare(body: Body) -> Body:
+    """The body without the matrix of its stiffness, of which `of_tissue` makes another."""
+    size = body.stiffness.size
+    return replace(body, stiffness=replace(body.stiffness, matrix=csr_array((size, size))))
 
 
 def _held(own: Stiffness, support: csc_array, fixed: Booleans | None) -> Stiffness:

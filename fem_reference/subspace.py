@@ -110,18 +110,21 @@ class Guesses:
     """
 
     def __init__(self, body: Body, vectors: Floats | None) -> None:
+        self.body = body
         self.vectors = np.zeros((body.load.size, 0)) if vectors is None else vectors
-        self._pushed = np.zeros_like(self.vectors)
-        for k, vector in enumerate(self.vectors.T):
-            self._pushed[:, k] = body.stiffness @ vector
-        self._stiffness = self.vectors.T @ self._pushed
-        self._mixed = np.zeros((self.vectors.shape[1], 0))
+        self._stiffness = self._among(self.vectors)
+        self._mixed = self._among(self.vectors[:, :0])
+
+    def _among(self, vectors: Floats) -> Floats:
+        """Stiffness (k, m) between the given vectors and others (n, m), of which none is kept."""
+        found = [self.vectors.T @ (self.body.stiffness @ one) for one in vectors.T]
+        return np.reshape(found, (vectors.shape[1], self.vectors.shape[1])).T
 
     def start(self, found: Subspace, load: Floats) -> Floats:
         """Displacement (n,) that nears the one under a load most; `found` only grows."""
         W, V = self.vectors, found.vectors
-        known = self._mixed.shape[1]
-        self._mixed = mixed = np.hstack([self._mixed, self._pushed.T @ V[:, known:]])
+        fresh = self._among(V[:, self._mixed.shape[1] :])
+        self._mixed = mixed = np.hstack([self._mixed, fresh])
         energy = np.block([[found.stiffness, mixed.T], [mixed, self._stiffness]])
         sizes = np.sqrt(np.diag(energy))
         forces = np.concatenate([V.T @ load, W.T @ load]) / sizes

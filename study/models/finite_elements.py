@@ -13,7 +13,7 @@ from fem_reference import model as fem
 from fem_reference.burden import burden_of, laden
 from fem_reference.contact.motion import run as in_contact
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
-from fem_reference.elasticity import Body, Loaded, of_tissue
+from fem_reference.elasticity import Body, Loaded, bare, of_tissue
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
@@ -181,10 +181,10 @@ class PreparedElements:
         """
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
         own, start = self._best_body(), None
-        body = of_tissue(own, tissue, self.model.reference.element)
         if self.best is not None:
             start, self.best = self.best.found.rest(own), self.best.outlined
-        del own
+        own = bare(own)
+        body = of_tissue(own, tissue, self.model.reference.element)
         points = self.problem.observation.volume_points
         return at_points(evaluation(body, points), self._at_rest(body, start))
 
