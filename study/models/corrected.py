@@ -301,9 +301,10 @@ def assumptions(scene: Scene) -> list[str]:
     """On what the sum takes for granted."""
     coarse = _coarse(scene)
     sizes = " and more" if coarse.graded else ""
+    of = "way" if any(tool.travels for tool in scene.tools) else "place"
     return [
         "The corrected lattice is the linear finite elements plus what a lattice of "
-        f"{1e3 * coarse.spacing:.3g} mm{sizes} does beyond itself linear, for this place of the "
+        f"{1e3 * coarse.spacing:.3g} mm{sizes} does beyond itself linear, for this {of} of the "
         "load only. Its errors are estimates, none of them a bound: of what the spacing leaves out "
         f"of the nonlinear part, from a lattice of {FINER:.2g} times the spacing and an assumed "
         f"order of {ORDER:g}; of the linear part by its mesh and by its vectors.",
