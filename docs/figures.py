@@ -832,12 +832,31 @@ def organ() -> Iterator[tuple[str, str]]:
     yield "organ-ranking", f"\n\n{lines}\n\n"
 
 
+def run_stages() -> Iterator[tuple[str, str]]:
+    """What the default run takes: at first, of kept stages, and after a change."""
+    whole = {line["case"]: line for line in measured("run_stages") if line["stage"] == "whole"}
+    for name, case in (
+        ("first", "after install"),
+        ("fresh", "side by side"),
+        ("alone", "one after another"),
+        ("unchanged", "unchanged"),
+        ("title", "other title"),
+        ("reading", "other reading"),
+        ("spacing", "other spacing"),
+    ):
+        seconds = float(whole[case]["wall_s"])
+        yield f"run-{name}", f"{seconds:.0f} s"
+    for name, case in ("first", "after install"), ("fresh", "side by side"):
+        yield f"run-{name}-memory", f"{float(whole[case]['memory_mb']) / 1e3:.1f} GB"
+
+
 def figures() -> dict[str, str]:
     """Every figure by name, as it is printed."""
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
     models = (error_bar_livers, certified, tradeoff, corrected, graded, planned)
-    groups = (*fuzzy, *lattice, *models, verification, validation, stability, ranking, organ)
+    held = (verification, validation, stability, ranking, organ)
+    groups = (*fuzzy, *lattice, *models, run_stages, *held)
     return {name: text for group in groups for name, text in group()}
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.sparse import csc_array
 from fem_reference.direct import symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
+from study.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -27,10 +29,7 @@ Booleans = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Of the unbalanced forces relative to the load and the forces that hold."""
 MOST_ITERATIONS = 16
-EASY = 5
-"""After as few iterations the next increment is twice as large."""
-SMALLEST_INCREMENT = 1 / 64
-"""Of what is asked for; an increment that would have to be smaller ends the path."""
+INCREMENTS = Increments(easy=5, smallest=1 / 64)
 SHORTEST_STEP = 1 / 64
 GROWTH = 2.0
 """By how much unbalanced forces may grow in a step: near 1/2, volumes are kept to second order."""
@@ -107,14 +106,10 @@ def solve_driven(body: MixedSolid, drive: Drive, factors: Sequence[float] = (1.0
     ValueError for a factor that is zero, or prescribed values that do not fit the body.
     """
     _refuse(body, drive, factors)
-    at = _Rest(0.0, np.zeros(body.size + body.pressures), ())
-    states: list[DrivenState] = []
-    for factor in factors:
-        at, iterations, failure = _move_up(body, drive, at, factor)
-        if failure:
-            return DrivenPath(tuple(states), at.factor, failure)
-        states.append(_state(body, drive, at, iterations))
-    return DrivenPath(tuple(states), at.factor, "")
+    start = _Rest(0.0, np.zeros(body.size + body.pressures), ())
+    found = follow(start, factors, partial(_rest, body, drive), INCREMENTS)
+    states = map(partial(_state, body, drive), found.rests, found.iterations)
+    return DrivenPath(tuple(states), found.reached, found.failure)
 
 
 def solve_linear(body: MixedSolid, drive: Drive) -> DrivenState:
@@ -180,24 +175,6 @@ def _state(body: MixedSolid, drive: Drive, at: _Rest, iterations: int) -> Driven
         at.residuals,
         iterations,
     )
-
-
-def _move_up(body: MixedSolid, drive: Drive, at: _Rest, target: float) -> tuple[_Rest, int, str]:
-    """The rest at the target, or the last before it, the iterations spent, and why it ended."""
-    increment, iterations = target - at.factor, 0
-    while at.factor != target:
-        left = target - at.factor
-        goal = target if abs(increment) >= abs(left) else at.factor + increment
-        found = _rest(body, drive, at, goal)
-        iterations += len(found.residuals) - 1
-        if not found.failure:
-            at = found
-            increment *= 2.0 if len(found.residuals) <= EASY + 1 else 1.0
-            continue
-        increment = 0.5 * (goal - at.factor)
-        if abs(increment) < SMALLEST_INCREMENT * abs(target):
-            return at, iterations, f"{found.failure} at {goal:.4g} times what is asked for"
-    return at, iterations, ""
 
 
 def _rest(body: MixedSolid, drive: Drive, start: _Rest, factor: float) -> _Rest:

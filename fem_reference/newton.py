@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from fem_reference.elements import ELEMENTS
 from fem_reference.hyperelasticity import HyperelasticSolid, largest_log_strain, solid
 from fem_reference.laws import DEFAULT, Law
 from fem_reference.mixed_strain import on_nodes
+from study.continuation import Increments, follow
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -28,11 +30,7 @@ TOLERANCE = 1e-8
 """Of the unbalanced forces relative to the load, in the Euclidean norm."""
 
 MOST_ITERATIONS = 15
-EASY = 5
-"""After as few iterations the next increment of the load is twice as large."""
-
-SMALLEST_INCREMENT = 1 / 32
-"""Of the load asked for; an increment that would have to be smaller ends the path."""
+INCREMENTS = Increments(easy=5, smallest=1 / 32, unit="the load")
 
 SHORTEST_STEP = 1 / 64
 
@@ -76,18 +74,13 @@ class Path:
         return not self.failure
 
 
-@dataclass(frozen=True)
-class _Rest:
+class _Rest(NamedTuple):
     """Where Newton's method ended; a stable rest if `failure` is empty."""
 
-    load_factor: float
+    factor: float
     displacement: Floats
     residuals: tuple[float, ...]
     failure: str = ""
-
-    @property
-    def iterations(self) -> int:
-        return len(self.residuals) - 1
 
 
 def solve(
@@ -107,14 +100,10 @@ def solve(
     if ELEMENTS[body.element].mixed:
         return _with_pressure(body, tissue, law, load_factors)
     problem = solid(body, tissue, law)
-    at = _Rest(0.0, np.zeros(len(body.load)), (0.0,))
-    states: list[State] = []
-    for factor in load_factors:
-        at, iterations, failure = _load_up(problem, at, factor)
-        if failure:
-            return Path(tuple(states), at.load_factor, failure)
-        states.append(_state(problem, at, iterations))
-    return Path(tuple(states), at.load_factor, "")
+    start = _Rest(0.0, np.zeros(len(body.load)), (0.0,))
+    found = follow(start, load_factors, partial(_rest, problem), INCREMENTS)
+    states = map(partial(_state, problem), found.rests, found.iterations)
+    return Path(tuple(states), found.reached, found.failure)
 
 
 def _with_pressure(
@@ -150,7 +139,7 @@ def _state(problem: HyperelasticSolid, at: _Rest, iterations: int) -> State:
     u = at.displacement
     F = problem.deformation(u)
     return State(
-        at.load_factor,
+        at.factor,
         u,
         largest_log_strain(F),
         float(np.linalg.det(F).min()),
@@ -160,27 +149,9 @@ def _state(problem: HyperelasticSolid, at: _Rest, iterations: int) -> State:
     )
 
 
-def _load_up(problem: HyperelasticSolid, at: _Rest, target: float) -> tuple[_Rest, int, str]:
-    """The rest at the target, or the last before it, the iterations spent, and why it ended."""
-    increment, iterations = target - at.load_factor, 0
-    while at.load_factor != target:
-        left = target - at.load_factor
-        goal = target if abs(increment) >= abs(left) else at.load_factor + increment
-        found = _rest(problem, at.displacement, goal)
-        iterations += found.iterations
-        if not found.failure:
-            at = found
-            increment *= 2.0 if found.iterations <= EASY else 1.0
-            continue
-        increment = 0.5 * (goal - at.load_factor)
-        if abs(increment) < SMALLEST_INCREMENT * abs(target):
-            return at, iterations, f"{found.failure} at {goal:.4g} times the load"
-    return at, iterations, ""
-
-
-def _rest(problem: HyperelasticSolid, start: Floats, factor: float) -> _Rest:
+def _rest(problem: HyperelasticSolid, start: _Rest, factor: float) -> _Rest:
     """Newton's method at one load."""
-    load, u = factor * problem.load, start
+    load, u = factor * problem.load, start.displacement
     residuals: list[float] = []
     failure = "no balance of forces"
     while len(residuals) <= MOST_ITERATIONS:

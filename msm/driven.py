@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
 from msm.network import Network
 from msm.tangent import SIGNS, Tangent, empty_tangent, linearise
+from study.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,10 +30,7 @@ Booleans = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Of the unbalanced forces relative to the load and the forces that hold."""
 MOST_ITERATIONS = 20
-EASY = 6
-"""After as few iterations the next increment is twice as large."""
-SMALLEST_INCREMENT = 1 / 64
-"""Of what is asked for; an increment that would have to be smaller ends the path."""
+INCREMENTS = Increments(easy=6, smallest=1 / 64)
 SHORTEST_STEP = 1 / 64
 GROWTH = 2.0
 """By how much unbalanced forces may grow in a step that moves no node that is held."""
@@ -94,14 +93,9 @@ def move_driven(
     if prescribed.shape != net.load.shape:
         raise ValueError(f"prescribed: {prescribed.shape} does not fit {net.load.shape} nodes")
     lattice = _Lattice(law, net, prescribed)
-    at = _Rest(0.0, np.zeros_like(net.load), np.zeros(len(net.cells)), ())
-    rests: list[DrivenRest] = []
-    for factor in factors:
-        at, failure = _move_up(lattice, at, factor)
-        if failure:
-            return DrivenLattice(tuple(rests), at.factor, failure)
-        rests.append(lattice.told(at))
-    return DrivenLattice(tuple(rests), at.factor, "")
+    start = _Rest(0.0, np.zeros_like(net.load), np.zeros(len(net.cells)), ())
+    found = follow(start, factors, partial(_rest, lattice), INCREMENTS)
+    return DrivenLattice(tuple(map(lattice.told, found.rests)), found.reached, found.failure)
 
 
 def lowest_frequency(
@@ -123,23 +117,6 @@ def lowest_frequency(
     start = np.ones(mass.shape[0])
     (found,) = eigsh(stiffness, 1, mass, 0.0, OPinv=inverse, return_eigenvectors=False, v0=start)
     return float(np.sqrt(found) / (2.0 * np.pi))
-
-
-def _move_up(lattice: _Lattice, at: _Rest, target: float) -> tuple[_Rest, str]:
-    """The rest at the target, or the last before it and why it ended there."""
-    increment = target - at.factor
-    while at.factor != target:
-        left = target - at.factor
-        goal = target if abs(increment) >= abs(left) else at.factor + increment
-        found = _rest(lattice, at, goal)
-        if not found.failure:
-            at = found
-            increment *= 2.0 if len(found.residuals) <= EASY + 1 else 1.0
-            continue
-        increment = 0.5 * (goal - at.factor)
-        if abs(increment) < SMALLEST_INCREMENT * abs(target):
-            return at, f"{found.failure} at {goal:.4g} times what is asked for"
-    return at, ""
 
 
 def _rest(lattice: _Lattice, start: _Rest, factor: float) -> _Rest:

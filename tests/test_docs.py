@@ -1,7 +1,9 @@
 """README and pages: figures are those of the tables, commands and code run as they are shown."""
 
 import csv
+import functools
 import importlib.util
+import io
 import json
 import os
 import re
@@ -12,6 +14,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from study.commands import app
 from study.scene.file import read_scene
@@ -205,16 +208,12 @@ def test_commands_in_prose_exist_with_their_flags(page):
             assert re.search(rf"{flag}\b", shown), f"{name} has no {flag}"
 
 
+@functools.cache
 def help_of(name):
-    done = subprocess.run(
-        [sys.executable, "-m", "study", name, "--help"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=ROOT,
-    )
-    assert done.returncode == 0, f"there is no command {name}"
-    return done.stdout
+    assert name in app, f"there is no command {name}"
+    shown = io.StringIO()
+    app.help_print([name], console=Console(file=shown, width=200))
+    return shown.getvalue()
 
 
 def test_every_command_is_in_the_readme():

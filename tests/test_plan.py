@@ -196,6 +196,14 @@ def test_scene_that_wants_rest_takes_no_step_and_tells_its_errors(tmp_path, monk
     assert (out / "mine.txt").exists()
 
 
+@pytest.mark.parametrize("flag", ["fields", "save_mesh", "resume", "open_"])
+def test_flags_of_a_motion_are_refused_where_the_rest_alone_is_wanted(tmp_path, flag):
+    overrides = [*SMALL, 'require.quantities=["rest"]', "require.error=60 %"]
+    with pytest.raises(ValueError, match=rf"--{flag.strip('_').replace('_', '-')}: .*rest alone"):
+        run("block", set_=overrides, out=tmp_path / "rest", **{flag: True})
+    assert not (tmp_path / "rest").exists()
+
+
 def test_rest_has_what_large_displacements_change_where_it_is_asked_for():
     scene = scene_of('require.quantities=["rest"]', "require.error=50 %")
     found = {large: rest_of(scene, Silent(), large=large).rows[0] for large in (False, True)}

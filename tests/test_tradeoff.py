@@ -469,14 +469,14 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
 @pytest.mark.slow
 def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     """On this block no lattice down to half the scene's spacing promises as much."""
-    words = ("recommend", "block", *OVERRIDES, "--error", "12 %")
+    words = ("recommend", "block", *OVERRIDES, "--error", "10 %")
     code, said = command(*words)
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
     assert "this place of the load only" in said
     assert "MB kept while it steps" in said
-    scene = read_scene(str(tmp_path / "block-12percent.toml"))
+    scene = read_scene(str(tmp_path / "block-10percent.toml"))
     assert scene.models[-1] in {"superposition", "corrected", "region"}
 
 
@@ -518,6 +518,9 @@ def test_only_what_none_is_cheaper_and_better_than_stands_in_the_table():
     lines = list(advice.table_of([MIDDLE, COARSE, candidate(0.21, 0.5)]))
     assert len(lines) == 3
     assert lines[1].startswith("     0.1 s   20.0")
+    same = candidate(0.08, 0.2, single=True)
+    marked = list(advice.table_of([MIDDLE, same], "field", MIDDLE))
+    assert [line.endswith("<- taken") for line in marked[1:]] == [False, True]
     assert list(advice.table_of([])) == []
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -68,7 +69,6 @@ def run(
         Most that a model may take; one that needs longer is told as not finished, and the others
         go on.
     """
-    from study.progress import on_stderr
     from study.results.folder import default_folder
     from study.scene.file import read_scene
     from study.stages.store import user_store
@@ -79,25 +79,23 @@ def run(
         raise ValueError(f"--workers {workers}: give 1 or more")
     if minutes is not None and not minutes > 0.0:
         raise ValueError(f"--minutes {minutes:g}: give more than 0, or leave it out for no end")
-    chosen = read_scene(scene, set_ or ())
-    for flag, given in (("--fields", fields), ("--save-mesh", save_mesh)):
-        if given and chosen.is_point:
-            raise ValueError(f"{flag}: a single point has none; leave it out")
-    folder = out or default_folder(scene)
-    if chosen.require is not None:
-        from study.plan.plan import lines
-        from study.run import planned
-
-        with on_stderr() as progress:
-            found = planned.planned(chosen, progress)
-            print("\n".join(lines(found)))
-            if not found.moves:
-                at = out or folder.with_name(f"{folder.name}-rest")
-                print("\n".join(planned.at_rest(found, at, progress)))
-                return
-        chosen = found.scene
     if open_ and not (report and html):
         raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
+    chosen = read_scene(scene, set_ or ())
+    of_a_body = {"--fields": fields, "--save-mesh": save_mesh}
+    if chosen.is_point:
+        _refuse_any(of_a_body, "a single point has none; leave it out")
+    folder = out or default_folder(scene)
+    if chosen.require is not None and not chosen.require.moves:
+        _refuse_any(
+            of_a_body | {"--resume": resume, "--open": open_},
+            "require.quantities asks for the rest alone, whose folder has no motion and no report; "
+            "leave it out, or ask for history too",
+        )
+        _at_rest(chosen, out or folder.with_name(f"{folder.name}-rest"))
+        return
+    if chosen.require is not None:
+        chosen = _planned(chosen)
     how = _How(folder, report, report and html, fields, save_mesh, resume, fresh, workers, minutes)
     results = _results(chosen, how, user_store())
     if open_:
@@ -106,6 +104,37 @@ def run(
         show(folder / PAGE)
     if any(not check.passed for check in results.record.checks):
         sys.exit(EXIT_FAILED_CHECK)
+
+
+def _refuse_any(flags: Mapping[str, bool], why: str) -> None:
+    """Refuse the first flag that is set."""
+    for flag, given in flags.items():
+        if given:
+            raise ValueError(f"{flag}: {why}")
+
+
+def _planned(scene: Scene) -> Scene:
+    """The scene that keeps what is required, once a person is told of the plan."""
+    from study.plan.plan import lines
+    from study.progress import on_stderr
+    from study.run import planned
+
+    with on_stderr() as progress:
+        found = planned.planned(scene, progress)
+    print("\n".join(lines(found)))
+    return found.scene
+
+
+def _at_rest(scene: Scene, folder: Path) -> None:
+    """Plan a scene of which the rest alone is wanted, and write a folder of that."""
+    from study.plan.plan import lines
+    from study.progress import on_stderr
+    from study.run import planned
+
+    with on_stderr() as progress:
+        found = planned.planned(scene, progress)
+        print("\n".join(lines(found)))
+        print("\n".join(planned.at_rest(found, folder, progress)))
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from study.scene import Require, Scene
 from study.scene.problem import problem_of
 
 FIELD = "field"
-MOVING = frozenset({HISTORY, PEAK_FORCE})
 """Quantities that are those of a motion."""
 
 
@@ -51,7 +50,7 @@ class Plan:
     def moves(self) -> bool:
         """Whether anything is stepped in time, and not only brought to rest."""
         required = self.scene.require
-        return required is None or not MOVING.isdisjoint(required.quantities)
+        return required is None or required.moves
 
     @property
     def large(self) -> bool:
@@ -188,8 +187,11 @@ def _moved_decisions(
 
 
 def _time(scene: Scene, required: Require) -> tuple[str, str, str]:
-    moves = not MOVING.isdisjoint(required.quantities)
-    how = f"{scene.time.duration:g} s of motion" if moves else "no step: rest under the full load"
+    how = (
+        f"{scene.time.duration:g} s of motion"
+        if required.moves
+        else "no step: rest under the full load"
+    )
     return "time", how, f"wanted: {', '.join(required.quantities)}"
 
 

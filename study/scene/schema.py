@@ -388,6 +388,11 @@ class Require:
     rate: Annotated[float, Quantity("Hz", 0.1, 1e5)] | None = None
     memory: Annotated[float, Quantity("byte", 1e6, 1e13)] | None = None
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything is to be stepped in time, and not only brought to rest."""
+        return not {"history", "peak-force"}.isdisjoint(self.quantities)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:

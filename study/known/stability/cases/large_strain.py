@@ -17,7 +17,7 @@ from scipy.sparse import csc_array, diags_array
 
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import solid
-from fem_reference.newton import SMALLEST_INCREMENT, TOLERANCE, solve
+from fem_reference.newton import INCREMENTS, TOLERANCE, solve
 from study.known import pressed
 from study.known.case import Case, Family
 from study.known.finding import Finding, value
@@ -54,7 +54,7 @@ def cases() -> Iterator[Case]:
         )
     for pressure in (0.2, 0.3, 1.0):
         title = f"load at giving way, {pressure:g} E asked: st-venant-kirchhoff"
-        resolved = SMALLEST_INCREMENT * pressure / GIVES_WAY
+        resolved = INCREMENTS.smallest * pressure / GIVES_WAY
         yield FAMILY.case(title, "gives_way", {"pressure": pressure}, resolved, quick=True)
     for force in (0.1, 1.0, 10.0, 30.0):
         yield FAMILY.case(
