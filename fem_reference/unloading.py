@@ -24,6 +24,7 @@ from scipy.sparse import csc_array
 from fem_reference.direct import symmetric_factors
 from fem_reference.laws import IDENTITY
 from fem_reference.mixed_strain import MixedSolid, kinematics
+from study.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -32,8 +33,7 @@ TOLERANCE = 1e-9
 """Of the unbalanced forces relative to the load."""
 MOST_ITERATIONS = 12
 SHORTEST_STEP = 1 / 64
-SMALLEST_INCREMENT = 1 / 16
-"""Of the load."""
+BY = Increments(easy=5, smallest=1 / 16)
 DECREASE = 1e-4
 """Of the unbalanced forces that a step promises, what it must hold."""
 
@@ -41,11 +41,20 @@ DECREASE = 1e-4
 class Unloading(NamedTuple):
     """Way `back` [m] of the nodes (n,) to the shape without stress, then pressures [Pa].
 
-    `reached`: share of the load for which it is found; 1 if all is well.
+    `reached`: share of the load for which one was found; 1 if all is well.
     """
 
     back: Floats
     reached: float
+
+
+class _Rest(NamedTuple):
+    """Unknowns z for a share of the load, and what was unbalanced before each iteration."""
+
+    z: Floats
+    residuals: tuple[float, ...] = (0.0,)
+    failure: str = ""
+    factor: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,35 +71,32 @@ class _Point:
 def unload(given: MixedSolid, load: Floats, free: Bools) -> Unloading:
     """The shape without stress of a body that is at rest as `given` under a load [N] (n,).
 
-    `free` (n + pressures,): unknowns that are not fixed. `back` is that of the largest share of the
-    load for which it was found.
+    `free` (n + pressures,): unknowns that are not fixed. `back` is that of the whole load, or 0
+    where it is not found.
     """
-    z, reached, goal = np.zeros(len(free)), 0.0, 1.0
-    while reached < 1.0:
-        found = _newton(given, goal * load, free, z)
-        if found is None:
-            goal = 0.5 * (reached + goal)
-            if goal - reached < SMALLEST_INCREMENT:
-                break
-            continue
-        z, reached, goal = found, goal, min(1.0, 2.0 * goal - reached)
-    return Unloading(z, reached)
+
+    def rest(start: _Rest, share: float) -> _Rest:
+        return _newton(given, share * load, free, start.z)._replace(factor=share)
+
+    found = follow(_Rest(np.zeros(len(free))), (1.0,), rest, BY)
+    back = found.rests[-1].z if found.rests else np.zeros(len(free))
+    return Unloading(back, found.reached)
 
 
-def _newton(given: MixedSolid, load: Floats, free: Bools, start: Floats) -> Floats | None:
-    """Unknowns that balance a load; None where no way leads there."""
+def _newton(given: MixedSolid, load: Floats, free: Bools, start: Floats) -> _Rest:
+    """Unknowns that balance a load, or why there are none."""
     n = given.size
     scale = np.where(np.arange(len(free)) < n, 1.0, given.typical_shear / given.length)
     size = max(float(np.linalg.norm(load)), float(np.finfo(np.float64).tiny))
-    z, at = start, _point(given, start)
+    z, at, sizes = start, _point(given, start), list[float]()
     left = _off(given, load, free, z, at)
     for _ in range(MOST_ITERATIONS):
-        norm = float(np.linalg.norm(scale * left)) / size
-        if norm <= TOLERANCE:
-            return z
+        sizes.append(float(np.linalg.norm(scale * left)) / size)
+        if sizes[-1] <= TOLERANCE:
+            return _Rest(z, tuple(sizes))
         factors = symmetric_factors(_tangent(given, z, at, free))
         if factors is None:
-            return None
+            return _Rest(z, tuple(sizes), "the tangent is singular")
         step = np.zeros_like(z)
         step[free] = factors.solve(left[free])
         length = 1.0
@@ -99,13 +105,14 @@ def _newton(given: MixedSolid, load: Floats, free: Bools, start: Floats) -> Floa
             if np.isfinite(there).all() and given.volume_ratio(there).min() > 0.0:
                 point = _point(given, there)
                 off = _off(given, load, free, there, point)
-                if np.linalg.norm(scale * off) / size <= (1.0 - DECREASE * length) * norm:
+                missed = float(np.linalg.norm(scale * off)) / size
+                if missed <= (1.0 - DECREASE * length) * sizes[-1]:
                     break
             length *= 0.5
         else:
-            return None
+            return _Rest(z, tuple(sizes), "no way towards balance")
         z, at, left = there, point, off
-    return None
+    return _Rest(z, tuple(sizes), "no balance of forces")
 
 
 def _point(given: MixedSolid, z: Floats) -> _Point:
