@@ -24,6 +24,8 @@ from study.results.tables import (
     ScoreError,
     SensitivityEntry,
     SimilarityScore,
+    ToolForceSample,
+    ToolForceScore,
 )
 from study.scene.file import resolved
 
@@ -38,6 +40,8 @@ Row = (
     | ScoreDifference
     | FieldDifference
     | SensitivityEntry
+    | ToolForceSample
+    | ToolForceScore
 )
 Flat = dict[str, object]
 Series = dict[str, dict[str, float]]

@@ -8,12 +8,13 @@ import pytest
 from scipy.stats import t as student
 
 from study.models.table import models_of
+from study.problem.trajectory import empty_trajectory
 from study.run.ready import QUIET
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.validation import fit_table, own_scene, table
 from study.validation.fitting import Free, _shifted, fit, free_of, solve
-from study.validation.own_data import Curve, read_curve, read_markers
+from study.validation.own_data import Curve, OwnMarkers, read_curve, read_markers
 from study.validation.own_scene import OwnData
 
 SCENE = [
@@ -271,6 +272,25 @@ def test_a_scene_beside_its_own_motion_differs_by_nothing(posed):
     late = replace(own_curve(posed), times=own_curve(posed).times + 1.0)
     with pytest.raises(ValueError, match="is not within"):
         own_scene.refuse_unanswered(problem, late)
+
+
+def test_a_force_is_that_with_which_the_first_moved_tool_is_pushed():
+    """The body pushes a tool back that goes down: what is read of it is positive."""
+    problem = problem_of(read_scene("block", (*SCENE, *MOVED)))
+    times = problem.observation.times
+    pushed_up = times[:, None, None] * np.array([0.5, 0.0, 2.0])
+    motion = replace(empty_trajectory(problem.observation, 1), tool_force=pushed_up)
+    given = Curve("force_N", times[2:5] + 0.01, np.ones(3), None)
+    assert own_scene.seen(problem, motion, given, 0) == pytest.approx(2.0 * given.times)
+
+
+def test_markers_are_told_by_the_length_of_what_they_are_off():
+    """An uncertainty is of each component, and the root mean square is of lengths."""
+    moved, places = np.tile([3e-3, 0.0, 4e-3], (4, 1)), np.zeros((4, 3))
+    markers = OwnMarkers(places, 0.0 * moved, np.full(4, 1e-3))
+    found = own_scene._of_markers(markers, "model", moved, None)
+    assert found.found == pytest.approx(5e-3)
+    assert found.uncertainty == pytest.approx(1e-3 * np.sqrt(3.0))
 
 
 def test_a_modulus_is_found_again_and_its_error_told(posed):
