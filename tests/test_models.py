@@ -7,6 +7,7 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
+from msm.integrators import INTEGRATORS
 from study.annotation.choice import Choice
 from study.known.stability.cases import own_scene
 from study.models import tissue
@@ -401,6 +402,7 @@ def test_a_choice_holds_its_default_and_refuses_other_names_with_those_there_are
     names = choice.names()
     assert len(names) == len(set(names)) > 1
     assert [choice.read(name) for name in names] == list(names)
+    assert set(choice.usual) <= set(names)
     taken = default if isinstance(default, tuple) else (default,)
     assert set(taken) <= set(names)
     wrong = '["nonesuch"]' if isinstance(default, tuple) else "nonesuch"
@@ -408,6 +410,14 @@ def test_a_choice_holds_its_default_and_refuses_other_names_with_those_there_are
         read_scene("block", [f"{path}={wrong}"])
     assert path in str(refusal.value)
     assert all(repr(name) in str(refusal.value) for name in names)
+
+
+def test_the_integrator_by_default_suits_every_lattice():
+    """So that the check of a scene need not look at it."""
+    method = INTEGRATORS[CHOICES["lattice.integrator"][1]]
+    assert method.stiffness_damping
+    assert not method.implicit_volume
+    assert not method.linear_only
 
 
 def test_an_entry_added_to_a_table_is_a_choice(monkeypatch):

@@ -19,9 +19,11 @@ class Choice:
     As an annotation `Annotated[str, Choice("msm.integrators:INTEGRATORS")]` it makes pydantic take
     the keys of that table and nothing else. The table is imported when a value is read, so that a
     scene can be declared without what computes it, and an entry added to the table is a choice.
+    Names that are `usual` are taken without importing it, for tables that take long to load.
     """
 
     table: str
+    usual: tuple[str, ...] = ()
 
     def names(self) -> tuple[str, ...]:
         """The keys of the table, in its order."""
@@ -30,6 +32,8 @@ class Choice:
 
     def read(self, value: object) -> str:
         """The value if it is a key of the table; ValueError with the keys there are."""
+        if isinstance(value, str) and value in self.usual:
+            return value
         names = self.names()
         if not isinstance(value, str) or value not in names:
             quoted = [repr(name) for name in names]

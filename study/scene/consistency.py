@@ -162,7 +162,8 @@ def _lattice_contradictions(scene: Scene, table: Table) -> Iterator[str]:
             f"lattice.volume_term: needs tissue.poisson_ratio of {SPRING_POISSON_RATIO} or more, "
             f"not {nu:g}; leave it out or raise the ratio"
         )
-    if _has(table, ("lattice", "integrator")):
+    # The one by default suits every lattice, and the table of all takes a while to load.
+    if _has(table, ("lattice", "integrator")) and lattice.integrator != type(lattice).integrator:
         yield from _integrator_contradictions(scene)
     if lattice.time_step is not None and lattice.step_rate is not None:
         yield "lattice.time_step: contradicts lattice.step_rate; give one of them"

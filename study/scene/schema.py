@@ -28,10 +28,10 @@ TOOL_POINT, END_POINT = "tool", "tool-end"
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Annotated[str, Choice("fuzzy.systems.kinds:SYSTEMS")]
 ModelName = Annotated[str, Choice("study.models.table:MODELS")]
-IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS")]
-ElementName = Annotated[str, Choice("fem_reference.elements:CHOICES")]
-MethodName = Annotated[str, Choice("fem_reference.model:METHODS")]
-LargeStrain = Annotated[str, Choice("fem_reference.laws:LARGE_STRAIN")]
+IntegratorName = Annotated[str, Choice("msm.integrators:INTEGRATORS", ("symplectic-euler",))]
+ElementName = Annotated[str, Choice("fem_reference.elements:CHOICES", ("auto",))]
+MethodName = Annotated[str, Choice("fem_reference.model:METHODS", ("ritz-vectors",))]
+LargeStrain = Annotated[str, Choice("fem_reference.laws:LARGE_STRAIN", ("neo-hookean",))]
 SuitedKey = Literal[
     "support.depth",
     "support.stiffness",
