@@ -33,7 +33,7 @@ from study.scene.schema import END_POINT, TOOL_POINT, Organ, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
 from study.scene.travel import travelling
-from study.scene.way import notes_on_misses, refuse_blocked
+from study.scene.obstacles import notes_on_misses, refuse_blocked
 
 Floats = NDArray[np.float64]
 
