@@ -28,12 +28,12 @@ from study.problem.supports import (
 )
 from study.problem.trajectory import Observation
 from study.problem.way import full_share
+from study.scene.obstacles import notes_on_misses, refuse_blocked
 from study.scene.place import OUTWARD, resolve
 from study.scene.schema import END_POINT, TOOL_POINT, Organ, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
 from study.scene.travel import travelling
-from study.scene.obstacles import notes_on_misses, refuse_blocked
 
 Floats = NDArray[np.float64]
 
