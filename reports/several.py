@@ -91,22 +91,28 @@ def _numbers(run: Results) -> Iterator[tuple[Key, Measured]]:
         yield key, Measured(one.estimate_pa / PA_PER_KPA, one.quadrature_error_pa / PA_PER_KPA)
 
 
-def lines(names: Sequence[str], rows: Iterable[Compared]) -> list[str]:
+def lines(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Compared]) -> list[str]:
     """The table for a terminal, those that differ first."""
-    rows = list(rows)
     table = [[*HEADER, *names, "verdict"], *cells(rows)]
     widths = [max(len(row[i]) for row in table) for i in range(len(table[0]))]
     told = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
-    return [*(line.rstrip() for line in told), verdict(rows)]
+    return [*(line.rstrip() for line in told), said(names, runs, rows)]
 
 
-def verdict(rows: Sequence[Compared]) -> str:
-    """How many numbers differ, in a sentence."""
+def said(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Compared]) -> str:
+    """How many numbers differ, and which models have none, in sentences."""
     apart = sum(row.differs is True for row in rows)
-    return (
+    text = (
         f"{apart} of {len(rows)} numbers differ by more than their errors; ± is numerical "
-        "(mesh, time steps, quadrature), not that of a model"
+        "(mesh, time steps, quadrature), not that of a model."
     )
+    lost = [
+        f"{model.label} in {name} ({model.status})"
+        for name, run in zip(names, runs, strict=True)
+        for model in run.record.models
+        if model.status != "finished"
+    ]
+    return f"{text} Without numbers: {', '.join(lost)}." if lost else text
 
 
 def cells(rows: Iterable[Compared]) -> list[list[str]]:

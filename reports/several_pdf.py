@@ -39,7 +39,7 @@ def several_pdf(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Co
         "header": [*several.HEADER, *names, "verdict"],
         "rows": [[words(cell) for cell in row] for row in table[:MOST_ROWS]],
         "left_out": max(0, len(table) - MOST_ROWS),
-        "said": several.verdict(rows),
+        "said": several.said(names, runs, rows),
         "alternative": alternative(names, runs),
     }
     figure = curves_figure(names, runs)

@@ -205,6 +205,15 @@ def test_three_folders_make_one_table_with_those_that_differ_first(tmp_path, cap
     assert any(line.endswith("within errors") for line in table)
 
 
+def test_a_model_that_is_lost_in_a_run_is_named():
+    runs = [whole(), with_model(whole(), "basafa", status="diverged", ended_at_s=0.5)]
+    rows = several.compared(runs)
+    assert at_tool("Basafa benchmark") not in {(row.quantity, row.model) for row in rows}
+    said = several.said(["a", "b"], runs, rows)
+    assert said.endswith("Without numbers: Basafa benchmark in b (diverged).")
+    assert "Without" not in several.said(["a", "a"], [whole(), whole()], rows)
+
+
 def test_a_report_lays_the_curves_of_all_runs_over_each_other(tmp_path, capsys):
     runs = {"a": whole(), "b": scaled(whole(), 1.2)}
     for name, run in runs.items():

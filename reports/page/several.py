@@ -30,7 +30,7 @@ def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[C
     text = Template(part("several.html")).substitute(
         title=markup.escape(f"Several runs: {', '.join(names)}"),
         style=part("page.css"),
-        said=markup.escape(several.verdict(rows)),
+        said=markup.escape(several.said(names, runs, rows)),
         height=f"{ROW * -(-len(labels) // COLUMNS)}rem",
         words=markup.escape(alternative(names, runs), quote=True),
         table=table(

@@ -71,7 +71,7 @@ def _by_errors(folders: list[Path], out: Path | None) -> None:
     names = several.short_names([str(folder) for folder in folders])
     runs = [read(folder) for folder in folders]
     rows = several.compared(runs)
-    print("\n".join(several.lines(names, rows)))
+    print("\n".join(several.lines(names, runs, rows)))
     if out is None:
         return
     if out.suffix.lower() == PDF:
