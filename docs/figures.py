@@ -894,7 +894,7 @@ def run_stages() -> Iterator[tuple[str, str]]:
         ("spacing", "other spacing"),
     ):
         seconds = float(whole[case]["wall_s"])
-        yield f"run-{name}", f"{seconds:.0f} s"
+        yield f"run-{name}", f"{seconds:.0f} s" if seconds >= 1.0 else f"{seconds:.1f} s"
     for name, case in ("first", "after install"), ("fresh", "side by side"):
         yield f"run-{name}-memory", f"{float(whole[case]['memory_mb']) / 1e3:.1f} GB"
 
