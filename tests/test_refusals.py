@@ -1,15 +1,10 @@
 """What `run` refuses, `check` refuses in the same words; what `check` passes, `run` runs."""
 
 import random
-import signal
-import sys
-import warnings
-from dataclasses import dataclass
 from functools import partial
 
 import pytest
 
-from study.__main__ import main
 from study.check import describe_scene
 from study.commands import EXIT_BAD_INPUT
 from study.run.study import run_study
@@ -29,41 +24,13 @@ TINY = (
 TISSUE = 'models=["tissue"]'
 
 
-@dataclass(frozen=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def typed(monkeypatch, capsys, tmp_path):
-    """The program on words typed in an empty folder."""
-
-    def enter(*words):
-        monkeypatch.setattr(sys, "argv", ["liver-study", *map(str, words)])
-        code = 0
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Cyclopts application invoked without tokens")
-            try:
-                main()
-            except SystemExit as left:
-                code = left.code or 0
-        return Ended(code, *capsys.readouterr())
-
-    handler = signal.getsignal(signal.SIGTERM)
-    monkeypatch.chdir(tmp_path)
-    yield enter
-    signal.signal(signal.SIGTERM, handler)
-
-
 def sets(*overrides):
     return [word for one in overrides for word in ("--set", one)]
 
 
 def complaint(ended):
     """The message, without the stages that a run tells before it."""
-    return ended.err[ended.err.index("liver-study: ") :]
+    return ended.stderr[ended.stderr.index("liver-study: ") :]
 
 
 BAD = [
@@ -125,7 +92,7 @@ def test_check_and_run_refuse_a_scene_in_the_same_words(scene, overrides, words,
     checked, ran = typed("check", scene, *given), typed("run", scene, "--no-report", *given)
     assert words in complaint(checked)
     assert complaint(ran) == complaint(checked)
-    assert (checked.code, ran.code) == (EXIT_BAD_INPUT, EXIT_BAD_INPUT)
+    assert (checked.returncode, ran.returncode) == (EXIT_BAD_INPUT, EXIT_BAD_INPUT)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
@@ -200,7 +167,7 @@ def test_every_study_of_a_scene_refuses_it_at_the_start_as_run_does(words, typed
     given = () if "block.toml" in words else sets(*TINY, bad)
     refused = typed(*words, *given)
     ran = typed("run", "block.toml")
-    assert refused.code == EXIT_BAD_INPUT
+    assert refused.returncode == EXIT_BAD_INPUT
     assert complaint(refused) == complaint(ran)
     assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"block.toml"}
 
@@ -224,8 +191,8 @@ def test_an_output_that_cannot_be_written_is_refused_at_the_start(words, place, 
     if words[0] == "recommend" and place == "file":
         place = "."
     done = typed(*words, "--out", place)
-    assert done.code == EXIT_BAD_INPUT
-    assert place in done.err
+    assert done.returncode == EXIT_BAD_INPUT
+    assert place in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "mine"
 
@@ -235,9 +202,9 @@ def test_check_looks_at_the_folder_of_the_run(typed, tmp_path):
     foreign.parent.mkdir(parents=True)
     foreign.write_text("")
     checked, ran = typed("check", "paper"), typed("run", "paper")
-    assert "holds thesis.tex" in checked.err
+    assert "holds thesis.tex" in checked.stderr
     assert complaint(ran) == complaint(checked)
-    assert typed("check", "paper", "--out", "elsewhere").code == 0
+    assert typed("check", "paper", "--out", "elsewhere").returncode == 0
     assert not (tmp_path / "elsewhere").exists()
 
 
@@ -281,8 +248,8 @@ def test_a_flag_that_does_not_apply_is_an_error(words, message, typed, tmp_path)
     if words[1] == "cube.stl":
         (tmp_path / "cube.stl").write_text("solid")
     done = typed(*words)
-    assert done.code == EXIT_BAD_INPUT
-    assert message in done.err
+    assert done.returncode == EXIT_BAD_INPUT
+    assert message in done.stderr
     assert {path.name for path in tmp_path.rglob("*.*")} <= {"cube.stl"}
 
 
@@ -296,7 +263,7 @@ def test_a_flag_that_does_not_apply_is_an_error(words, message, typed, tmp_path)
     ],
 )
 def test_a_flag_that_applies_is_none(words, typed):
-    assert typed(*words).code == 0
+    assert typed(*words).returncode == 0
 
 
 VARIED = {
