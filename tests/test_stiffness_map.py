@@ -113,6 +113,25 @@ def test_a_shear_modulus_is_a_third_or_so_of_youngs(tmp_path):
     assert found == pytest.approx([2.0 * (1.0 + nu) * 3e3])
 
 
+def test_noise_where_no_organ_is_does_not_refuse_a_map(tmp_path):
+    """Elastograms have small values beside the body; at the organ they are a mistaken unit."""
+
+    def noisy(points, at):
+        away = np.linalg.norm(points - at, axis=-1)
+        return np.where(away < 1.5e-3, 1e-3, 20.0)  # 1 Pa
+
+    beside, within = np.array([-0.009, 0.046, 0.034]), np.array([0.03, 0.02, 0.015])
+    origin = (12.0, 12.0, -12.0)
+    shape = (44, 34, 29)
+    path = image(tmp_path / "a.nii", lambda p: noisy(p, beside), shape, origin)
+    assert problem_of(scene_of(path)).tissue.mapped(within[None]) == pytest.approx([20e3])
+    path = image(tmp_path / "b.nii", lambda p: noisy(p, within), shape, origin)
+    with pytest.raises(
+        ValueError, match=r"unit: in kPa \d+ of 43384 voxels .* of 1 to 1 Pa, beyond"
+    ):
+        problem_of(scene_of(path))
+
+
 def test_zeros_are_tissue_as_around_and_do_not_soften_what_is_beside_them(tmp_path):
     path = image(tmp_path / "map.nii", lambda p: np.where(p[..., 0] < 0.03, 0.0, 20.0))
     problem = problem_of(scene_of(path))

@@ -21,6 +21,8 @@ from study.scene.place import resolve
 from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 Distance = Callable[[Floats], Floats]
 
 PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
@@ -56,7 +58,7 @@ def tissue_of(table: OrganTissue, geometry: Geometry) -> Tissue:
         ),
         mapped=None
         if table.stiffness_map is None
-        else _mapped(table.stiffness_map, base, geometry.offset),
+        else _mapped(table.stiffness_map, base, geometry),
     )
     _check(found, table, geometry.mesh)
     return found
@@ -142,24 +144,39 @@ def _lies_in(mesh: TetrahedralMesh, tissue: VariedTissue) -> bool:
     return made is not None and bool(made.share.sum() * SAMPLES >= FEWEST)
 
 
-def _mapped(given: StiffnessMap, tissue: Tissue, offset: Floats) -> Distance:
-    """Young's modulus [Pa] at points of the scene, NaN where the image has none.
-
-    `offset` [m] (3,): what was subtracted from the coordinates of the organ's file.
-    """
+def _mapped(given: StiffnessMap, tissue: Tissue, geometry: Geometry) -> Distance:
+    """Young's modulus [Pa] at points of the scene, NaN where the image has none."""
     voxels, affine = _image(Path(given.file))
     of_young = 1.0 if given.quantity == "youngs-modulus" else 2.0 * (1.0 + tissue.poisson_ratio)
     modulus = voxels * PASCALS[given.unit] * of_young
     known = np.isfinite(modulus) & (modulus > 0.0)
     low, high = RANGE
-    if known.any() and not (low <= modulus[known].min() and modulus[known].max() <= high):
+    odd = np.argwhere(known & ((modulus < low) | (modulus > high)))
+    odd = odd[_are_near(odd, affine, geometry)]
+    if len(odd):
+        found = modulus[tuple(odd.T)]
         raise ValueError(
-            f"tissue.stiffness_map.unit: in {given.unit} Young's modulus goes from "
-            f"{modulus[known].min():.3g} to {modulus[known].max():.3g} Pa, beyond {low:g} to "
-            f"{high:g}; give the unit of the image"
+            f"tissue.stiffness_map.unit: in {given.unit} {len(odd)} of {known.sum()} voxels with a "
+            f"value lie at the organ and have a Young's modulus of {found.min():.3g} to "
+            f"{found.max():.3g} Pa, beyond {low:g} to {high:g}; give the unit of the image, or set "
+            "voxels that were not measured to 0"
         )
     inverse = np.asarray(np.linalg.inv(affine), dtype=np.float64)
+    offset = geometry.offset
     return _Sampled(np.where(known, modulus, 0.0), known.astype(np.float64), inverse, offset)
+
+
+def _are_near(voxels: Ints, affine: Floats, geometry: Geometry) -> Booleans:
+    """Which voxels (n, 3), by number, are in the box of the organ or within one of them of it.
+
+    Noise of an image where no organ is says nothing of its unit.
+    """
+    in_ras = voxels @ affine[:3, :3].T + affine[:3, 3]
+    points = 1e-3 * in_ras @ to_scene("RAS") - geometry.offset  # which is its own inverse
+    reach = 1e-3 * np.abs(affine[:3, :3]).sum(axis=1)
+    vertices = geometry.mesh.points
+    low, high = vertices.min(axis=0) - reach, vertices.max(axis=0) + reach
+    return np.asarray(((low <= points) & (points <= high)).all(axis=1))
 
 
 class _Sampled:
