@@ -14,9 +14,13 @@ from study.organ.isosurface_stuffing import stuff
 from study.organ.occupancy import ImplicitBody, MeshBody
 from study.problem.contact import Foundation, ToolPatch
 from study.scene import Place
-from study.scene.place import OUTWARD, resolve
+from study.scene.file import read_scene, resolved, validate
+from study.scene.place import OUTWARD, refuse_far, resolve
+from study.scene.problem import problem_of
 
 VOLUME = 1.5e-3
+MOVED = np.array([2.0, 0.0, -0.01])
+"""What was subtracted from the coordinates of an organ's file [m]."""
 
 
 def signed(points):
@@ -149,6 +153,37 @@ def test_a_place_on_a_face_of_a_block_is_exact():
     assert point == pytest.approx([0.06, 0.04, 0.06])
     point, _ = resolve(Place(point=(0.06, 0.04, 0.05), snap=False), surface)
     assert point == pytest.approx([0.06, 0.04, 0.05])
+
+
+def test_a_point_far_from_the_organ_is_refused_by_its_key():
+    """It would move to the nearest corner, with an exit code of 0."""
+    surface = boundary(block_mesh((0.12, 0.08, 0.06), 0.02))
+    size = float(np.linalg.norm([0.12, 0.08, 0.06]))
+    near, far = (Place(point=(0.12 + times * size, 0.04, 0.03)) for times in (0.99, 1.01))
+    refuse_far({"tool.place": near, "support.place": Place(side="left", at=(0, 0))}, surface, MOVED)
+    with pytest.raises(ValueError, match=r"^control_points.a.point: is 157.8 mm off .*; move it$"):
+        refuse_far({"tool.place": near, "control_points.a": far}, surface, np.zeros(3))
+    with pytest.raises(ValueError, match=r"by \(-2000, 0, 10\) mm, and points are not; move it"):
+        refuse_far({"tool.place": far}, surface, MOVED)
+
+
+@pytest.mark.parametrize(
+    "key", ["tool.place", "control_points.tool", "support.place", "tool.2.place"]
+)
+def test_every_point_of_a_scene_is_looked_at(key):
+    table = resolved(read_scene("block"))
+    far = {"point": ["1 m", "1 m", "1 m"]}
+    table["tool"] = [table["tool"], dict(table["tool"])]
+    if key == "tool.2.place":
+        table["tool"][1]["place"] = far
+    elif key == "tool.place":
+        table["tool"][0]["place"] = far
+    elif key == "support.place":
+        table["support"] |= {"place": far, "radius": "1 cm"}
+    else:
+        table["control_points"] = {"tool": far}
+    with pytest.raises(ValueError, match=rf"^{key}.point: is .* off the organ"):
+        problem_of(validate(table, "made"))
 
 
 def test_a_place_beside_a_concave_organ_falls_back_to_the_nearest_surface():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +33,30 @@ def resolve(place: Place, surface: SurfaceMesh) -> tuple[Floats, Floats]:
         point = np.array(place.point, dtype=float)
     nearest, normal = _nearest(point, surface)
     return (nearest if place.snap else point), normal
+
+
+def refuse_far(places: Mapping[str, Place], surface: SurfaceMesh, offset: Floats) -> None:
+    """ValueError naming a point that is off the organ by more than its size.
+
+    It would move to a surface that was not meant. `offset` [m] (3,): what was subtracted from the
+    coordinates of the organ's file.
+    """
+    lower, upper = surface.points.min(axis=0), surface.points.max(axis=0)
+    size = float(np.linalg.norm(upper - lower))
+    for key, place in places.items():
+        if place.point is None:
+            continue
+        point = np.array(place.point)
+        away = float(np.linalg.norm(np.maximum(0.0, np.maximum(lower - point, point - upper))))
+        if away > size:
+            moved = ", ".join(f"{0.0 - 1e3 * one:.4g}" for one in offset)
+            file = (
+                f"; the organ's file was moved to the origin, by ({moved}) mm, and points are not"
+            )
+            raise ValueError(
+                f"{key}.point: is {1e3 * away:.4g} mm off the organ, which is {1e3 * size:.4g} mm "
+                f"across{file if offset.any() else ''}; move it"
+            )
 
 
 def _from_side(

@@ -29,8 +29,8 @@ from study.problem.supports import (
 from study.problem.trajectory import Observation
 from study.problem.way import full_share
 from study.scene.obstacles import notes_on_misses, refuse_blocked
-from study.scene.place import OUTWARD, resolve
-from study.scene.schema import END_POINT, TOOL_POINT, Organ, Scene, Tool
+from study.scene.place import OUTWARD, refuse_far, resolve
+from study.scene.schema import END_POINT, TOOL_POINT, Organ, Place, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
 from study.scene.travel import travelling
@@ -52,6 +52,7 @@ def problem_of(scene: Scene) -> Problem:
     """
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
+    refuse_far(dict(_places(scene)), surface, geometry.offset)
     foundation = _support(scene, surface)
     first, *loads = _loads(scene.tool, "tool", surface)
     tool, factor = first.tool, first.factor
@@ -96,6 +97,26 @@ def problem_of(scene: Scene) -> Problem:
     )
 
 
+def _places(scene: Scene) -> Iterator[tuple[str, Place]]:
+    """Every place that a scene states, by its key."""
+    yield from ((f"control_points.{name}", one) for name, one in scene.control_points.items())
+    for name, tool in zip(_names("tool", len(scene.tools)), scene.tools, strict=True):
+        yield f"{name}.place", tool.place
+    for name, support in zip(_names("support", len(scene.supports)), scene.supports, strict=True):
+        if support.place is not None:
+            yield f"{name}.place", support.place
+    for number, weight in enumerate(scene.weight, 1):
+        yield f"weight.{number}.place", weight.place
+    for number, inclusion in enumerate(scene.tissue.inclusion, 1):
+        if inclusion.place is not None:
+            yield f"tissue.inclusion.{number}.place", inclusion.place
+
+
+def _names(table: str, count: int) -> list[str]:
+    """Names of tables of which the first has no number."""
+    return [table, *(f"{table}.{n}" for n in range(2, count + 1))]
+
+
 def _probes(scene: Scene, surface: SurfaceMesh, loads: Sequence[Load]) -> dict[str, Floats]:
     """Control points [m] (3,) by name; by default those of the tissue where the tool is placed.
 
@@ -130,8 +151,8 @@ def _further_loads(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Ite
 
 def _moved(scene: Scene) -> list[tuple[str, Tool]]:
     """Tools that are moved, by the names of their tables."""
-    names = ["tool", *(f"tool.{n}" for n in range(2, len(scene.tools) + 1))]
-    return [(name, one) for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
+    named = zip(_names("tool", len(scene.tools)), scene.tools, strict=True)
+    return [(name, one) for name, one in named if one.is_moved]
 
 
 def _rigid(name: str, tool: Tool, surface: SurfaceMesh, rule: SurfaceRule) -> RigidTool:
