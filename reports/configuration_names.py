@@ -39,13 +39,20 @@ WORDS: dict[str, Callable[[str], str]] = {
     "step_rate": lambda value: f"{value} Hz steps",
     "rate": lambda value: f"{value} Hz steps",
     "element": lambda value: NAMES.get(value, value),
-    "level": lambda value: f"mesh {value.replace('-', '−')}",
+    "level": lambda value: _mesh(int(value)),
     "integrator": lambda value: NAMES.get(value, value.replace("-", " ")),
     "vectors": lambda value: NAMES.get(value, value),
     "precision": lambda value: f"{value} precision",
     "radius": lambda value: f"to {1e3 * float(value):.3g} mm from the tool",
     "count": lambda value: f"{value} vectors",
 }
+
+
+def _mesh(level: int) -> str:
+    if level == 0:
+        return "the scene's mesh"
+    steps = "a step" if abs(level) == 1 else f"{abs(level)} steps"
+    return f"mesh {steps} {'finer' if level > 0 else 'coarser'}"
 
 
 def contender_name(contender: str) -> str:
@@ -56,7 +63,7 @@ def contender_name(contender: str) -> str:
 def name_of(contender: str, settings: str, edge: float | None = None) -> str:
     """Name of a configuration in a sentence, from its settings "key=value key=value".
 
-    `edge`: elements [m] of the mesh of level 0; where it is not known a mesh has its number.
+    `edge`: elements [m] of the mesh of level 0; where it is not known meshes are told from that.
     """
     known = dict(part.split("=", 1) for part in settings.split())
     head = SPRINGS.get(known.pop("volume_term", ""), contender_name(contender))
