@@ -32,6 +32,7 @@ from study.models import finite_elements as reference
 from study.models.model import SILENT
 from study.organ.block import block_mesh
 from study.problem.damping import RayleighDamping
+from study.run.warnings import warnings
 from study.scene import Organ, Reference, Tissue
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import geometry_of, problem_of
@@ -366,6 +367,21 @@ def test_an_accuracy_out_of_reach_is_said(short, monkeypatch):
     _, elements, _ = run(with_reference(short, accuracy=1e-4))
     assert len(elements.levels) == 4
     assert elements.accuracy_missed == 1e-4
+
+
+def test_meshes_too_coarse_to_tell_their_error_are_told_with_a_remedy(short, usual):
+    record, elements, _ = usual
+    assert not any("too coarse" in text for text in warnings(short, [record], []))
+    known = elements.mesh_error
+    coarse = {
+        name: dataclasses.replace(one, displacement=0.7) for name, one in known.by_probe.items()
+    }
+    rough = dataclasses.replace(
+        elements, mesh_error=dataclasses.replace(known, by_probe=coarse), accuracy_missed=None
+    )
+    (said,) = warnings(short, [dataclasses.replace(record, elements=rough)], [])
+    assert "an error of 70 %" in said
+    assert said.endswith("Set reference.accuracy, or reduce reference.element_size.")
 
 
 def test_the_stated_error_holds_against_a_much_finer_mesh(short, usual, monkeypatch):

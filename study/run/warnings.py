@@ -12,6 +12,8 @@ from study.scene.schema import Tool
 
 OVERLAP = 0.01
 """Of a tool's travel, above which an overlap is told."""
+UNKNOWN = 0.25
+"""Stated error of the elements' meshes, above which it tells that they are too coarse."""
 FINE = 2.0
 """Spacings to a tool's radius, below which contact is told to be coarse."""
 
@@ -116,6 +118,12 @@ def _of_mesh(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
             f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "
             f"mesh of {elements.elements} tetrahedra, the last within the limit, reaches "
             f"{100 * elements.mesh_error.worst.displacement:.2g} %. {_more_accurate(scene)}"
+        )
+    elif elements.mesh_error and elements.mesh_error.worst.displacement > UNKNOWN:
+        yield (
+            "The finite elements state an error of "
+            f"{100 * elements.mesh_error.worst.displacement:.2g} %, as their meshes are too coarse "
+            "to tell a smaller one. Set reference.accuracy, or reduce reference.element_size."
         )
 
 
