@@ -61,9 +61,9 @@ def budget_of_nearest(results: Results) -> ErrorBudget | None:
 
 def caption(results: Results) -> str:
     """What the figure shows, as its caption says it."""
+    band = "; the band is the type-2 interval" if results.bands else ""
     said = (
-        f"Displacement at the control point {tool_probe(results)} along the push, over time; the "
-        "band is the type-2 interval. "
+        f"Displacement at the control point {tool_probe(results)} along the push, over time{band}. "
     )
     if budget_of_nearest(results) is not None:
         said += (

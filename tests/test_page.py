@@ -225,6 +225,8 @@ def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does
     slow = with_model(results_of(), "basafa", wall_s=2.0)
     assert "takes 33 of its 16.7 ms, and is not ready in time" in said(slow)
     assert "Of those in time the nearest is MSM Mamdani: 40.0 % off" in said(slow)
+    hidden = with_model(with_mesh_error(field_peak=0.9), "basafa", wall_s=2.0)
+    assert "how far off is not resolved (< 90.0 %), a frame" in said(hidden)
     for name in MODELS:
         slow = with_model(slow, name, wall_s=2.0)
     assert "No model that finished is ready in time here" in said(slow)

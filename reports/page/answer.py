@@ -363,9 +363,12 @@ def _in_time(results: Results, found: Nearest) -> Iterator[str]:
         return
     best = min(shares, key=lambda name: shares[name])
     taken = frame_share(results.model(best)) or 0.0
+    off = f"{percent(shares[best])} off"
+    if found.error is not None and shares[best] < found.error:
+        off = f"how far off is {resolved(shares[best], found.error)}"
     yield (
-        f"Of those in time the nearest is {labels(results)[best]}: {percent(shares[best])} off, a "
-        f"frame takes {_frame(taken)}."
+        f"Of those in time the nearest is {labels(results)[best]}: {off}, a frame takes "
+        f"{_frame(taken)}."
     )
 
 
