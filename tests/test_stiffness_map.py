@@ -302,7 +302,8 @@ def test_what_is_wrong_with_the_mesh_of_an_inclusion_is_told_in_its_keys(tmp_pat
         ({"place": {"side": "left", "at": [0.5, 0.5]}}, r"place: give fraction or point"),
         ({"unit": "mm"}, r"tissue\.inclusion\.1\.unit: has no effect"),
         ({"youngs_modulus": "0 Pa"}, r"tissue\.inclusion\.1\.youngs_modulus"),
-        ({"place": {"point": [1.0, 1.0, 1.0]}}, r"tissue\.inclusion\.1: nothing of it lies in"),
+        ({"place": {"point": [0.1, 0.0, 0.0]}}, r"tissue\.inclusion\.1: nothing of it lies in"),
+        ({"place": {"point": [1.0, 1.0, 1.0]}}, r"tissue\.inclusion\.1\.place\.point: is .* off"),
     ],
 )
 def test_an_inclusion_that_is_none_is_refused(change, message):
