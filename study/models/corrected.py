@@ -25,6 +25,7 @@ from msm.lattice import LatticeMesh
 from msm.model import Counts, Fixed, Step
 from msm.timestep import whole_steps
 from study.models.corrected_errors import Errors, checks
+from study.models.coupled_stepper import CoupledStepper
 from study.models.damping import reference_damping
 from study.models.deformed import Deformed, superposed
 from study.models.finite_elements import (
@@ -32,14 +33,13 @@ from study.models.finite_elements import (
     PreparedElements,
     reference_of,
 )
-from study.models.keeping import recorded
 from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, asked_step
 from study.models.lattice_assumptions import springs
 from study.models.mesh_error import MeshSolution
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.models.remainder import FINER, ORDER, PreparedRemainder, Remainder, plus
 from study.models.tissue import of_modulus
-from study.models.together import Together
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
@@ -233,11 +233,11 @@ class PreparedCorrected:
 
     def _keep_fields(self, found: Remainder, shape: Deformed, watch: Watch) -> None:
         """Keep the motion of the mesh's vertices, if it is wanted."""
-        if watch.keeping is None or watch.keeping.fields is None:
+        if watch.persistence is None or watch.persistence.fields is None:
             return
         mesh, times = Mesh(shape.mesh.points, shape.mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(watch.keeping, resume=False)
-        with recorded(afresh, self.model.name, mesh, times) as on_sample:
+        afresh = replace(watch.persistence, resume=False)
+        with record_fields(afresh, self.model.name, mesh, times) as on_sample:
             for sample in found.samples:
                 on_sample(sample, *shape.state(sample, found))
 
@@ -245,7 +245,7 @@ class PreparedCorrected:
         """All parts at rest, stepped together; the vertices of the mesh are delivered by frames."""
         solved = self.best or self._on_level
         parts = self._remainder(solved), self._deformed(solved)
-        return Together(*parts, self.problem.factors, self.fine.model.damping).stepper()
+        return CoupledStepper(*parts, self.problem.factors, self.fine.model.damping).stepper()
 
 
 @lru_cache(maxsize=1)

@@ -137,6 +137,6 @@ def estimated_run(
         largest_strain=found.largest_strain,
         time_step_errors=errors,
     )
-    wanted = watch.keeping is not None and watch.keeping.fields is not None
+    wanted = watch.persistence is not None and watch.persistence.fields is not None
     notes = (f"Fields of {model.name} are not kept: only lattices and fem keep them.",)
     return ModelRun(found.trajectory, record, checks, notes if wanted else ())

@@ -17,7 +17,7 @@ from fuzzy.liver.system import records_in_use
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
 from fuzzy.systems.options import InferenceOptions
-from study.models.own_rules import own_estimates, system_of
+from study.models.user_rule_base import system_of, user_estimates
 from study.results.records import FuzzyRecord, StiffnessSet, SystemEstimate
 from study.results.tables import SensitivityEntry
 from study.scene import Scene
@@ -48,7 +48,7 @@ def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
     ValueError naming the key, for one without readings among them.
     """
     if scene.fuzzy.rule_base is not None:
-        return own_estimates(scene)
+        return user_estimates(scene)
     if settings(scene).missing.silences and not readings(scene):
         raise ValueError(
             'patient: no reading to estimate from; give one, such as patient.hcv = "9.5 kPa", or '

@@ -30,7 +30,6 @@ from study.models.errors import (
 )
 from study.models.grading import is_graded, next_graded
 from study.models.in_contact import contact_record, force_step_errors, resolving, rest_in_contact
-from study.models.keeping import recorded
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large
 from study.models.mesh_error import (
@@ -42,6 +41,7 @@ from study.models.mesh_error import (
     why_unknown,
 )
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.organ.geometry import Level
 from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
@@ -420,15 +420,15 @@ class PreparedElements:
 
     def _keep_fields(self, best: MeshSolution, watch: Watch) -> str:
         """Keep the motion of the vertices, if it is wanted; why it cannot be."""
-        keeping = watch.keeping
-        if keeping is None or keeping.fields is None:
+        persistence = watch.persistence
+        if persistence is None or persistence.fields is None:
             return ""
         moving, mesh = best.found.moving, best.level.mesh
         if moving is None:
             return "Fields of fem are kept of a superposition only, not of steps in time."
         shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(keeping, resume=False)
-        with recorded(afresh, self.model.name, shown, times) as on_sample:
+        afresh = replace(persistence, resume=False)
+        with record_fields(afresh, self.model.name, shown, times) as on_sample:
             for sample in range(len(times)):
                 u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in moving(sample))
                 on_sample(sample, u, v)

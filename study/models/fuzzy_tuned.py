@@ -7,7 +7,7 @@ from functools import partial
 
 from fuzzy.liver.assumptions import assumptions as fuzzy_assumptions
 from fuzzy.liver.stiffness import StiffnessEstimate
-from study.models import own_rules
+from study.models import user_rule_base
 from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import settings
 from study.models.lattice import FOLLOWED, LatticeModel
@@ -56,7 +56,7 @@ def assumptions(scene: Scene) -> list[str]:
     """On the springs, then on the fuzzy systems."""
     on_organ = [] if scene.is_point else layout(scene)
     if scene.fuzzy.rule_base is not None:
-        return [*on_organ, *springs(scene), *own_rules.assumptions(scene)]
+        return [*on_organ, *springs(scene), *user_rule_base.assumptions(scene)]
     return [*on_organ, *springs(scene), *fuzzy_assumptions(settings(scene))]
 
 

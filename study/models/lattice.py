@@ -21,7 +21,6 @@ from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, S
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.mesh.tetrahedra import volumes
-from study.models.at_depth import AtDepth
 from study.models.errors import (
     place,
     rounding_checks,
@@ -30,14 +29,15 @@ from study.models.errors import (
     time_step_errors,
     tool_force_errors,
 )
-from study.models.keeping import OnSample, checkpoint, recorded
+from study.models.indented_stepper import IndentedStepper
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import OnSample, checkpoint, record_fields
 from study.models.region_size import Sized, Wanted, sized
 from study.models.spacing_error import COARSER, spacing_errors
 from study.models.touching import touchable
+from study.problem.heterogeneous import of_tetrahedra
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import (
@@ -133,8 +133,8 @@ class LatticeModel:
                 raise ValueError(unfit)
             found = sized(problem, self._wanted(), self._of_tissue)
             plain = found.assembly
-            if problem.is_burdened:
-                plain = _with_burden(problem, plain)
+            if problem.has_further_loads:
+                plain = _loaded(problem, plain)
             made = self.make(self.scene, plain.lattice)
             return replace(on_lattice(self, problem, plain, made), region=found)
         plain = assembled(problem, self.lattice)
@@ -155,18 +155,18 @@ def assembled(problem: Problem, lattice: Lattice) -> Assembly:
     """The lattice that all models of a scene share."""
     on_mesh = lattice.springs == "tetrahedra"
     mix = () if on_mesh else (lattice.spacing, lattice.flexion, lattice.body_diagonals)
-    if problem.is_burdened:
-        return _burdened(problem, *mix)
+    if problem.has_further_loads:
+        return _with_further_loads(problem, *mix)
     return _cubic(problem, *mix) if mix else _on_mesh(problem)
 
 
 @lru_cache(maxsize=1)
-def _burdened(problem: Problem, *mix: float) -> Assembly:
+def _with_further_loads(problem: Problem, *mix: float) -> Assembly:
     """The lattice with what acts on it beside its first load, on the mesh without a mix."""
-    return _with_burden(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
+    return _loaded(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
 
 
-def _with_burden(problem: Problem, bare: Assembly) -> Assembly:
+def _loaded(problem: Problem, bare: Assembly) -> Assembly:
     """A lattice with what acts on it beside its first load."""
     surface, times = problem.geometry.surface, problem.observation.times
     points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
@@ -353,7 +353,7 @@ class PreparedLattice:
 
         ValueError where more than one load acts, of which there is no linearised rest to tell.
         """
-        if self.problem.is_burdened:
+        if self.problem.has_further_loads:
             raise ValueError("the lattice at rest is told under one load on a weightless body only")
         nodal = msm.static_displacement(self.assembly, self.springs.material)
         points = self.problem.observation.volume_points
@@ -376,7 +376,9 @@ class PreparedLattice:
         dt = _step(lattice, motion.limit_at_rest)
         if self.problem.rigid_tools:
             seen = self.problem.observation
-            deep = AtDepth(motion, float(seen.times[seen.frames[0]]), partial(_step, lattice))
+            deep = IndentedStepper(
+                motion, float(seen.times[seen.frames[0]]), partial(_step, lattice)
+            )
             steps = deep.take_step, motion.u.copy, dt, motion.u.size, deep.advance, deep.restart
             return Stepper(*steps)
         return Stepper(
@@ -394,7 +396,7 @@ class PreparedLattice:
         mesh, times = Mesh(lattice.nodes, lattice.cells), self.problem.observation.times
         with (
             watch.progress.stage(name) as advance,
-            recorded(watch.keeping, name, mesh, times) as on_sample,
+            record_fields(watch.persistence, name, mesh, times) as on_sample,
         ):
             return self._march(
                 asked_step(self.model.lattice), advance, watch, name, on_sample=on_sample
@@ -412,7 +414,7 @@ class PreparedLattice:
         Of those under more than one load of a given force, which no reference may follow.
         """
         model = self.model
-        if not self.problem.is_burdened or model.graded or model.lattice.springs != "lattice":
+        if not self.problem.has_further_loads or model.graded or model.lattice.springs != "lattice":
             return None, ()
         try:
             coarser = model.with_spacing(COARSER * model.spacing).prepare(self.problem)
@@ -476,7 +478,7 @@ class PreparedLattice:
             integrator=self.model.lattice.integrator,
             linear=self.linear,
             single=self.single,
-            checkpoint=checkpoint(watch.keeping, kept_as),
+            checkpoint=checkpoint(watch.persistence, kept_as),
             on_sample=on_sample,
         )
 

@@ -22,7 +22,7 @@ from study.scene.part import without
 
 if TYPE_CHECKING:
     from fuzzy.liver.stiffness import StiffnessEstimate
-    from study.models.keeping import Keeping
+    from study.models.persistence import Persistence
 
 Floats = NDArray[np.float64]
 Estimates = Mapping[str, "StiffnessEstimate"]
@@ -102,7 +102,7 @@ class Watch:
     """Who is told how far a run is, and what of it is kept on disk meanwhile."""
 
     progress: Progress
-    keeping: Keeping | None = None
+    persistence: Persistence | None = None
 
 
 SILENT = Watch(Silent())

@@ -67,7 +67,7 @@ def sized(
     where = places(problem, wanted.at)
     if wanted.radius is not None:
         return Sized(_assembled(problem, wanted, where, wanted.radius), wanted.radius, None)
-    if problem.is_burdened:
+    if problem.has_further_loads:
         raise ValueError(NO_TOLERANCE)
     whole = _assembled(problem, wanted, where, None)
     probes = [problem.tool_probe, *(problem.probes.index(name) for name in wanted.at)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from study.models import table
 from study.problem.supports import CLAMPED, FOUNDATION
-from study.problem.way import APART, MEASURED
+from study.problem.tool_travel import APART, MEASURED
 from study.results.records import ControlPoint
 from study.scene import Scene, Support
 

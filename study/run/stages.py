@@ -16,16 +16,16 @@ from typing import Any, Generic, TypeVar
 from study.folders import tell
 from study.progress import Progress
 from study.results.records import StageRecord
-from study.stages.flat import flattened, restored
-from study.stages.lanes import Job, Lanes
+from study.stages.job_pool import Job, JobPool
+from study.stages.serialisation import flattened, restored
 from study.stages.store import Entry, Store, shown_size
-from study.sweep.tally import duration
+from study.sweep.status import duration
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Means:
+class RunOptions:
     """What a run may use: a store, read unless `fresh`, and so many processes side by side.
 
     `mesh`: file to keep the tetrahedra in, if they are wanted; `minutes`: most that a model may
@@ -39,7 +39,7 @@ class Means:
     minutes: float | None = None
 
 
-ALONE = Means()
+SERIAL = RunOptions()
 """Nothing is kept, and one stage runs after another."""
 
 
@@ -69,14 +69,14 @@ class _Found:
 class Stages:
     """Stages of one run, on the lanes that it has."""
 
-    def __init__(self, means: Means, lanes: Lanes, progress: Progress) -> None:
-        self.means, self.lanes, self.progress = means, lanes, progress
+    def __init__(self, options: RunOptions, job_pool: JobPool, progress: Progress) -> None:
+        self.options, self.job_pool, self.progress = options, job_pool, progress
         self.found: dict[str, _Found] = {}
 
     def kept(self, stage: Stage[T]) -> T | None:
         """What the store has of a stage, None if nothing, or if it must not be read."""
-        store = self.means.store
-        if store is None or stage.key is None or self.means.fresh or not stage.readable:
+        store = self.options.store
+        if store is None or stage.key is None or self.options.fresh or not stage.readable:
             return None
         entry = store.get(stage.key)
         if entry is None:
@@ -92,22 +92,22 @@ class Stages:
         """The value of a stage, kept or computed here and now."""
         value = self.kept(stage)
         if value is None:
-            self.found[stage.name] = found = _computed(stage, self.means.store, self.progress)
+            self.found[stage.name] = found = _computed(stage, self.options.store, self.progress)
             value = found.value
         return value
 
     def start(self, stage: Stage[T]) -> None:
         """Compute a stage, beside others if there are lanes, and keep it."""
-        store = self.means.store
-        self.lanes.start(Job(stage.name, lambda progress: _computed(stage, store, progress)))
+        store = self.options.store
+        self.job_pool.start(Job(stage.name, lambda progress: _computed(stage, store, progress)))
 
     def beside(self, name: str, work: Callable[[], None]) -> None:
         """Let something be done on a lane that is free, by which what follows takes less time."""
-        self.lanes.start(Job(name, lambda _: work()))
+        self.job_pool.start(Job(name, lambda _: work()))
 
     def results(self) -> dict[str, Any]:
         """Values of all stages by name, once those that were started have ended."""
-        given = self.lanes.results()
+        given = self.job_pool.results()
         self.found |= {name: one for name, one in given.items() if isinstance(one, _Found)}
         return {name: found.value for name, found in self.found.items()}
 
@@ -139,7 +139,7 @@ def _record(name: str, entry: Entry, *, kept: bool) -> StageRecord:
     return StageRecord(name=name, wall_s=entry.wall, measured_at=at, kept=kept)
 
 
-def told(records: Sequence[StageRecord], store: Store) -> str:
+def store_summary(records: Sequence[StageRecord], store: Store) -> str:
     """For a person: which stages were kept from earlier runs, and how large the store is."""
     kept = [one.name for one in records if one.kept]
     seconds = sum(one.wall_s for one in records if one.kept)

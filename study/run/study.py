@@ -39,25 +39,25 @@ from study.results.tables import (
     ToolForceScore,
 )
 from study.run.assumptions import assumptions
-from study.run.posed import Posed
-from study.run.ready import ReadyPoint, ready
+from study.run.preparation import PreparedPointScene, prepare_scene
+from study.run.problem_record import ProblemRecord
 from study.run.requirement import requirement_checks
 from study.run.score_errors import error_rows, rating_rows
-from study.run.stages import ALONE, Means, Stage, Stages
+from study.run.stages import SERIAL, RunOptions, Stage, Stages
 from study.run.suiting import suited
 from study.run.tables import band_rows, certified_rows, curve_rows, difference_rows, similarity_rows
 from study.run.tool_forces import force_rows, force_scores, largest_forces
+from study.run.visual_output import kept
 from study.run.warnings import warnings
-from study.run.watched import kept
 from study.scene import Scene
 from study.scene.file import validate, write_scene
 from study.scene.part import without
 from study.stages.fingerprint import key
-from study.stages.lanes import lanes
+from study.stages.job_pool import job_pool
 from study.stages.threads import threads
 
 if TYPE_CHECKING:
-    from study.run.moving import Moving
+    from study.run.organ_stages import OrganStages
 
 SUITED, FUZZY, SIMILARITY = "scene suited to the organ", "fuzzy systems", "similarity"
 NO_FUZZY = (
@@ -82,15 +82,15 @@ class Compared:
     budgets: tuple[ErrorBudget, ...] = ()
 
 
-def run_study(scene: Scene, watch: Watch = SILENT, means: Means = ALONE) -> Results:
+def run_study(scene: Scene, watch: Watch = SILENT, options: RunOptions = SERIAL) -> Results:
     """Run all that the scene names, or take it from the store, and gather the results.
 
-    Raises ValueError, before anything is computed, for whatever `study.run.ready` refuses.
+    Raises ValueError, before anything is computed, for whatever `study.run.preparation` refuses.
     """
     started = time.perf_counter()
-    workers = 1 if scene.is_point else means.workers  # a point is moved before a process is there
-    with lanes(workers, watch.progress) as side_by_side, threads(workers):
-        stages = Stages(means, side_by_side, watch.progress)
+    workers = 1 if scene.is_point else options.workers  # a point is moved before a process is there
+    with job_pool(workers, watch.progress) as side_by_side, threads(workers):
+        stages = Stages(options, side_by_side, watch.progress)
         scene = _suited(scene, stages)
         # Files as they are now, not after the run.
         files = scene.organ.mesh, scene.fuzzy.rule_base, tissue_sha256(scene)
@@ -136,59 +136,61 @@ def _fuzzy(seen: Scene, progress: Progress) -> FuzzySide:
 
 
 def _on_point(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -> Compared:
-    given = ready(scene)
-    assert isinstance(given, ReadyPoint)  # noqa: S101 - of such a scene
+    given = prepare_scene(scene)
+    assert isinstance(given, PreparedPointScene)  # noqa: S101 - of such a scene
     _start_fuzzy(scene, stages, made_by.rule_base_sha256)
     problem = given.problem
     runs = {model.name: model.run(problem, watch) for model in given.models}
     point = ControlPoint(mass_kg=problem.mass, rest_length_m=problem.rest_length)
-    keeping = watch.keeping
-    wanted = keeping is not None and keeping.fields is not None
+    persistence = watch.persistence
+    wanted = persistence is not None and persistence.fields is not None
     notes = ("No fields are kept: a single point has none.",) if wanted else ()
     return Compared(problem.response, runs, notes, control_point=point)
 
 
 def _on_organ(scene: Scene, stages: Stages, watch: Watch, made_by: Provenance) -> Compared:
-    from study.run.moving import Moving  # imports what moves an organ, which a point has no need of
+    from study.run.organ_stages import (
+        OrganStages,  # imports what moves an organ, which a point has no need of
+    )
 
     tuned = estimates(scene) if is_tuned(scene) else {}
     _start_fuzzy(scene, stages, made_by.rule_base_sha256)
-    moving = Moving(scene, tuned, organ_sha256(scene), stages, watch)
-    posed = moving.start()
-    found = moving.motions(posed)
-    if stages.means.mesh is not None:
-        _save_mesh(moving, posed, stages.means.mesh)
+    organ_stages = OrganStages(scene, tuned, organ_sha256(scene), stages, watch)
+    problem_record = organ_stages.start()
+    found = organ_stages.motions(problem_record)
+    if stages.options.mesh is not None:
+        _save_mesh(organ_stages, problem_record, stages.options.mesh)
     return Compared(
-        posed.response,
+        problem_record.response,
         found.runs,
-        (*posed.notes, *found.notes),
-        _fields(posed, found.runs),
-        posed.dimensionless,
+        (*problem_record.notes, *found.notes),
+        _fields(problem_record, found.runs),
+        problem_record.dimensionless,
         found.limits,
         budgets=found.budgets,
     )
 
 
-def _save_mesh(moving: Moving, posed: Posed, path: Path) -> None:
+def _save_mesh(organ_stages: OrganStages, problem_record: ProblemRecord, path: Path) -> None:
     """Write the tetrahedra that the run was on. ValueError where they cannot be made again."""
-    if moving.posing.mesh != posed.mesh:
+    if organ_stages.builder.mesh != problem_record.mesh:
         raise ValueError(
             "--save-mesh: the mesher made another mesh than that of the results kept in the store; "
             "add --fresh to compute on the new one"
         )
-    save(moving.posing.problem.geometry.mesh, path)
+    save(organ_stages.builder.problem.geometry.mesh, path)
 
 
-def _fields(posed: Posed, runs: dict[str, ModelRun]) -> Arrays:
+def _fields(problem_record: ProblemRecord, runs: dict[str, ModelRun]) -> Arrays:
     """Surface, tool, its way, probes, inclusions, and what is kept of each model to draw."""
-    seen = posed.watched
+    seen = problem_record.visual_output
     found = {
-        "points": posed.points,
-        "triangles": posed.triangles,
-        "tool": posed.tool,
-        "probes": posed.probes,
-        **({"inclusions": posed.inclusions} if len(posed.inclusions) else {}),
-        **({"ways": posed.ways} if len(posed.ways) else {}),
+        "points": problem_record.points,
+        "triangles": problem_record.triangles,
+        "tool": problem_record.tool,
+        "probes": problem_record.probes,
+        **({"inclusions": problem_record.inclusions} if len(problem_record.inclusions) else {}),
+        **({"ways": problem_record.travel_paths} if len(problem_record.travel_paths) else {}),
         "held": seen.held,
         "loaded": seen.loaded,
         "cut": seen.points,

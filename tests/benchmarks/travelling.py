@@ -42,7 +42,7 @@ from study.models.model import Prepared
 from study.models.remainder import PreparedRemainder
 from study.models.table import model
 from study.problem.problem import Problem
-from study.problem.way import DEGREE, Turn
+from study.problem.tool_travel import DEGREE, StationFactor
 from study.progress import Silent
 from study.scene import LoadHistory, Scene
 from study.scene.place import depths
@@ -183,27 +183,29 @@ def watched(given: Scene) -> Problem:
     return replace(problem, observation=seen, probes=names)
 
 
-def turns(problem: Problem) -> list[Turn]:
+def station_loads(problem: Problem) -> list[StationFactor]:
     """Factors of its stations."""
     found = [problem.factor, *(one.factor for one in problem.loads)]
-    assert all(isinstance(one, Turn) for one in found)
+    assert all(isinstance(one, StationFactor) for one in found)
     return found  # type: ignore[return-value]
 
 
 def under(problem: Problem, motion: Floats) -> Floats:
     """Displacement [m] (samples, 3) under the tool, by that (samples, stations, 3) at stations."""
-    shares = np.column_stack([one.share(problem.observation.times) for one in turns(problem)])
+    shares = np.column_stack(
+        [one.share(problem.observation.times) for one in station_loads(problem)]
+    )
     return np.asarray(np.einsum("tk,tkd->td", shares, motion))
 
 
 def times_as_hard(problem: Problem, force: float) -> Problem:
     """The problem with so many times the force."""
-    (first, *rest) = [_harder(one, force) for one in turns(problem)]
+    (first, *rest) = [_harder(one, force) for one in station_loads(problem)]
     loads = tuple(replace(one, factor=turn) for one, turn in zip(problem.loads, rest, strict=True))
     return replace(problem, factor=first, loads=loads)
 
 
-def _harder(turn: Turn, force: float) -> Turn:
+def _harder(turn: StationFactor, force: float) -> StationFactor:
     def history(times: Floats) -> Floats:
         return force * turn.history(times)
 

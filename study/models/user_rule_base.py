@@ -36,7 +36,7 @@ def system_of(scene: Scene) -> FuzzySystem:
         raise ValueError(f"fuzzy.rule_base: {error}") from error
 
 
-def own_estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
+def user_estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
     """Estimate by each kind of system that the scene names.
 
     ValueError naming the key: for readings that are not those of the system's inputs, a kind that

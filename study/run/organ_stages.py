@@ -20,11 +20,11 @@ from study.run.limits import (
     lattice_limits,
     reference_at_rest,
 )
-from study.run.posed import Posed, Posing
-from study.run.ready import set_up
+from study.run.preparation import prepare_models
+from study.run.problem_record import ProblemBuilder, ProblemRecord
 from study.run.stages import Stage, Stages
 from study.run.unfinished import moved, within
-from study.run.watched import thinned
+from study.run.visual_output import with_end_fields_only
 from study.scene import Scene
 from study.similarity.batch import compile_measures
 from study.stages.fingerprint import key
@@ -41,7 +41,7 @@ WITH_LIMITS = "fem"
 
 
 @dataclass(frozen=True)
-class Moved:
+class ModelResult:
     """The run of a model; of a solid also at rest, if it is asked for, or why part of it is not."""
 
     run: ModelRun
@@ -49,13 +49,13 @@ class Moved:
     why: str = ""
 
 
-def _finished(found: Moved) -> bool:
+def _finished(found: ModelResult) -> bool:
     """Whether there is a motion, if one that diverged."""
     return found.run.record.status != "not finished"
 
 
 @dataclass(frozen=True)
-class Rested:
+class LatticeRestResult:
     """The lattice at rest, or why it is not."""
 
     found: LatticeAtRest | None
@@ -63,7 +63,7 @@ class Rested:
 
 
 @dataclass(frozen=True)
-class Mended:
+class BudgetResult:
     """A lattice mended toward a reference, or why it is not."""
 
     found: Mending | None
@@ -88,7 +88,7 @@ class Motions:
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
+class OrganStages:
     """A scene with an organ, to be moved by stages.
 
     `organ`: SHA-256 of the file that it names, if any.
@@ -102,9 +102,9 @@ class Moving:
     prepared: dict[str, Prepared] = field(default_factory=dict)
 
     @cached_property
-    def posing(self) -> Posing:
+    def builder(self) -> ProblemBuilder:
         """The problem, built when it is needed."""
-        return Posing(self.scene, self.watch.progress)
+        return ProblemBuilder(self.scene, self.watch.progress)
 
     @cached_property
     def models(self) -> dict[str, Model]:
@@ -128,30 +128,30 @@ class Moving:
         """Whether the limits of the lattice are told: of tuned lattices beside finite elements."""
         return bool(self.estimates) and WITH_LIMITS in self.models
 
-    def start(self) -> Posed:
+    def start(self) -> ProblemRecord:
         """Take what is kept, and start what is not; the problem as its results tell it.
 
         ValueError for whatever a run would refuse, before it is waited for.
         """
-        posed = self.stages.now(self.posed())
-        missing = self._missing(posed.mesh)
-        if missing and posed.mesh != self.posing.mesh:  # made anew, and otherwise
-            posed = self.posing.posed()
-            missing = self._missing(posed.mesh)
+        problem_record = self.stages.now(self.problem_record())
+        missing = self._missing(problem_record.mesh)
+        if missing and problem_record.mesh != self.builder.mesh:  # made anew, and otherwise
+            problem_record = self.builder.problem_record()
+            missing = self._missing(problem_record.mesh)
         for stage, needs in missing:
             for name in needs:
                 self._prepare(name)
             self.stages.start(stage)
         if missing:
             self.stages.beside("compiled measures", compile_measures)
-        return posed
+        return problem_record
 
-    def motions(self, posed: Posed) -> Motions:
+    def motions(self, problem_record: ProblemRecord) -> Motions:
         """What all stages gave, once they have ended."""
         given = self.stages.results()
-        ran: dict[str, Moved] = {name: given[name] for name in self.models}
-        limits, notes = self._limits(given, posed)
-        ways: dict[str, Mended] = {
+        ran: dict[str, ModelResult] = {name: given[name] for name in self.models}
+        limits, notes = self._limits(given, problem_record)
+        ways: dict[str, BudgetResult] = {
             name: given[BUDGET.format(name)]
             for name in references(self.scene)
             if BUDGET.format(name) in given
@@ -163,33 +163,33 @@ class Moving:
             {name: way.found for name, way in ways.items() if way.found is not None},
             {name: one.run for name, one in ran.items()},
             {name: one.rest.field for name, one in ran.items() if one.rest is not None},
-            posed.response.volumes,
+            problem_record.response.volumes,
         )
         runs = {name: one.run for name, one in ran.items()}
         return Motions(runs, limits, budgets, tuple(dict.fromkeys(notes)))
 
     def _limits(
-        self, given: dict[str, Any], posed: Posed
+        self, given: dict[str, Any], problem_record: ProblemRecord
     ) -> tuple[LatticeLimits | None, list[str]]:
         """The limits of the lattice, or a note on why they are not known."""
         if AT_REST not in given:
             return None, []
-        lattice: Rested = given[AT_REST]
-        reference: Moved = given[WITH_LIMITS]
+        lattice: LatticeRestResult = given[AT_REST]
+        reference: ModelResult = given[WITH_LIMITS]
         why = lattice.why or reference.why
         if lattice.found is None or reference.rest is None or why:
             return None, [f"What the lattice cannot do at rest is not known: {why}."]
-        nu, volumes = self.scene.tissue.poisson_ratio, posed.response.volumes
+        nu, volumes = self.scene.tissue.poisson_ratio, problem_record.response.volumes
         return lattice_limits(lattice.found, reference.rest, nu, volumes), []
 
     # --- the stages --------------------------------------------------------------------------
 
-    def posed(self) -> Stage[Posed]:
+    def problem_record(self) -> Stage[ProblemRecord]:
         """The problem as its results tell it."""
         lattice = self.scene.lattice
-        given = (self.posing.part, self.organ, lattice.springs, lattice.spacing)
+        given = (self.builder.part, self.organ, lattice.springs, lattice.spacing)
         found = key(ORGAN, *given, modules=(__name__,))
-        return Stage(ORGAN, Posed, found, lambda _: self.posing.posed())
+        return Stage(ORGAN, ProblemRecord, found, lambda _: self.builder.problem_record())
 
     def _missing(self, mesh: str) -> list[Wanted]:
         """What is not kept, the dearest first."""
@@ -202,17 +202,19 @@ class Moving:
             return
         if self.has_limits:
             seen = kind("tissue").seen(self.scene)
-            yield Wanted(self._stage(AT_REST, Rested, partial(self._rest, seen), mesh, seen))
+            yield Wanted(
+                self._stage(AT_REST, LatticeRestResult, partial(self._rest, seen), mesh, seen)
+            )
         for name in references(self.scene):
             yield self._of_budget(self.lattice, name, mesh)
 
     def _of_model(self, name: str, mesh: str) -> Wanted:
-        model, keeping = self.models[name], self.watch.keeping
+        model, persistence = self.models[name], self.watch.persistence
         at_rest, at_quarter = self._asked_at_rest(name)
         work = partial(self._move, name, at_rest, at_quarter)
-        stage = self._stage(name, Moved, work, mesh, model, at_rest, at_quarter)
+        stage = self._stage(name, ModelResult, work, mesh, model, at_rest, at_quarter)
         # Of a stage that is kept there are no fields of all nodes.
-        readable = keeping is None or keeping.fields is None
+        readable = persistence is None or persistence.fields is None
         # What was not to be had may be had by another run, on a machine that is less busy.
         return Wanted(replace(stage, readable=readable, lasting=_finished), (name,))
 
@@ -222,12 +224,12 @@ class Moving:
         assert isinstance(mended, LatticeModel)  # noqa: S101 - as it was chosen
         toward = reference if isinstance(reference, LatticeModel) else None
         work = partial(self._mend, lattice, name)
-        stage = self._stage(BUDGET.format(name), Mended, work, mesh, mended.scene, toward)
+        stage = self._stage(BUDGET.format(name), BudgetResult, work, mesh, mended.scene, toward)
         return Wanted(stage, (lattice, name))
 
     def _stage(self, name: str, of: type, work: Work, mesh: str, *given: object) -> Stage[Any]:
         """A stage on a mesh of the problem, and of what else it is given."""
-        found = key(name, of, self.posing.part, self.organ, mesh, *given, modules=(__name__,))
+        found = key(name, of, self.builder.part, self.organ, mesh, *given, modules=(__name__,))
         return Stage(name, of, found, work)
 
     def _asked_at_rest(self, name: str) -> tuple[bool, bool]:
@@ -242,35 +244,35 @@ class Moving:
         """A model set up once. ValueError for one that would not run."""
         if name not in self.prepared:
             one = [self.models[name]]
-            self.prepared.update(set_up(one, self.posing.problem, self.watch.progress))
+            self.prepared.update(prepare_models(one, self.builder.problem, self.watch.progress))
         return self.prepared[name]
 
-    def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> Moved:
+    def _move(self, name: str, at_rest: bool, at_quarter: bool, progress: Progress) -> ModelResult:
         prepared, watch = self._prepare(name), self.watch
-        watch = replace(watch, progress=within(progress, self.stages.means.minutes))
-        run = thinned(moved(self.models[name], prepared, self.posing.problem, watch))
+        watch = replace(watch, progress=within(progress, self.stages.options.minutes))
+        run = with_end_fields_only(moved(self.models[name], prepared, self.builder.problem, watch))
         if run.record.status == "not finished":
-            return Moved(run, None, f"{name} is not finished")
+            return ModelResult(run, None, f"{name} is not finished")
         if not at_rest:
-            return Moved(run)
+            return ModelResult(run)
         with progress.stage(f"{name}: at rest"):
             try:
-                return Moved(run, reference_at_rest(prepared, at_quarter=at_quarter))
+                return ModelResult(run, reference_at_rest(prepared, at_quarter=at_quarter))
             except ValueError as error:
-                return Moved(run, reference_at_rest(prepared, at_quarter=False), str(error))
+                return ModelResult(run, reference_at_rest(prepared, at_quarter=False), str(error))
 
-    def _rest(self, seen: Scene, progress: Progress) -> Rested:
+    def _rest(self, seen: Scene, progress: Progress) -> LatticeRestResult:
         with progress.stage(AT_REST):
             try:
-                return Rested(lattice_at_rest(seen, self.posing.problem))
+                return LatticeRestResult(lattice_at_rest(seen, self.builder.problem))
             except ValueError as error:  # of a lattice beside those of the scene
-                return Rested(None, str(error))
+                return LatticeRestResult(None, str(error))
 
-    def _mend(self, lattice: str, reference: str, progress: Progress) -> Mended:
+    def _mend(self, lattice: str, reference: str, progress: Progress) -> BudgetResult:
         mended = self._prepare(lattice)
         assert isinstance(mended, PreparedLattice)  # noqa: S101 - as its model is a lattice
         with progress.stage(BUDGET.format(reference)):
             try:
-                return Mended(mending(mended, self._prepare(reference)))
+                return BudgetResult(mending(mended, self._prepare(reference)))
             except ValueError as error:  # of a lattice that is mended
-                return Mended(None, str(error))
+                return BudgetResult(None, str(error))

@@ -26,7 +26,7 @@ REPORTS = {"report": manifest.REPORT, "page": manifest.PAGE}
 
 
 @dataclass(frozen=True)
-class Left:
+class UpToDateRun:
     """What a run left in a folder: when [UTC], in short, and which reports of the run it has."""
 
     at: str
@@ -45,7 +45,7 @@ def run_key(scene: Scene, folder: Path, *, fields: bool, mesh: bool) -> str:
     return digest(["run", *given, everything("reports"), machine()])
 
 
-def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
+def up_to_date_run(store: Store, key: str, folder: Path, scene: Scene) -> UpToDateRun | None:
     """What the folder holds of the run of a key, None if it is not what that wrote."""
     found = store.get(key)
     if found is None or found.value["sums"] != _sha256(folder / manifest.NAME):
@@ -58,10 +58,10 @@ def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
         (digest := _sha256(folder / name)) is not None and found.value.get(kind) == digest
         for kind, name in REPORTS.items()
     )
-    return Left(at, results, report, page)
+    return UpToDateRun(at, results, report, page)
 
 
-def note(store: Store, key: str, folder: Path) -> None:
+def record_run(store: Store, key: str, folder: Path) -> None:
     """Note what a run has left in a folder."""
     reports = {kind: _sha256(folder / name) for kind, name in REPORTS.items()}
     store.put(key, {"sums": _sha256(folder / manifest.NAME), **reports}, {}, wall=0.0)

@@ -8,7 +8,7 @@ from msm.stepper import LatticeStepper, State
 from msm.timestep import LOOK
 
 
-class AtDepth:
+class IndentedStepper:
     """Steps of a lattice from rest until `restart`, which puts it where its tools are deepest.
 
     `at` [s]: when they are; `step`: the step [s] for a critical one [s]. What is touched is stopped

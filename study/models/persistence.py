@@ -18,7 +18,7 @@ OnSample = Callable[[int, Floats, Floats], None]
 
 
 @dataclass(frozen=True)
-class Keeping:
+class Persistence:
     """Folder of states, whether to go on from them, folder for fields or None to keep none."""
 
     state: Path
@@ -26,20 +26,22 @@ class Keeping:
     fields: Path | None = None
 
 
-def checkpoint(keeping: Keeping | None, name: str) -> Checkpoint | None:
+def checkpoint(persistence: Persistence | None, name: str) -> Checkpoint | None:
     """Where the run of that name keeps its state, if anything is kept."""
-    if keeping is None:
+    if persistence is None:
         return None
-    return Checkpoint(keeping.state / f"{name}.npz", resume=keeping.resume)
+    return Checkpoint(persistence.state / f"{name}.npz", resume=persistence.resume)
 
 
 @contextmanager
-def recorded(keeping: Keeping | None, name: str, mesh: Mesh, times: Floats) -> Iterator[OnSample]:
+def record_fields(
+    persistence: Persistence | None, name: str, mesh: Mesh, times: Floats
+) -> Iterator[OnSample]:
     """What a run tells its samples, so that its fields end up in NAME.vtkhdf if they are wanted."""
-    if keeping is None or keeping.fields is None:
+    if persistence is None or persistence.fields is None:
         yield lambda *_: None
         return
-    raw = keeping.state / f"{name}.frames"
-    path = keeping.fields / f"{name}.vtkhdf"
-    with recording(path, mesh, times, raw, resume=keeping.resume) as frames:
+    raw = persistence.state / f"{name}.frames"
+    path = persistence.fields / f"{name}.vtkhdf"
+    with recording(path, mesh, times, raw, resume=persistence.resume) as frames:
         yield frames.write

@@ -46,7 +46,7 @@ class Frame:
         motion.time += motion.step * self.count
 
 
-class Together:
+class CoupledStepper:
     """A nonlinear lattice, itself linear, and linear elements, at rest and then by the same steps.
 
     `lattice` is the first, with its `step` [s]. The displacement of the mesh's vertices is made

@@ -23,7 +23,7 @@ QUIET = Silent()
 
 
 @runtime_checkable
-class Refusing(Protocol):
+class Refuses(Protocol):
     """A prepared model that refuses more than `prepare` does, such as too many steps."""
 
     def refuse(self) -> None:
@@ -31,7 +31,7 @@ class Refusing(Protocol):
 
 
 @runtime_checkable
-class RefusingPoint(Protocol):
+class RefusesPoint(Protocol):
     """A model of a single point that refuses some of them."""
 
     def refuse(self, problem: PointProblem) -> None:
@@ -39,7 +39,7 @@ class RefusingPoint(Protocol):
 
 
 @dataclass(frozen=True)
-class Ready:
+class PreparedScene:
     """The problem of a scene with an organ, and its models by name, set up and not refused."""
 
     problem: Problem
@@ -47,26 +47,26 @@ class Ready:
 
 
 @dataclass(frozen=True)
-class ReadyPoint:
+class PreparedPointScene:
     """The problem of a scene that is a single point, and its models."""
 
     problem: PointProblem
     models: tuple[PointModel, ...]
 
 
-def ready(scene: Scene, progress: Progress = QUIET) -> Ready | ReadyPoint:
+def prepare_scene(scene: Scene, progress: Progress = QUIET) -> PreparedScene | PreparedPointScene:
     """Everything that a scene names, set up. ValueError for whatever a run of it would refuse."""
     found = estimates(scene) if is_tuned(scene) else {}
     return _point(scene, found) if scene.is_point else _organ(scene, found, progress)
 
 
-def _organ(scene: Scene, found: Estimates, progress: Progress) -> Ready:
+def _organ(scene: Scene, found: Estimates, progress: Progress) -> PreparedScene:
     with progress.stage("organ"):
         problem = problem_of(scene)
-    return Ready(problem, set_up(models_of(scene, found), problem, progress))
+    return PreparedScene(problem, prepare_models(models_of(scene, found), problem, progress))
 
 
-def set_up(
+def prepare_models(
     models: Iterable[Model], problem: Problem, progress: Progress = QUIET
 ) -> dict[str, Prepared]:
     """Models by name on a problem, all before any runs. ValueError for one that would not run."""
@@ -74,15 +74,15 @@ def set_up(
     for model in models:
         with progress.stage(f"{model.name}: set up"):
             found[model.name] = prepared = model.prepare(problem)
-            if isinstance(prepared, Refusing):
+            if isinstance(prepared, Refuses):
                 prepared.refuse()
     return found
 
 
-def _point(scene: Scene, found: Estimates) -> ReadyPoint:
+def _point(scene: Scene, found: Estimates) -> PreparedPointScene:
     problem = point_problem_of(scene)
     models = tuple(point_models_of(scene, found))
     for model in models:
-        if isinstance(model, RefusingPoint):
+        if isinstance(model, RefusesPoint):
             model.refuse(problem)
-    return ReadyPoint(problem, models)
+    return PreparedPointScene(problem, models)

@@ -22,7 +22,7 @@ STRAIGHT = 0.05
 
 
 @dataclass(frozen=True)
-class Watched:
+class VisualOutput:
     """Where a run is looked at for its pictures.
 
     `samples`: those at which the surface is kept, the peak first and the last one last. Of the cut
@@ -37,12 +37,12 @@ class Watched:
     loaded: Floats
 
 
-def watched(problem: Problem) -> Watched:
+def visual_output(problem: Problem) -> VisualOutput:
     """What is looked at of a problem as a scene poses it."""
     (peak, last), tool = problem.observation.frames, problem.tool
     between = set(_frames(_loads(problem), {0, peak, last})) - {peak, last}
     points, triangles = cut(problem.geometry.mesh, tool.centre, _across(problem))
-    return Watched((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
+    return VisualOutput((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
 
 
 def _loads(problem: Problem) -> Floats:
@@ -67,7 +67,7 @@ def _frames(loads: Floats, given: set[int]) -> list[int]:
     return found
 
 
-def to_watch(problem: Problem, found: Watched) -> Problem:
+def with_visual_output(problem: Problem, found: VisualOutput) -> Problem:
     """The problem whose models keep all that is looked at, see `kept`."""
     seen = problem.observation
     surface = np.vstack([seen.surface_points, found.points])
@@ -99,7 +99,7 @@ def _acted_on(problem: Problem) -> tuple[Floats, Floats]:
     return held, loaded
 
 
-def thinned(run: ModelRun) -> ModelRun:
+def with_end_fields_only(run: ModelRun) -> ModelRun:
     """The run whose fields inside are kept at the peak and at the end alone: they are large."""
     bounds = None if run.bounds is None else (_ends(run.bounds[0]), _ends(run.bounds[1]))
     halved = None if run.halved is None else _ends(run.halved)
@@ -110,7 +110,7 @@ def _ends(one: Trajectory) -> Trajectory:
     return replace(one, volume_field=one.volume_field[[0, -1]])
 
 
-def kept(found: Watched, name: str, field: Floats) -> Arrays:
+def kept(found: VisualOutput, name: str, field: Floats) -> Arrays:
     """Arrays of a model's field (frames, s + c, 3): on the surface, in the cut, and as a film.
 
     On surface and cut [m] at the peak and at the end; the film in single precision at all samples,
