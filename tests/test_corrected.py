@@ -11,7 +11,7 @@ from msm import model as msm
 from msm.model import Automatic, Counts
 from study.models import corrected
 from study.models.coupled_stepper import Frame
-from study.models.lattice import asked_step
+from study.models.lattice import requested_step
 from study.models.model import SILENT, Watch
 from study.models.persistence import Persistence
 from study.models.remainder import FINER, ORDER, PreparedRemainder, remainder_errors
@@ -180,7 +180,7 @@ def test_several_loads_are_followed_as_a_fine_lattice_follows_them(two):
     elements = two.fine.solved_on(None, Silent()).found.trajectory.displacement
     finer = beside(0.3, 0.3)
     fine = finer.model.coarse.varied(spacing=0.005).prepare(finer.problem)
-    step = asked_step(fine.model.lattice)
+    step = requested_step(fine.model.lattice)
     truth = elements + PreparedRemainder(fine, 20).run(step).trajectory.displacement
     assert apart(elements, truth) > 0.02
     assert apart(found, truth) < 0.5 * apart(elements, truth)

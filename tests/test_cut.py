@@ -11,7 +11,12 @@ from scipy.spatial import ConvexHull
 from reports.cut_figure import cut_figure, section
 from study.mesh.cut import cut
 from study.organ.block import block_of_cells
-from study.run.visual_output import kept, visual_output, with_end_fields_only, with_visual_output
+from study.run.visual_output import (
+    visual_arrays,
+    visual_output,
+    with_end_fields_only,
+    with_visual_output,
+)
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.report_samples import results_of
@@ -91,7 +96,7 @@ def test_the_peak_comes_first_the_end_last_and_the_film_in_order(problem):
     assert asked.frames == seen.samples
     count = len(asked.surface_points)
     field = np.arange(len(seen.samples))[:, None, None] * np.ones((1, count, 3))
-    found = kept(seen, "toy", field)
+    found = visual_arrays(seen, "toy", field)
     assert found["toy"][:, 0, 0].tolist() == [0.0, 8.0]
     assert found["cut.toy"].shape == (2, len(seen.points), 3)
     in_order = np.array(seen.samples)[found["film.toy"][:, 0, 0].astype(int)]

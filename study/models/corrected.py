@@ -33,7 +33,7 @@ from study.models.finite_elements import (
     PreparedElements,
     reference_of,
 )
-from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, asked_step
+from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, requested_step
 from study.models.lattice_assumptions import springs
 from study.models.mesh_error import MeshSolution
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
@@ -130,7 +130,7 @@ class PreparedCorrected:
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion by the lattice's own steps, or by equal ones of at most `longest` [s]."""
         solved = self._on_level
-        step: Step = asked_step(self.model.coarse.lattice)
+        step: Step = requested_step(self.model.coarse.lattice)
         if longest is not None:
             interval = float(self.problem.observation.times[1])
             step = Fixed(interval / whole_steps(interval, longest))
@@ -165,7 +165,9 @@ class PreparedCorrected:
         solved = self.best = self.fine.best
         prepared, shape = self._remainder(solved), self._deformed(solved)
         with watch.progress.stage(self.model.name) as advance:
-            found = prepared.run(asked_step(self.model.coarse.lattice), advance, keep_nodes=True)
+            found = prepared.run(
+                requested_step(self.model.coarse.lattice), advance, keep_nodes=True
+            )
         self._keep_fields(found, shape, watch)
         record = replace(
             self._record(found, solved, shape),
@@ -211,7 +213,7 @@ class PreparedCorrected:
             other = coarse.varied(spacing=spacing).prepare(self.problem)
             remainder = PreparedRemainder(other, found.vectors)
             with progress.stage(f"{self.model.name}: {1e3 * spacing:.3g} mm") as advance:
-                compared = remainder.run(asked_step(other.model.lattice), advance).trajectory
+                compared = remainder.run(requested_step(other.model.lattice), advance).trajectory
         except ValueError as error:  # of a lattice that is too large
             return str(error)
         lost = f"its lattice of {1e3 * spacing:.3g} mm diverged"
@@ -317,5 +319,7 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     any_load=False,
-    able=frozenset({"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}),
+    supported_features=frozenset(
+        {"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}
+    ),
 )

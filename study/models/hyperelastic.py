@@ -21,7 +21,12 @@ from fem_reference.observation import at_points, evaluation
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors, tool_force_errors
-from study.models.finite_elements import ABLE, FRAME_RATE, FiniteElements, PreparedElements
+from study.models.finite_elements import (
+    FRAME_RATE,
+    SUPPORTED_FEATURES,
+    FiniteElements,
+    PreparedElements,
+)
 from study.models.in_contact import contact_record, rest_in_contact
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
@@ -355,4 +360,6 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)
+KIND = ModelKind(
+    models=models, assumptions=assumptions, is_reference=True, supported_features=SUPPORTED_FEATURES
+)

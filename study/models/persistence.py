@@ -1,4 +1,4 @@
-"""What is kept on disk of the runs while they run: states to go on from, fields."""
+"""What runs write to disk while they run: states to resume from, and nodal fields."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ OnSample = Callable[[int, Floats, Floats], None]
 
 @dataclass(frozen=True)
 class Persistence:
-    """Folder of states, whether to go on from them, folder for fields or None to keep none."""
+    """Where runs write, and whether they resume.
+
+    `state`: folder of the states; `resume`: whether to continue from them; `fields`: folder of the
+    nodal fields, None to write none.
+    """
 
     state: Path
     resume: bool = False
@@ -27,7 +31,7 @@ class Persistence:
 
 
 def checkpoint(persistence: Persistence | None, name: str) -> Checkpoint | None:
-    """Where the run of that name keeps its state, if anything is kept."""
+    """Where the run of a name keeps its state; None if nothing is written."""
     if persistence is None:
         return None
     return Checkpoint(persistence.state / f"{name}.npz", resume=persistence.resume)
@@ -37,7 +41,7 @@ def checkpoint(persistence: Persistence | None, name: str) -> Checkpoint | None:
 def record_fields(
     persistence: Persistence | None, name: str, mesh: Mesh, times: Floats
 ) -> Iterator[OnSample]:
-    """What a run tells its samples, so that its fields end up in NAME.vtkhdf if they are wanted."""
+    """A function that records each sample; the fields are written to NAME.vtkhdf if wanted."""
     if persistence is None or persistence.fields is None:
         yield lambda *_: None
         return

@@ -1,4 +1,4 @@
-"""A scene and its problem: as plain arguments of a task on another process, and as objects."""
+"""A scene and its problem: as plain arguments of a task in another process, and as objects."""
 
 from __future__ import annotations
 

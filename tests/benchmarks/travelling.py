@@ -37,7 +37,7 @@ from msm import model as msm
 from msm.model import Counts, Run
 from study.models.corrected import CorrectedLattice
 from study.models.deformed import superposed
-from study.models.lattice import PreparedLattice, asked_step
+from study.models.lattice import PreparedLattice, requested_step
 from study.models.model import Prepared
 from study.models.remainder import PreparedRemainder
 from study.models.table import model
@@ -268,7 +268,7 @@ def by_vectors(one: PreparedLattice, vectors: Floats) -> Parts:
     """With its linear part in vectors, as a corrected lattice has it."""
     prepared = PreparedRemainder(one, vectors.shape[1])
     prepared.__dict__["vectors"] = vectors  # whatever the force, the same
-    found, linear = prepared.run(asked_step(one.model.lattice)), prepared.linear()
+    found, linear = prepared.run(requested_step(one.model.lattice)), prepared.linear()
     weights, _ = one.assembly.lattice.interpolation(one.problem.observation.probes)
     loads = np.vstack([linear.load, linear.others])
     rests = [weights @ linear.displacement(load / linear.squares) for load in loads]
@@ -278,7 +278,7 @@ def by_vectors(one: PreparedLattice, vectors: Floats) -> Parts:
 def by_steps(one: PreparedLattice) -> Parts:
     """With its linear part stepped."""
     given = (one.assembly, one.springs.material, one.problem.factor, one.problem.observation)
-    whole = msm.run(*given, asked_step(one.model.lattice))
+    whole = msm.run(*given, requested_step(one.model.lattice))
     linear = msm.run(*given, Counts(whole.substeps), linear=True)
     added = whole.trajectory.displacement - linear.trajectory.displacement
     return Parts(whole, added, np.zeros(0))

@@ -79,7 +79,7 @@ def _free(scene: Scene) -> Scene:
 
 def tried(scene: Scene) -> list[str]:
     """Kinds of models that are tried on a scene."""
-    others = (n for n in scene.models if n != "fem" and not kind(n).of_patient)
+    others = (n for n in scene.models if n != "fem" and not kind(n).patient_specific)
     return list(dict.fromkeys(("tissue", *others)))
 
 
