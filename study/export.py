@@ -32,7 +32,7 @@ from study.organ.geometry import Level
 from study.problem.contact import Load
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
-from study.problem.way import Turn
+from study.problem.tool_travel import StationFactor
 from study.progress import Progress
 from study.results import folder as results
 from study.run.suiting import read_suited
@@ -384,7 +384,7 @@ def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) ->
 
 def _of_load(load: Load) -> str:
     """Whose it is."""
-    travels = isinstance(load.factor, Turn)
+    travels = isinstance(load.factor, StationFactor)
     return f"of {load.tool.name}" + (" at a station of its path" if travels else "")
 
 

@@ -10,12 +10,12 @@ from fem_reference.subspace import Subspace, SubspaceMotion
 from msm import model as msm
 from msm.model import Automatic, Counts
 from study.models import corrected
-from study.models.keeping import Keeping
-from study.models.lattice import asked_step
+from study.models.coupled_stepper import Frame
+from study.models.lattice import requested_step
 from study.models.model import SILENT, Watch
+from study.models.persistence import Persistence
 from study.models.remainder import FINER, ORDER, PreparedRemainder, remainder_errors
 from study.models.table import kind, model
-from study.models.together import Frame
 from study.problem.contact import Load
 from study.problem.damping import RayleighDamping
 from study.problem.trajectory import Trajectory
@@ -23,7 +23,7 @@ from study.progress import Silent
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
-from study.tradeoff.lineup import configurations
+from study.tradeoff.contenders import configurations
 from tests.conftest import SMALL
 
 BRIEF = (
@@ -180,7 +180,7 @@ def test_several_loads_are_followed_as_a_fine_lattice_follows_them(two):
     elements = two.fine.solved_on(None, Silent()).found.trajectory.displacement
     finer = beside(0.3, 0.3)
     fine = finer.model.coarse.varied(spacing=0.005).prepare(finer.problem)
-    step = asked_step(fine.model.lattice)
+    step = requested_step(fine.model.lattice)
     truth = elements + PreparedRemainder(fine, 20).run(step).trajectory.displacement
     assert apart(elements, truth) > 0.02
     assert apart(found, truth) < 0.5 * apart(elements, truth)
@@ -337,7 +337,7 @@ def test_the_report_prints_each_error_by_itself(results):
 
 def test_its_fields_are_kept(tmp_path):
     one = prepared(FEW, "tool.force=0.2 N")
-    ran = one.run(Watch(SILENT.progress, Keeping(tmp_path, fields=tmp_path)))
+    ran = one.run(Watch(SILENT.progress, Persistence(tmp_path, fields=tmp_path)))
     assert (tmp_path / "corrected.vtkhdf").stat().st_size > 0
     assert not any("fields" in note.lower() for note in ran.notes)
 

@@ -14,7 +14,7 @@ from msm.integrators import INTEGRATORS
 from msm.laws import LAWS
 from reports.content import document
 from reports.report import make_report
-from study.known.stability.cases import own_scene
+from study.known.stability.cases import user_scene
 from study.models.table import MODELS
 from study.progress import Silent
 from study.results import Results
@@ -25,7 +25,7 @@ from study.similarity.score import MEASURES
 from study.sweep.runner import How
 from study.sweep.store import Store
 from study.tradeoff import study as tradeoff
-from study.tradeoff.lineup import configurations
+from study.tradeoff.contenders import configurations
 from study.tradeoff.problem import sampled
 from tests.conftest import SMALL
 
@@ -242,8 +242,8 @@ def test_the_toy_model_is_timed_by_the_tradeoff(scene, tmp_path):
 
 
 def test_the_toy_model_is_tried_by_the_stability_study(scene):
-    cases = [case for case in own_scene.cases(scene) if case.name.startswith("toy")]
-    assert len(cases) == len(own_scene.LOADS)
-    finding = own_scene.moves(**cases[0].arguments)
+    cases = [case for case in user_scene.cases(scene) if case.name.startswith("toy")]
+    assert len(cases) == len(user_scene.LOADS)
+    finding = user_scene.moves(**cases[0].arguments)
     assert finding.ending == "value"
     assert finding.difference <= cases[0].tolerance

@@ -21,7 +21,7 @@ from study.robustness.block import Block, plain
 from study.robustness.design import shares
 from study.robustness.organ_unknowns import PLACE, TABLE_II, OrganDraw, draws, unknowns
 from study.robustness.unknowns import Placed, Sampled, groups
-from study.run.stated import arguments, stated
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.study import run_study
 from study.scene.file import read_scene
 
@@ -42,7 +42,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def given(scene):
-    return stated(**arguments(scene))
+    return scene_problem(**scene_arguments(scene))
 
 
 def as_the_scene(scene, **changed):
@@ -107,7 +107,7 @@ HUNG = (
 
 def test_gravity_and_weights_are_those_of_the_scene_in_every_draw(scene, given):
     hung = organ.prepared(read_scene("block", HUNG))
-    posed = stated(**arguments(hung))
+    posed = scene_problem(**scene_arguments(hung))
     draw = as_the_scene(hung)
     drawn = organ._posed(draw, hung, posed.problem)
     assert np.array_equal(drawn.gravity, posed.problem.gravity)
@@ -124,7 +124,7 @@ def test_a_draw_that_finds_no_rest_under_its_weight_counts_for_no_one(monkeypatc
         raise NoRestError("it falls", "hold it")
 
     monkeypatch.setattr("msm.stepper.sagged", lost)
-    assert np.isnan(scored(as_the_scene(hung), stated(**arguments(hung)))).all()
+    assert np.isnan(scored(as_the_scene(hung), scene_problem(**scene_arguments(hung)))).all()
 
 
 def test_tools_that_are_moved_are_refused_with_the_reason():

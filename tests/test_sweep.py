@@ -19,8 +19,8 @@ from study.sweep.imports import reached
 from study.sweep.plan import plan
 from study.sweep.program import ROOT, program
 from study.sweep.runner import How, run
+from study.sweep.status import StatusLines, SweepStatus, duration, on_stderr
 from study.sweep.store import Store
-from study.sweep.tally import Tally, TallyLines, duration, on_stderr
 from study.sweep.task import Task
 
 FUNCTIONS = "tests.sweep_tasks"
@@ -334,13 +334,15 @@ def test_progress_counts_stored_done_and_failed_and_says_how_long_it_takes(store
     ]  # fmt: skip
     assert told[0].seconds_left is None
     assert told[-1].seconds_left == 0.0
-    assert str(Tally(100, 20, 38, 2, 120.0)) == "60 of 100, 20 from before, 2 failed, 2 min left"
+    assert (
+        str(SweepStatus(100, 20, 38, 2, 120.0)) == "60 of 100, 20 from before, 2 failed, 2 min left"
+    )
     assert [duration(s) for s in (8.4, 150, 9000)] == ["8 s", "2 min", "2.5 h"]
 
 
 def test_lines_are_sparse_where_stderr_is_no_terminal(store, capsys):
     with on_stderr("squares") as tell:
-        assert isinstance(tell, TallyLines)
+        assert isinstance(tell, StatusLines)
         run(squares(50), store, progress=tell)
     assert capsys.readouterr().err.splitlines() == ["squares: 0 of 50", "squares: 50 of 50"]
 

@@ -18,7 +18,7 @@ from study.problem.problem import Problem
 from study.progress import Progress
 from study.results import Results
 from study.results.arrays import Arrays
-from study.run.ready import ReadyPoint, ready
+from study.run.preparation import PreparedPointScene, prepare_scene
 from study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -73,8 +73,8 @@ def lattices(scene: Scene, progress: Progress) -> ExportedLattices:
     lattice.
     """
     _refuse(scene)
-    found = ready(scene, progress)
-    if isinstance(found, ReadyPoint):
+    found = prepare_scene(scene, progress)
+    if isinstance(found, PreparedPointScene):
         raise ValueError(  # noqa: TRY004 - a scene's choice, reported as such
             "organ.shape: a point has no lattice; use liver, block or a mesh"
         )

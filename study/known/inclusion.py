@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class BallInclusion:
         return cls(radius, inside, around, strain)
 
     @property
-    def tissue(self) -> VariedTissue:
+    def tissue(self) -> HeterogeneousTissue:
         """The body with the ball in it."""
         distance = Ellipsoid(np.zeros(3), np.full(3, self.radius))
         ball = Region(
@@ -54,7 +54,7 @@ class BallInclusion:
             poisson_ratio=self.inside.poisson_ratio,
         )
         around = self.around
-        return VariedTissue(
+        return HeterogeneousTissue(
             youngs_modulus=around.youngs_modulus,
             poisson_ratio=around.poisson_ratio,
             density=around.density,

@@ -17,8 +17,8 @@ from study.progress import Progress
 from study.run.suiting import read_suited
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 
 
 def verify(progress: Progress, *, quick: bool = False) -> list[CaseVerdict]:
@@ -66,9 +66,9 @@ class StabilityRequest:
         _ = How(self.workers, self.scheduler)
         for folder in (self.folder, self.store.folder):
             refuse_unwritable(folder, lambda _: None, "stability study")
-        from study.known.stability.cases import own_scene  # compiled, as suite's
+        from study.known.stability.cases import user_scene  # compiled, as suite's
 
-        own_scene.refuse(read_suited(self.scene, ()))
+        user_scene.refuse(read_suited(self.scene, ()))
 
 
 def planned(request: StabilityRequest) -> str:
@@ -77,7 +77,7 @@ def planned(request: StabilityRequest) -> str:
     return str(plan([case.task for case in request.cases()], request.store))
 
 
-def study(request: StabilityRequest, progress: Tell = silent) -> list[CaseVerdict]:
+def study(request: StabilityRequest, progress: ReportStatus = silent) -> list[CaseVerdict]:
     """Verdicts on all cases asked for, which are also written as a table."""
     request.refuse()
     chosen = request.cases()

@@ -83,10 +83,10 @@ def _stability(scene: Scene) -> Iterator[Case]:
         lattice_contact,
         lattice_shapes,
         long_steps,
-        own_scene,
+        user_scene,
     )
 
-    yield from own_scene.cases(scene)
+    yield from user_scene.cases(scene)
     for family in (
         critical_step,
         fixed_step,

@@ -25,6 +25,7 @@ from msm.lattice import LatticeMesh
 from msm.model import Counts, Fixed, Step
 from msm.timestep import whole_steps
 from study.models.corrected_errors import Errors, checks
+from study.models.coupled_stepper import CoupledStepper
 from study.models.damping import reference_damping
 from study.models.deformed import Deformed, superposed
 from study.models.finite_elements import (
@@ -32,14 +33,13 @@ from study.models.finite_elements import (
     PreparedElements,
     reference_of,
 )
-from study.models.keeping import recorded
-from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, asked_step
+from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, requested_step
 from study.models.lattice_assumptions import springs
 from study.models.mesh_error import MeshSolution
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.models.remainder import FINER, ORDER, PreparedRemainder, Remainder, plus
 from study.models.tissue import of_modulus
-from study.models.together import Together
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
@@ -130,7 +130,7 @@ class PreparedCorrected:
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion by the lattice's own steps, or by equal ones of at most `longest` [s]."""
         solved = self._on_level
-        step: Step = asked_step(self.model.coarse.lattice)
+        step: Step = requested_step(self.model.coarse.lattice)
         if longest is not None:
             interval = float(self.problem.observation.times[1])
             step = Fixed(interval / whole_steps(interval, longest))
@@ -165,7 +165,9 @@ class PreparedCorrected:
         solved = self.best = self.fine.best
         prepared, shape = self._remainder(solved), self._deformed(solved)
         with watch.progress.stage(self.model.name) as advance:
-            found = prepared.run(asked_step(self.model.coarse.lattice), advance, keep_nodes=True)
+            found = prepared.run(
+                requested_step(self.model.coarse.lattice), advance, keep_nodes=True
+            )
         self._keep_fields(found, shape, watch)
         record = replace(
             self._record(found, solved, shape),
@@ -211,7 +213,7 @@ class PreparedCorrected:
             other = coarse.varied(spacing=spacing).prepare(self.problem)
             remainder = PreparedRemainder(other, found.vectors)
             with progress.stage(f"{self.model.name}: {1e3 * spacing:.3g} mm") as advance:
-                compared = remainder.run(asked_step(other.model.lattice), advance).trajectory
+                compared = remainder.run(requested_step(other.model.lattice), advance).trajectory
         except ValueError as error:  # of a lattice that is too large
             return str(error)
         lost = f"its lattice of {1e3 * spacing:.3g} mm diverged"
@@ -233,11 +235,11 @@ class PreparedCorrected:
 
     def _keep_fields(self, found: Remainder, shape: Deformed, watch: Watch) -> None:
         """Keep the motion of the mesh's vertices, if it is wanted."""
-        if watch.keeping is None or watch.keeping.fields is None:
+        if watch.persistence is None or watch.persistence.fields is None:
             return
         mesh, times = Mesh(shape.mesh.points, shape.mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(watch.keeping, resume=False)
-        with recorded(afresh, self.model.name, mesh, times) as on_sample:
+        afresh = replace(watch.persistence, resume=False)
+        with record_fields(afresh, self.model.name, mesh, times) as on_sample:
             for sample in found.samples:
                 on_sample(sample, *shape.state(sample, found))
 
@@ -245,7 +247,7 @@ class PreparedCorrected:
         """All parts at rest, stepped together; the vertices of the mesh are delivered by frames."""
         solved = self.best or self._on_level
         parts = self._remainder(solved), self._deformed(solved)
-        return Together(*parts, self.problem.factors, self.fine.model.damping).stepper()
+        return CoupledStepper(*parts, self.problem.factors, self.fine.model.damping).stepper()
 
 
 @lru_cache(maxsize=1)
@@ -317,5 +319,7 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     any_load=False,
-    able=frozenset({"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}),
+    supported_features=frozenset(
+        {"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}
+    ),
 )

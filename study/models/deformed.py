@@ -1,4 +1,4 @@
-"""The mesh of the finite elements as they and a lattice beside them deform it together."""
+"""The mesh of the finite elements as deformed by them and by the lattice that corrects them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Deformed:
-    """The vertices of the finite elements' mesh, as both parts move them.
+    """The vertices of the finite elements' mesh, displaced by both parts.
 
     `weights` (v, n): of the coarse lattice's nodes at the vertices; `subspace`: that of the
-    elements, its vectors (3 v, m) at the vertices only; `motion`: of the elements.
+    elements, with its vectors (3 v, m) at the vertices only; `motion`: of the elements.
     """
 
     mesh: TetrahedralMesh
@@ -34,7 +34,7 @@ class Deformed:
 
     @classmethod
     def of(cls, solved: MeshSolution, lattice: LatticeMesh) -> Deformed:
-        """Of a mesh on which the elements were solved."""
+        """The mesh on which the elements were solved."""
         mesh, found = solved.level.mesh, superposed(solved)
         among = found.subspace
         # The unknowns of vertices come before those of edges.
@@ -51,9 +51,10 @@ class Deformed:
         return u, v
 
     def inverted_cells(self, found: Remainder) -> int:
-        """Largest number over the samples of cells turned inside out.
+        """Largest number over the samples of inverted cells.
 
-        Of the mesh as the sum deforms it, its tetrahedra straight, or of the coarse lattice.
+        Counted on the mesh deformed by the sum of both parts, with straight tetrahedra, and on the
+        coarse lattice.
         """
         counts = (
             int((volumes(self._deformed(sample, found)) <= 0.0).sum()) for sample in found.samples
@@ -61,7 +62,7 @@ class Deformed:
         return max(found.lattice.inverted_cells, *counts)
 
     def largest_strain(self, found: Remainder, frames: tuple[int, ...]) -> float:
-        """Largest |principal stretch - 1| of the tetrahedra at the frames that are finite."""
+        """Largest |principal stretch - 1| of the tetrahedra, over the finite frames."""
         finite = set(frames) & set(found.samples)
         rest = _edges(self.mesh)
         stretches = (
@@ -81,7 +82,7 @@ def _edges(mesh: TetrahedralMesh) -> Floats:
 
 
 def superposed(solved: MeshSolution) -> Superposed:
-    """How elements were superposed whose method is that of Ritz vectors or modes."""
+    """The superposition of elements solved with Ritz vectors or modes."""
     found = solved.found.superposed
     assert found is not None  # noqa: S101 - of these methods
     return found

@@ -115,7 +115,7 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
 
 def _is_correctable(scene: Scene) -> bool:
     """Whether a corrected lattice follows a scene, and large displacements are asked for."""
-    able = kind("corrected").able
+    able = kind("corrected").supported_features
     nonlinear = scene.lattice.geometry == "nonlinear" and scene.lattice.integrator != "xpbd"
     return nonlinear and able.issuperset(scene.features)
 

@@ -94,7 +94,7 @@ class ToolPatch:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A blunt tool beside the first, or a station of one that travels (`study.problem.way`).
+    """A further blunt tool, or one station of a travelling tool (`study.problem.tool_travel`).
 
     `factor`: share of its force at times [s].
     """

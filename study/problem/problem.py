@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
 from study.problem.contact import Load, ToolPatch, Weight
+from study.problem.heterogeneous import OUTLINE, HeterogeneousTissue, notes_of
 from study.problem.response import Response, ToolPath
 from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
+from study.problem.tool_travel import full_share, travel_paths
 from study.problem.trajectory import Observation
-from study.problem.varied import OUTLINE, VariedTissue, notes_of
-from study.problem.way import full_share, ways
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Problem:
     of_tools: tuple[str, ...] = ()
 
     @property
-    def is_burdened(self) -> bool:
+    def has_further_loads(self) -> bool:
         """Whether more acts on the organ than its first tool as a load."""
         return bool(self.rigid_tools or self.loads or self.weights or self.gravity.any())
 
@@ -84,11 +84,11 @@ class Problem:
         return np.array([full_share(one, peak) for one in histories])
 
     @property
-    def ways(self) -> Floats:
+    def travel_paths(self) -> Floats:
         """Places [m] (tools, places, 3), equally spaced in time, of each tool that travels."""
         first = (self.tool, self.factor)
         loads = [first, *((load.tool, load.factor) for load in self.loads)]
-        return ways([(tool.name, tool.centre, factor) for tool, factor in loads])
+        return travel_paths([(tool.name, tool.centre, factor) for tool, factor in loads])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ class Problem:
     @property
     def inclusions(self) -> Floats:
         """Points [m] (regions, OUTLINE, 3) of the surface of each region of other tissue."""
-        regions = self.tissue.regions if isinstance(self.tissue, VariedTissue) else ()
+        regions = self.tissue.regions if isinstance(self.tissue, HeterogeneousTissue) else ()
         outlines = [one.outline for one in regions if len(one.outline)]
         return np.stack(outlines) if outlines else np.zeros((0, OUTLINE, 3))
 

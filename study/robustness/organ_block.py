@@ -19,7 +19,7 @@ from study.robustness.block import Block, plain
 from study.robustness.design import shares
 from study.robustness.organ_unknowns import OrganDraw, as_drawn, draws, unknowns
 from study.robustness.patient import SYSTEMS, estimates, readings
-from study.run.stated import stated
+from study.run.scene_problem import scene_problem
 from study.scene import Place, Scene
 from study.scene.place import resolve
 from study.scene.problem import problem_of
@@ -104,7 +104,7 @@ def usual_spacing(problem: Problem) -> float:
 
 def run(asked: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
     """Estimates and scores of a row of the design, as plain lists."""
-    given = stated(scene, mesh_sha256)
+    given = scene_problem(scene, mesh_sha256)
     return plain(evaluated(Asked(**asked).draws(), given.scene, _seen(given.problem)))
 
 

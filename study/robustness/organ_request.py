@@ -25,14 +25,14 @@ from study.robustness.organ_block import (
 from study.robustness.organ_unknowns import unknowns
 from study.robustness.ranges import write_ranges
 from study.robustness.unknowns import groups
-from study.run.stated import arguments, stated
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.canonical import Plain
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 from study.sweep.task import Task
 
 Floats = NDArray[np.float64]
@@ -86,12 +86,12 @@ class OrganRequest:
         """The scene as every draw has it, as plain values. ValueError of one that will not do."""
         scene = read_suited(self.scene, self.overrides)
         _refuse_moved(scene)
-        return arguments(prepared(scene))
+        return scene_arguments(prepared(scene))
 
     @cached_property
     def about(self) -> float:
         """Spacing [m] that the lattices have about."""
-        return self.spacing or usual_spacing(stated(**self.given).problem)
+        return self.spacing or usual_spacing(scene_problem(**self.given).problem)
 
     def tasks(self) -> list[Task]:
         """A task a row of the design. ValueError unless the size is a power of two."""
@@ -138,7 +138,7 @@ class Found:
     finer: tuple[rows.Finer, ...]
 
 
-def study(request: OrganRequest, progress: Tell = silent) -> Found:
+def study(request: OrganRequest, progress: ReportStatus = silent) -> Found:
     """Who is nearest to the benchmark in each draw; all tables are written to the folder.
 
     Raises ValueError for a scene with nothing to draw, a size that is no power of two, a folder

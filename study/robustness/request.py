@@ -19,8 +19,8 @@ from study.scene.file import read_scene
 from study.similarity.batch import COLUMNS
 from study.sweep.plan import plan
 from study.sweep.runner import How, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 from study.sweep.task import Task
 
 SCENE = "paper"
@@ -81,7 +81,7 @@ def planned(request: RobustnessRequest) -> str:
     return str(plan(request.tasks(), request.store))
 
 
-def study(request: RobustnessRequest, progress: Tell = silent) -> list[rows.Nearest]:
+def study(request: RobustnessRequest, progress: ReportStatus = silent) -> list[rows.Nearest]:
     """How often each system is nearest to the benchmark; all tables are written to the folder.
 
     Raises ValueError for a size that is no power of two, a folder that cannot be written, or a

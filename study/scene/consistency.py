@@ -372,7 +372,7 @@ def _place_of_inclusion(name: str, one: Inclusion) -> Iterator[str]:
 def _feature_contradictions(scene: Scene) -> Iterator[str]:
     """Models that cannot follow what the scene asks."""
     for feature in scene.features:
-        able = [name for name in MODELS.names() if feature in _kind(name).able]
+        able = [name for name in MODELS.names() if feature in _kind(name).supported_features]
         for name in scene.models:
             if name not in able:
                 yield (

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from study.mesh.kinds import SurfaceMesh
 from study.problem.contact import Load, ToolPatch
-from study.problem.way import APART, SAME, stations, turns
+from study.problem.tool_travel import APART, SAME, station_loads, stations
 from study.scene.place import depths
 from study.scene.schema import Tool
 
@@ -33,7 +33,7 @@ def travelling(tool: Tool, patch: ToolPatch, surface: SurfaceMesh) -> tuple[Load
     places = _on_surface(patch, found.away, reached, surface)
     return tuple(
         Load(replace(patch, centre=place), turn)
-        for place, turn in turns(
+        for place, turn in station_loads(
             found, places, times, marks, tool.history.factor, SAME * tool.radius
         )
     )

@@ -19,11 +19,11 @@ from typing import Any
 from study.sweep.canonical import digest
 from study.sweep.program import program
 
-KEEPING = ("study.stages.flat", "study.stages.store")
+KEEPING = ("study.stages.serialisation", "study.stages.store")
 """Modules that what is kept passes through."""
 
 
-class NotToldError(TypeError):
+class NoFingerprintError(TypeError):
     """A value that has no text of its own."""
 
 
@@ -34,16 +34,16 @@ def key(stage: str, *things: object, modules: tuple[str, ...] = ()) -> str | Non
     """
     found: set[str] = {*modules, *KEEPING}
     try:
-        told = [_told(thing, found) for thing in things]
+        descriptions = [_description(thing, found) for thing in things]
         programs = {name: program(name) for name in sorted(found)}
-    except (NotToldError, ValueError):
+    except (NoFingerprintError, ValueError):
         return None
-    return digest([stage, told, programs, machine()])
+    return digest([stage, descriptions, programs, machine()])
 
 
 def text(thing: object) -> str:
     """SHA-256 of a value alone. NotToldError if it has no text."""
-    return digest(_told(thing, set()))
+    return digest(_description(thing, set()))
 
 
 @functools.cache
@@ -62,67 +62,73 @@ def _processor() -> list[str]:
 
 
 @functools.singledispatch
-def _told(thing: Any, modules: set[str]) -> Any:
+def _description(thing: Any, modules: set[str]) -> Any:
     """Of an object: its fields, or the array that it is."""
     if dataclasses.is_dataclass(thing):
         return [_class(thing, modules), *_fields(thing, modules)]
     array = getattr(thing, "__array__", None)
     if array is None:
-        raise NotToldError(f"a {type(thing).__name__} has no text")
+        raise NoFingerprintError(f"a {type(thing).__name__} has no text")
     values = array()
     if values.dtype.hasobject:
-        raise NotToldError(f"an array of {values.dtype} has no text")
+        raise NoFingerprintError(f"an array of {values.dtype} has no text")
     return [values.dtype.str, list(values.shape), hashlib.sha256(values.tobytes()).hexdigest()]
 
 
-@_told.register(NoneType)
-@_told.register(int)
-@_told.register(str)
+@_description.register(NoneType)
+@_description.register(int)
+@_description.register(str)
 def _plain(thing: int | str | None, _: set[str]) -> Any:
     return thing
 
 
-@_told.register(float)
+@_description.register(float)
 def _number(thing: float, _: set[str]) -> Any:
     return thing.hex()
 
 
-@_told.register(tuple)
-@_told.register(list)
+@_description.register(tuple)
+@_description.register(list)
 def _sequence(thing: Sequence[Any], modules: set[str]) -> Any:
-    return [_class(thing, modules), *(_told(one, modules) for one in thing)]
+    return [_class(thing, modules), *(_description(one, modules) for one in thing)]
 
 
-@_told.register(Mapping)
+@_description.register(Mapping)
 def _mapping(thing: Mapping[Any, Any], modules: set[str]) -> Any:
-    return ["by name", *([_told(k, modules), _told(v, modules)] for k, v in thing.items())]
+    return [
+        "by name",
+        *([_description(k, modules), _description(v, modules)] for k, v in thing.items()),
+    ]
 
 
-@_told.register(functools.partial)
+@_description.register(functools.partial)
 def _partial(thing: functools.partial[Any], modules: set[str]) -> Any:
-    return ["partial", *(_told(x, modules) for x in (thing.func, thing.args, thing.keywords))]
+    return [
+        "partial",
+        *(_description(x, modules) for x in (thing.func, thing.args, thing.keywords)),
+    ]
 
 
-@_told.register(MethodType)
+@_description.register(MethodType)
 def _method(thing: MethodType, modules: set[str]) -> Any:
-    return ["method", thing.__name__, _told(thing.__self__, modules)]
+    return ["method", thing.__name__, _description(thing.__self__, modules)]
 
 
-@_told.register(type)
-@_told.register(FunctionType)
+@_description.register(type)
+@_description.register(FunctionType)
 def _named(thing: Any, modules: set[str]) -> Any:
     """Module and name of what stands at the top of a module."""
     if thing.__module__ == "builtins":
         return thing.__qualname__
     if "<" in thing.__qualname__:  # within a function, and so of what that was given
-        raise NotToldError(f"{thing.__qualname__} is made within a function")
+        raise NoFingerprintError(f"{thing.__qualname__} is made within a function")
     modules.add(thing.__module__)
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
 def _fields(thing: Any, modules: set[str]) -> Iterator[Any]:
     for one in dataclasses.fields(thing):
-        yield [one.name, _told(getattr(thing, one.name), modules)]
+        yield [one.name, _description(getattr(thing, one.name), modules)]
 
 
 def _class(thing: object, modules: set[str]) -> Any:

@@ -27,7 +27,7 @@ from study.folders import FolderError, naming, refusal, tell
 from study.sweep.canonical import Plain, canonical, digest
 
 if TYPE_CHECKING:
-    from study.stages.flat import Arrays
+    from study.stages.serialisation import Arrays
 
 FOLDER, LIMIT = "LIVER_STUDY_STORE", "LIVER_STUDY_STORE_LIMIT"
 """Environment variables: the folder of stages, and its limit with a unit, such as "4 GB"."""

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from study.stages.lanes import available
+from study.stages.job_pool import available
 
 _ALLOWED: ContextVar[int | None] = ContextVar("allowed", default=None)
 _HELPERS: dict[int, ThreadPoolExecutor] = {}

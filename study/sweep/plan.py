@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import NamedTuple
 
+from study.sweep.status import duration
 from study.sweep.store import Store, Stored
-from study.sweep.tally import duration
 from study.sweep.task import Task
 
 

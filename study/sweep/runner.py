@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from study.sweep.attempt import Attempt, Status, attempt
 from study.sweep.canonical import Plain, canonical
 from study.sweep.program import program
+from study.sweep.status import ReportStatus, SweepStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tally, Tell, silent
 from study.sweep.task import Task
 
 
@@ -48,7 +48,7 @@ class Outcome:
 
 
 def run(
-    tasks: Sequence[Task], store: Store, how: How | None = None, progress: Tell = silent
+    tasks: Sequence[Task], store: Store, how: How | None = None, progress: ReportStatus = silent
 ) -> list[Outcome]:
     """Outcomes of all tasks, in their order; only those without a stored result are run.
 
@@ -69,19 +69,19 @@ def run(
         store.tidy()
 
 
-def _run(tasks: Sequence[Task], store: Store, how: How, progress: Tell) -> list[Outcome]:
+def _run(tasks: Sequence[Task], store: Store, how: How, progress: ReportStatus) -> list[Outcome]:
     by_key = {task.key: task for task in tasks}
     ended = {name: kept for name, task in by_key.items() if (kept := _kept(task, store))}
     left = {name: task for name, task in by_key.items() if name not in ended}
-    tally, start = Tally(len(by_key), stored=len(ended)), time.perf_counter()
-    progress(tally)
+    status, start = SweepStatus(len(by_key), stored=len(ended)), time.perf_counter()
+    progress(status)
     with _attempts(tuple(left.values()), how) as attempts:
         for task, found in attempts:
             if found.value is not None:
                 store.put(task, found.value, found.wall)
             ended[task.key] = found
-            tally = tally.counting(found.status == "done", time.perf_counter() - start)
-            progress(tally)
+            status = status.counting(found.status == "done", time.perf_counter() - start)
+            progress(status)
     return [Outcome(task, *ended[task.key]) for task in tasks]
 
 

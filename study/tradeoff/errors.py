@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.models.spacing_error import force_differences
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 
 Floats = NDArray[np.float64]
 Status = Literal[
@@ -49,7 +49,7 @@ class Errors:
         return self.force if self.of_force else self.field
 
 
-def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
+def errors(outcome: Outcome, reference: ReferenceSolution, given: SceneProblem) -> Errors:
     """Errors of one run of `study.tradeoff.observation`."""
     if outcome.status != "done" or outcome.value is None:
         status: Status = "crashed" if outcome.status == "crashed" else "failed"
@@ -69,7 +69,9 @@ def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
     )
 
 
-def _of_force(measured: Errors, found: Floats, reference: Truth, given: Stated) -> Errors:
+def _of_force(
+    measured: Errors, found: Floats, reference: ReferenceSolution, given: SceneProblem
+) -> Errors:
     """With the errors of the force, by which it is then judged."""
     over_time, peak = force_differences(given.problem, found, reference.force).max(axis=1)
     kept = resolved(over_time, float(reference.force_errors.max()))
@@ -82,7 +84,9 @@ def _of_force(measured: Errors, found: Floats, reference: Truth, given: Stated) 
     )
 
 
-def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> Errors:
+def _measured(
+    found: Floats, moved: Floats, reference: ReferenceSolution, given: SceneProblem
+) -> Errors:
     volumes = given.problem.volume_rule.weights
     field = relative_l2(found, reference.field, volumes)
     moved = moved.reshape(reference.curves.shape)

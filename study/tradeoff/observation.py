@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.models.model import Simulation
-from study.run.stated import stated
+from study.run.scene_problem import scene_problem
 from study.sweep.canonical import Plain
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.contenders import Configuration
 from study.tradeoff.problem import plain
 
 FUNCTION = f"{__name__}:observe"
@@ -34,7 +34,7 @@ class Observed:
 
 def observe(name: str, settings: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
     """What is observed of a contender by name, as plain values of `Observed`."""
-    given = stated(scene, mesh_sha256)
+    given = scene_problem(scene, mesh_sha256)
     configuration = Configuration(name, settings)
     return vars(_observed(configuration.model(given.scene).prepare(given.problem).simulate()))
 

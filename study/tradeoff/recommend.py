@@ -11,7 +11,7 @@ keep up after all.
 Where the place of the load is known beforehand, what follows it there only is chosen from too:
 Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
 few, and each promises what a run of it was off by, or the reference's own error if that is more.
-All are then judged by the reference with large displacements, `study.tradeoff.geometry`.
+All are then judged by the reference with large displacements, `study.tradeoff.large_displacements`.
 
 Where tools are moved the error is that of their force over time. Against the finest lattice of the
 same springs every spacing is run, for errors by contact jump with how cells lie; each promises what
@@ -28,7 +28,7 @@ import numpy as np
 from study.models.spacing_error import force_differences
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
@@ -36,16 +36,16 @@ from study.sweep.canonical import restored
 from study.sweep.runner import How, Outcome
 from study.sweep.store import Store
 from study.tradeoff import study
-from study.tradeoff.chosen import DOUBLE, in_words, scene_with
+from study.tradeoff.comparison import Comparison
+from study.tradeoff.contenders import Configuration, fraction, may_be_single
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.geometry import with_large_displacements
-from study.tradeoff.judge import Judge
-from study.tradeoff.lineup import Configuration, fraction, may_be_single
+from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
+from study.tradeoff.selection import DOUBLE, described, scene_with
 from study.tradeoff.table import Cost, is_beaten
 from study.tradeoff.timing import QUICK_REPEATS
 
@@ -146,18 +146,18 @@ def recommend(
     spacings = every[: len(FITTED)] if study.has_reference(scene) else every
     tried = [_configuration(scene, h) for h in spacings]
     single = [_configuration(scene, spacings[-1], SINGLE)] if may_be_single(scene) else []
-    judge, outcomes = study.judged(coarser, [*tried, *single], store, how)
-    given, followed = judge.given, None
-    if known_place and judge.reference is not None:
-        followed = _followed(given, judge.reference, store, how)
-        judge = replace(judge, reference=followed.known)
+    comparison, outcomes = study.judged(coarser, [*tried, *single], store, how)
+    given, followed = comparison.given, None
+    if known_place and comparison.reference is not None:
+        followed = _followed(given, comparison.reference, store, how)
+        comparison = replace(comparison, reference=followed.known)
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
-    promises = _promises(judge, tried, outcomes, every)
+    promises = _promises(comparison, tried, outcomes, every)
     candidates = _candidates(given, promises, added, wanted, progress)
     if followed is not None:
         candidates += _bound(given, followed, wanted, progress)
-    found = _verified(judge, candidates, wanted, store, how, progress)
-    return replace(found, against=judge.words if judge.finest else "")
+    found = _verified(comparison, candidates, wanted, store, how, progress)
+    return replace(found, against=comparison.words if comparison.finest else "")
 
 
 def judged_by(scene: Scene) -> Scene:
@@ -183,17 +183,17 @@ class Fit:
 
 
 def _promises(
-    judge: Judge,
+    comparison: Comparison,
     tried: Sequence[Configuration],
     outcomes: Sequence[Outcome],
     every: Sequence[float],
 ) -> dict[float, Promise]:
     """What a spacing [m] promises, in double precision."""
     spacings = [float(one.settings["spacing"]) for one in tried]
-    if judge.reference is None:
-        return dict(_measured_promises(judge, tried, outcomes))
-    known = judge.reference
-    found = [errors(one, known, judge.given) for one in outcomes[: len(tried)]]
+    if comparison.reference is None:
+        return dict(_measured_promises(comparison, tried, outcomes))
+    known = comparison.reference
+    found = [errors(one, known, comparison.given) for one in outcomes[: len(tried)]]
     kept = [(h, e.judged) for h, e in zip(spacings, found, strict=True) if e.judged is not None]
     own = known.field_error if known.force_bar is None else known.force_bar
     curve = fitted([h for h, _ in kept], [error for _, error in kept], own)
@@ -201,13 +201,13 @@ def _promises(
 
 
 def _measured_promises(
-    judge: Judge, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
+    comparison: Comparison, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
 ) -> Iterator[tuple[float, Promise]]:
     """What each run was off the finest lattice by, and the own error of that."""
     for one, outcome in zip(tried, outcomes, strict=False):
-        known = judge.truth(one)
+        known = comparison.truth(one)
         alike = replace(known, force_errors=np.zeros_like(known.force_errors))
-        found = errors(outcome, alike, judge.given)
+        found = errors(outcome, alike, comparison.given)
         if found.status in {"resolved", "not resolved"}:
             promise = Promise(found.force or 0.0, known.force_bar or 0.0)
             yield float(one.settings["spacing"]), promise
@@ -237,7 +237,7 @@ def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Con
     return Configuration("volume-springs" if lacks else "springs", settings)
 
 
-def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, float]:
+def _added_by_single(outcomes: Sequence[Outcome], given: SceneProblem) -> dict[str, float]:
     """What single precision changes of the field or the force, of a run in double and in single.
 
     Relative L2; nothing where there is no such run, or it was not whole.
@@ -256,7 +256,7 @@ def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, fl
 
 
 def _candidates(
-    given: Stated,
+    given: SceneProblem,
     promises: Mapping[float, Promise],
     added: Mapping[str, float],
     wanted: Demand,
@@ -279,10 +279,10 @@ class Followers:
 
     chosen: tuple[Configuration, ...]
     outcomes: tuple[Outcome, ...]
-    known: Truth
+    known: ReferenceSolution
 
 
-def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
+def _followed(given: SceneProblem, known: ReferenceSolution, store: Store, how: How) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
     Without runs that tell what geometry changes, those of small displacements are left out.
@@ -297,7 +297,7 @@ def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
 
 
 def _bound(
-    given: Stated, followed: Followers, wanted: Demand, progress: Progress
+    given: SceneProblem, followed: Followers, wanted: Demand, progress: Progress
 ) -> list[Candidate]:
     """Candidates of those that were run, timed in turns."""
     known = followed.known
@@ -329,7 +329,7 @@ def _as_measured(found: Errors, own: float) -> Promise:
     return Promise(found.field or 0.0, own)
 
 
-def _costs(given: Stated, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
+def _costs(given: SceneProblem, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
     longest = [float("inf")] * len(chosen)  # that at rest is less
     return study.costs(given, chosen, longest, QUICK_REPEATS, progress, sized=True)
 
@@ -353,7 +353,7 @@ def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
 
 
 def _verified(
-    judge: Judge,
+    comparison: Comparison,
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
@@ -361,9 +361,9 @@ def _verified(
     progress: Progress,
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
-    given, chosen = judge.given, best(candidates, wanted)
+    given, chosen = comparison.given, best(candidates, wanted)
     _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, how)
-    measured = judge.errors(chosen.configuration, outcome)
+    measured = comparison.errors(chosen.configuration, outcome)
     (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
@@ -373,7 +373,7 @@ def _verified(
     met = met and (wanted.error is None or (measured.judged or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(judge, others, wanted, store, how, progress)
+        return _verified(comparison, others, wanted, store, how, progress)
     wall = cost.timing.step[1] / cost.step
     return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 
@@ -404,7 +404,7 @@ def lines(found: Recommended) -> list[str]:
     if measured.judged is not None:
         verdict = ", as promised" if promise.holds(measured.judged) else ", not as promised"
     text = [
-        in_words(one.configuration),
+        described(one.configuration),
         f"{_quantity(measured)} error promised {100 * promise.error:.1f} +- "
         f"{100 * promise.bar:.1f} %, measured {error}" + verdict,
     ]
@@ -476,6 +476,6 @@ def table_of(
         memory = "" if one.cost.memory is None else _in_mb(one.cost.memory)
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
-            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {in_words(one.configuration)}"
+            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {described(one.configuration)}"
             + (" <- taken" if one is taken else "")
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study.models.finite_elements import reference_of
 from study.models.model import SILENT, ModelRun
 from study.results.records import ElementsRecord, MeshLevel
-from study.run.stated import Stated, stated
+from study.run.scene_problem import SceneProblem, scene_problem
 from study.run.tool_forces import largest_forces
 from study.sweep.canonical import Plain, restored
 from study.tradeoff.problem import plain
@@ -43,7 +43,7 @@ class SolvedReference:
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferenceSolution:
     """What contenders are compared with.
 
     `field` [m] (q, 3) at the peak; `curves` [m] (samples, probes, 3); relative errors of both,
@@ -67,7 +67,7 @@ class Truth:
 
 def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     """The reference of a scene, as plain values of `SolvedReference`."""
-    given = stated(scene, mesh_sha256)
+    given = scene_problem(scene, mesh_sha256)
     reference = reference_of(given.scene).varied(large_strain="none")
     run = reference.prepare(given.problem).run(SILENT)
     elements, steps = run.record.elements, run.record.time_step_errors
@@ -93,14 +93,14 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     )
 
 
-def _force_errors(given: Stated, run: ModelRun) -> list[float] | None:
+def _force_errors(given: SceneProblem, run: ModelRun) -> list[float] | None:
     """Of each tool's force over time by all that is estimated, None where a part is not."""
     found = [one.relative_error for one in largest_forces(given.problem.response, {"fem": run})]
     known = [error for error in found if error is not None]
     return known if len(known) == len(given.problem.rigid_tools) else None
 
 
-def truth(value: Plain, given: Stated) -> Truth:
+def truth(value: Plain, given: SceneProblem) -> ReferenceSolution:
     """The reference of a stored value. ValueError if it or its error is unknown."""
     found = restored(SolvedReference, value)
     if not found.finished:
@@ -114,7 +114,7 @@ def truth(value: Plain, given: Stated) -> Truth:
     if tools and found.force_errors is None:
         raise ValueError("the error of the reference's force on the tools is unknown")
     of_force = np.array(found.force_errors or [])
-    return Truth(
+    return ReferenceSolution(
         np.reshape(found.field, (-1, 3)),
         np.reshape(found.curves, (len(seen.times), len(seen.probes), 3)),
         found.field_error,

@@ -14,16 +14,16 @@ from study.models.table import model
 from study.problem.features import BESIDE_ONE_LOAD, FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
-from study.run.ready import set_up
-from study.run.stated import arguments, stated
+from study.run.preparation import prepare_models
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.plan import plan
 from study.sweep.runner import How
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
+from study.tradeoff.contenders import configurations, is_moved
 from study.tradeoff.demand import Demand, as_share, demand, length
-from study.tradeoff.lineup import configurations, is_moved
 from study.tradeoff.problem import sampled
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
 
@@ -76,9 +76,9 @@ def _ready(request: TradeoffRequest) -> Scene:
 
 def _set_up(scene: Scene) -> Problem:
     """The problem of a scene on which what others are compared with can run. ValueError if not."""
-    problem = stated(**arguments(scene)).problem
+    problem = scene_problem(**scene_arguments(scene)).problem
     compared_with = "fem" if study.has_reference(scene) else "tissue"
-    set_up([model(scene, compared_with)], problem)
+    prepare_models([model(scene, compared_with)], problem)
     return problem
 
 
@@ -103,14 +103,14 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
 
 def _against(found: study.Found) -> list[str]:
     """What the errors are of and against, and how large its own is."""
-    judge = found.judge
-    if judge.reference is not None and not judge.finest:
-        own = 100 * judge.reference.field_error
+    comparison = found.comparison
+    if comparison.reference is not None and not comparison.finest:
+        own = 100 * comparison.reference.field_error
         return [f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %"]
     bars = [one.force_bar for one in found.entries if one.force_bar is not None]
-    why = [f"not against the scene's finite elements: {judge.why}"] if judge.why else []
+    why = [f"not against the scene's finite elements: {comparison.why}"] if comparison.why else []
     return [
-        f"errors are of the force of the tools over time, against {judge.words}; its own is "
+        f"errors are of the force of the tools over time, against {comparison.words}; its own is "
         f"{100 * min(bars):.2g} to {100 * max(bars):.2g} %",
         *why,
     ]
@@ -137,14 +137,14 @@ def advise(
     problem = _set_up(recommend.judged_by(sampled(given)))
     lattice = model(given, "tissue").varied().prepare(problem)  # one of its spacing
     if absolute is not None:
-        at_rest = model(given, "fem").prepare(problem) if problem.is_burdened else lattice
+        at_rest = model(given, "fem").prepare(problem) if problem.has_further_loads else lattice
         reach = float(np.linalg.norm(at_rest.rest(), axis=1).max())
         share = as_share(absolute, reach)
         wanted = demand(rate, share)
+        at_rest_name = "elements yield" if problem.has_further_loads else YIELDS
         told = [
             f"an error of {1e3 * absolute:.3g} mm is taken as {share} of the {1e3 * reach:.3g} mm "
-            f"by which the {'elements yield' if problem.is_burdened else YIELDS} at most at rest; "
-            "errors are of the whole field"
+            f"by which the {at_rest_name} at most at rest; errors are of the whole field"
         ]
     store = _store(Path("results") / f"{request.name}-tradeoff")
     if known_place:

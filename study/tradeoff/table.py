@@ -39,8 +39,8 @@ from pathlib import Path
 
 import numpy as np
 
+from study.tradeoff.contenders import Configuration
 from study.tradeoff.errors import Errors
-from study.tradeoff.lineup import Configuration
 from study.tradeoff.rates import RATES, frame
 from study.tradeoff.timing import Timing
 

@@ -16,10 +16,10 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import BEAM, beam
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Markers, beam_markers
-from study.validation.rows import Comparison, own_error
+from study.validation.predictions import KINDS, Kind, Prediction
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def _factor_at(factors: Floats, ways: Floats, target: float) -> float:
     return float(brentq(lambda s: float(path(s)) - target, factors[0], factors[-1]))
 
 
-def _answer(kind: Kind, case: Markers, level: int, factors: tuple[float, ...]) -> Answer:
+def _answer(kind: Kind, case: Markers, level: int, factors: tuple[float, ...]) -> Prediction:
     watched, _ = _watched(case)
     return kind.solve(beam(case.force, watched.reshape(-1, 3)), level, MODULUS, factors)
 

@@ -15,11 +15,11 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import CUBE, FACES, cube
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Beads, beads
+from study.validation.predictions import KINDS, Kind, Prediction
 from study.validation.registration import registered
-from study.validation.rows import Comparison, own_error
 from study.validation.specimen import Specimen
 
 Floats = NDArray[np.float64]
@@ -69,14 +69,14 @@ def _folded(points: Floats) -> tuple[Floats, Floats]:
     return sign * points, sign
 
 
-def _answers(specimen: Specimen, kind: Kind, levels: int) -> tuple[list[Answer], list[float]]:
+def _answers(specimen: Specimen, kind: Kind, levels: int) -> tuple[list[Prediction], list[float]]:
     sizes = [mesh.size for mesh in specimen.meshes] if kind.elements else list(specimen.spacings)
     count = min(levels, len(sizes))
     factors = tuple(way / CUBE for way in SOLVED)
     return [kind.solve(specimen, n, MODULUS, factors) for n in range(count)], sizes[:count]
 
 
-def _fit(known: Beads, sign: Floats, answer: Answer, state: str) -> _Fit:
+def _fit(known: Beads, sign: Floats, answer: Prediction, state: str) -> _Fit:
     """The plate's way with which the least is left of the beads after a rigid motion."""
     ways = CUBE * np.concatenate([[0.0], answer.factors])
     low, high = WAYS[state]

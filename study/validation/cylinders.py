@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import BONDED, FACES, cylinder
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Compression, compressions
-from study.validation.rows import Comparison, own_error
+from study.validation.predictions import KINDS, Kind, Prediction
 from study.validation.specimen import Specimen
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iter
 
 def _curves(
     specimen: Specimen, kind: Kind, faces: str, levels: int
-) -> tuple[list[Answer], list[float]]:
+) -> tuple[list[Prediction], list[float]]:
     """Answers on meshes or spacings, coarse to fine, and their sizes."""
     whole = [mesh.size for mesh in specimen.meshes] if kind.elements else list(specimen.spacings)
     # Between sliding plates the strain is uniform, and elements of any size are exact.
@@ -55,7 +55,7 @@ def _curves(
 
 
 def _of_material(
-    measured: Compression, curves: tuple[list[Answer], list[float]], kind: Kind, faces: str
+    measured: Compression, curves: tuple[list[Prediction], list[float]], kind: Kind, faces: str
 ) -> Iterator[Comparison]:
     answers, sizes = curves
     forces = [_padded(-answer.force) for answer in answers]

@@ -29,8 +29,8 @@ from study.progress import Progress
 from study.scene import Scene
 from study.scene.consistency import contradictions
 from study.scene.problem import problem_of
-from study.validation.own_data import Curve
-from study.validation.own_scene import coarser, probe_number, refuse_unanswered, seen
+from study.validation.user_data import Curve
+from study.validation.user_scene import coarser, probe_number, refuse_unanswered, seen
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from study.progress import Progress
 from study.scene.file import read_scene
-from study.validation import cantilever, cube, cylinders, own_scene
-from study.validation.answers import KINDS
-from study.validation.rows import Comparison
+from study.validation import cantilever, cube, cylinders, user_scene
+from study.validation.comparison import Comparison
+from study.validation.predictions import KINDS
 
 Compare = Callable[[tuple[str, ...], int, Progress], Iterable[Comparison]]
 
@@ -56,8 +56,8 @@ def own_comparisons(
     """A scene by name or file beside the measurements in a folder. ValueError for unfit ones."""
     if scene is None or scene in PROBLEMS:
         raise ValueError("--data: give the scene that was measured too, a name or a TOML file")
-    data = own_scene.read_folder(folder)
-    return own_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
+    data = user_scene.read_folder(folder)
+    return user_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
 
 
 def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from study.folders import write_text
-from study.validation.rows import Comparison
+from study.validation.comparison import Comparison
 
 COLUMNS = (
     *("problem", "case", "faces", "model", "quantity", "unit", "measured", "uncertainty"),

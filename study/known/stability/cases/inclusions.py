@@ -23,8 +23,8 @@ from study.known.stability.bodies import Make, lattice_of
 from study.known.stability.growth import measured_limit
 from study.known.verification.moduli import oedometric
 from study.organ.block import block_mesh
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
@@ -76,11 +76,11 @@ class Layer:
 MIDDLE = Layer(CELL, 2.0 * CELL)
 
 
-def varied(contrast: float, tissue: Tissue) -> VariedTissue:
+def varied(contrast: float, tissue: Tissue) -> HeterogeneousTissue:
     """A layer in the middle of the column of so many times the modulus."""
     modulus = contrast * tissue.youngs_modulus
     layer = Region(name="layer", distance=MIDDLE, youngs_modulus=modulus)
-    return VariedTissue(
+    return HeterogeneousTissue(
         youngs_modulus=tissue.youngs_modulus,
         poisson_ratio=tissue.poisson_ratio,
         regions=(layer,),
@@ -131,15 +131,15 @@ def too_low() -> Finding:
     return Finding("value")
 
 
-def _with_ball(make: Make, contrast: float, nu: float | None) -> VariedTissue:
+def _with_ball(make: Make, contrast: float, nu: float | None) -> HeterogeneousTissue:
     middle = 0.5 * make.spacing * np.array(make.counts)
     shape = Ellipsoid(middle, np.full(3, 0.9 * make.spacing))
     modulus = contrast * make.youngs_modulus
     ball = Region(name="ball", distance=shape, youngs_modulus=modulus, poisson_ratio=nu)
-    return VariedTissue(youngs_modulus=make.youngs_modulus, regions=(ball,))
+    return HeterogeneousTissue(youngs_modulus=make.youngs_modulus, regions=(ball,))
 
 
-def _lattice(make: Make, tissue: VariedTissue) -> tuple[Assembly, Material]:
+def _lattice(make: Make, tissue: HeterogeneousTissue) -> tuple[Assembly, Material]:
     """A block of whole cells of the tissue; its springs are those of `make` around."""
     plain, material = lattice_of(make)
     assert isinstance(plain.lattice, CellLattice)  # noqa: S101 - as it is made of whole cells

@@ -20,10 +20,10 @@ from study.known.pressed import DOWN
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.rigid import SPHERE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def pressed(
     times = np.linspace(0.0, 3.0 * max(ramp, 1e-3), SAMPLES)
     sphere = RigidTool("tool", SPHERE, RADIUS, TOP, DOWN, travel)
     distance = Ellipsoid(TOP - [0.0, 0.0, 0.014], np.full(3, BALL))
-    tissue = VariedTissue(
+    tissue = HeterogeneousTissue(
         poisson_ratio=nu,
         regions=(Region(name="ball", distance=distance, youngs_modulus=contrast * 9.5e3),),
     )

@@ -7,12 +7,12 @@ from dataclasses import replace
 from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION
 from study.scene import Scene
-from study.tradeoff.lineup import Configuration, is_moved
+from study.tradeoff.contenders import Configuration, is_moved
 
 DOUBLE = "double"
 
 
-def in_words(one: Configuration) -> str:
+def described(one: Configuration) -> str:
     """What it is, for a person."""
     given = one.settings
     if one.contender == "superposition":

@@ -20,8 +20,8 @@ from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.scene import Scene
 from study.scene.problem import OUTSIDE, problem_of
-from study.validation.own_data import Curve, OwnMarkers, read_curve, read_markers
-from study.validation.rows import ORDER, Comparison
+from study.validation.comparison import ORDER, Comparison
+from study.validation.user_data import Curve, UserMarkers, read_curve, read_markers
 
 Floats = NDArray[np.float64]
 
@@ -32,14 +32,14 @@ COARSER_SPACING = 4.0 / 3.0
 
 
 @dataclass(frozen=True)
-class OwnData:
+class UserData:
     """What a folder holds: curves by the name of their file, markers."""
 
     curves: dict[str, Curve]
-    markers: OwnMarkers | None
+    markers: UserMarkers | None
 
 
-def read_folder(folder: Path) -> OwnData:
+def read_folder(folder: Path) -> UserData:
     """All CSV files of a folder. ValueError for a folder without, or a file that is no such."""
     if not folder.is_dir():
         raise ValueError(f"--data {folder}: there is no such folder; give one with CSV files")
@@ -57,11 +57,11 @@ def read_folder(folder: Path) -> OwnData:
         if twice:
             raise ValueError(f"--data {folder}: holds {min(twice)} twice; rename one of them")
     markers = read_markers(of_markers[0]) if of_markers else None
-    return OwnData({one.stem: read_curve(one) for one in curves}, markers)
+    return UserData({one.stem: read_curve(one) for one in curves}, markers)
 
 
 def comparisons(
-    scene: Scene, data: OwnData, progress: Progress, probe: str | None = None
+    scene: Scene, data: UserData, progress: Progress, probe: str | None = None
 ) -> Iterator[Comparison]:
     """Each model of the scene beside what was measured: curves by their rms, markers likewise.
 
@@ -94,7 +94,7 @@ def comparisons(
             yield _of_markers(data.markers, model.label, moved(found), own)
 
 
-def _marked(problem: Problem, markers: OwnMarkers) -> Problem:
+def _marked(problem: Problem, markers: UserMarkers) -> Problem:
     """The problem seen at the markers too, after its control points.
 
     ValueError naming the line of one outside of the organ, where models have nothing to say.
@@ -227,7 +227,7 @@ def _of_curve(name: str, curve: Curve, label: str, found: Floats, own: Floats | 
     )
 
 
-def _of_markers(markers: OwnMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
+def _of_markers(markers: UserMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
     """The same of the markers when the load is largest."""
     spread = markers.uncertainty
     return Comparison(

@@ -46,7 +46,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class OwnMarkers:
+class UserMarkers:
     """Places and displacements [m] (m, 3) of markers; their standard uncertainty [m] (m,).
 
     `lines` (m,) of the file that they stand in, for messages.
@@ -71,11 +71,11 @@ def read_curve(path: Path) -> Curve:
     return Curve(found[0], times, values, _uncertainty(table))
 
 
-def read_markers(path: Path) -> OwnMarkers:
+def read_markers(path: Path) -> UserMarkers:
     """Markers from a CSV file; ValueError naming file, line and column for a file without."""
     table = _table(path)
     numbers = table.numbers((*PLACES, *MOVES))
-    return OwnMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(table), table.lines)
+    return UserMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(table), table.lines)
 
 
 def _uncertainty(table: _Table) -> Floats | None:

@@ -39,7 +39,7 @@ class Job(NamedTuple):
     work: Callable[[Progress], Any]
 
 
-class Lanes(Protocol):
+class JobPool(Protocol):
     """Takes jobs as they come, and gives their results once all are there."""
 
     def start(self, job: Job) -> None:
@@ -62,19 +62,19 @@ def can_fork() -> bool:
 
 
 @contextmanager
-def lanes(count: int, progress: Progress) -> Iterator[Lanes]:
+def job_pool(count: int, progress: Progress) -> Iterator[JobPool]:
     """So many jobs side by side, or one after another; no process is left when the block ends."""
     if count < 2 or not can_fork():
-        yield _OneLane(progress)
+        yield _SerialPool(progress)
         return
-    found = _Processes(count, progress)
+    found = _ProcessPool(count, progress)
     try:
         yield found
     finally:
         found.stop()
 
 
-class _OneLane:
+class _SerialPool:
     """Jobs in this process, in their order, when results are asked for."""
 
     def __init__(self, progress: Progress) -> None:
@@ -111,7 +111,7 @@ class _Worker:
         self.pipe.send(number)
 
 
-class _Processes:
+class _ProcessPool:
     """Jobs in processes of their own; this one only waits."""
 
     def __init__(self, count: int, progress: Progress) -> None:
@@ -159,7 +159,7 @@ class _Processes:
                 self.found[self.jobs[worker.at].name] = content[0]
                 worker.at = -1
             case "failed":
-                raise content[0] from _Elsewhere(content[1])
+                raise content[0] from _RemoteTraceback(content[1])
             case "begin":
                 stage = self.progress.stage(content[1])
                 worker.stages[content[0]] = stage, stage.__enter__()
@@ -178,7 +178,7 @@ class _Processes:
         self.workers.clear()
 
 
-class _Elsewhere(Exception):  # noqa: N818 - the cause of one, and only shown
+class _RemoteTraceback(Exception):  # noqa: N818 - the cause of one, and only shown
     """Where something was raised in another process."""
 
     def __str__(self) -> str:
@@ -228,7 +228,7 @@ def _undisturbed() -> Iterator[None]:
 def _serve(pipe: Connection, jobs: list[Job], progress: Progress) -> NoReturn:
     """Do jobs as their numbers come, until the pipe is closed. Nothing of the parent is unwound."""
     try:
-        _heed_the_parent()
+        _follow_parent()
         with ExitStack() as stack:
             stack.callback(pipe.close)
             while (number := pipe.recv()) is not None:
@@ -237,17 +237,17 @@ def _serve(pipe: Connection, jobs: list[Job], progress: Progress) -> NoReturn:
         os._exit(0)
 
 
-def _heed_the_parent() -> None:
+def _follow_parent() -> None:
     """Leave what is typed at the terminal to the parent, and end with it."""
     for number in signals.numbers():
         # One that waits to be answered would be lost if it were ignored, be it for a moment.
         ends = number == signal.SIGTERM
         signal.signal(number, signal.SIG_DFL if ends else signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, signals.numbers())
-    Thread(target=_end_with_the_parent, daemon=True).start()
+    Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def _end_with_the_parent() -> None:
+def _exit_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -46,7 +46,7 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class StationFactor:
     """The factor of a station: its share of the tool, wherever that is, times the tool's history.
 
     `times` [s] and `marks` [m] (c,): when the tool is how far on its way, linear in between, at
@@ -121,37 +121,40 @@ def stations(corners: Floats, distance: float) -> tuple[Stations, Floats]:
     return found, np.concatenate([[0.0], np.cumsum(lengths)])
 
 
-def turns(
+def station_loads(
     found: Stations,
     places: Floats,
     times: Floats,
     marks: Floats,
     history: Callable[[Floats], Floats],
     same: float,
-) -> Iterator[tuple[Floats, Turn]]:
+) -> Iterator[tuple[Floats, StationFactor]]:
     """Place [m] (3,) and factor of each station, of those less than `same` [m] apart as one."""
     shares, left = found.shares(), list(range(len(places)))
     while left:
         here = places[left[0]]
         at = [n for n in left if np.linalg.norm(places[n] - here) < same]
         left = [n for n in left if n not in at]
-        yield here, Turn(times, marks, tuple(one for n in at for one in shares[n]), history)
+        yield (
+            here,
+            StationFactor(times, marks, tuple(one for n in at for one in shares[n]), history),
+        )
 
 
-def ways(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
+def travel_paths(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
     """Places [m] (tools, OUTLINE, 3), equally spaced in time, of each tool that travels.
 
     `loads`: name of the tool, place [m] (3,) and factor of each load.
     """
-    stations: dict[str, list[tuple[Floats, Turn]]] = {}
+    stations: dict[str, list[tuple[Floats, StationFactor]]] = {}
     for name, place, factor in loads:
-        if isinstance(factor, Turn):
+        if isinstance(factor, StationFactor):
             stations.setdefault(name, []).append((place, factor))
     found = [_outline(one) for one in stations.values()]
     return np.stack(found) if found else np.zeros((0, OUTLINE, 3))
 
 
-def _outline(stations: Sequence[tuple[Floats, Turn]]) -> Floats:
+def _outline(stations: Sequence[tuple[Floats, StationFactor]]) -> Floats:
     times = stations[0][1].times
     at = np.linspace(times[0], times[-1], OUTLINE)
     shares = np.column_stack([turn.share(at) for _, turn in stations])
@@ -163,4 +166,4 @@ def full_share(history: Callable[[Floats], Floats], time: float) -> float:
 
     `time` [s]: at which the tool is where its rest is told.
     """
-    return float(history.share(np.array([time]))[0]) if isinstance(history, Turn) else 1.0
+    return float(history.share(np.array([time]))[0]) if isinstance(history, StationFactor) else 1.0

@@ -42,7 +42,7 @@ class Contender:
 
     def lacks(self, scene: Scene) -> list[str]:
         """Names of what a scene asks that it cannot follow."""
-        able = kind(self.model).able - self.unable
+        able = kind(self.model).supported_features - self.unable
         return [feature for feature in scene.features if feature not in able]
 
 
@@ -216,7 +216,7 @@ def contender(name: str) -> Contender:
     """
     if name in CONTENDERS:
         return CONTENDERS[name]
-    if name not in MODELS or kind(name).of_patient:
+    if name not in MODELS or kind(name).patient_specific:
         raise ValueError(
             f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}, or a model of "
             "the scene that needs no estimate"
@@ -227,7 +227,7 @@ def contender(name: str) -> Contender:
 def contenders_of(scene: Scene) -> list[str]:
     """All contenders that can follow a scene, and its own models that need no estimate."""
     entered = {one.model for one in CONTENDERS.values()}
-    own = [name for name in scene.models if name not in entered and not kind(name).of_patient]
+    own = [name for name in scene.models if name not in entered and not kind(name).patient_specific]
     return [name for name in (*CONTENDERS, *own) if not contender(name).lacks(scene)]
 
 

@@ -26,7 +26,7 @@ from study.models.model import Prepared
 from study.models.table import kind, model
 from study.problem.problem import Problem
 from study.results.provenance import organ_sha256
-from study.run.ready import set_up
+from study.run.preparation import prepare_models
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
@@ -43,7 +43,7 @@ WATCHED = {"runge-kutta-4": 1600, "split-volume": 400}
 LEAPS, LEAP = 40, 1e3
 """Implicit steps to rest, and how many times the explicit limit each is."""
 NEAR_REST = 1e-9
-HERE = "study.known.stability.cases.own_scene"
+HERE = "study.known.stability.cases.user_scene"
 
 
 def cases(scene: Scene) -> Iterator[Case]:
@@ -64,7 +64,7 @@ def refuse(scene: Scene) -> None:
     """ValueError for a scene of which a model cannot be set up, found before any case is run."""
     _refuse_point(scene)
     free = _free(scene)
-    set_up((model(free, name) for name in tried(free)), problem_of(free))
+    prepare_models((model(free, name) for name in tried(free)), problem_of(free))
 
 
 def _refuse_point(scene: Scene) -> None:
@@ -79,7 +79,7 @@ def _free(scene: Scene) -> Scene:
 
 def tried(scene: Scene) -> list[str]:
     """Kinds of models that are tried on a scene."""
-    others = (n for n in scene.models if n != "fem" and not kind(n).of_patient)
+    others = (n for n in scene.models if n != "fem" and not kind(n).patient_specific)
     return list(dict.fromkeys(("tissue", *others)))
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from study.folders import tell
 from study.stages.fingerprint import key
-from study.stages.flat import Arrays
+from study.stages.serialisation import Arrays
 from study.stages.store import Store
 
 
@@ -28,7 +28,7 @@ _CURRENT: ContextVar[_Current | None] = ContextVar("current", default=None)
 
 
 @contextmanager
-def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
+def using_store(store: Store | None, *, readable: bool = True) -> Iterator[None]:
     """Let what is made in the block be kept in a store, and taken from it if it is readable."""
     token = _CURRENT.set(None if store is None else _Current(store, readable))
     try:
@@ -38,7 +38,7 @@ def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
 
 
 def kept(name: str, *given: object, modules: tuple[str, ...]) -> Arrays | None:
-    """What `made_once` would take from the store, None where it would make it."""
+    """What `cached_arrays` would take from the store, None where it would make it."""
     current, found = _CURRENT.get(), key(name, *given, modules=modules)
     if current is None or found is None or not current.readable:
         return None
@@ -46,7 +46,7 @@ def kept(name: str, *given: object, modules: tuple[str, ...]) -> Arrays | None:
     return None if entry is None else entry.arrays
 
 
-def made_once(
+def cached_arrays(
     name: str, make: Callable[[], Arrays], *given: object, modules: tuple[str, ...]
 ) -> Arrays:
     """Arrays by name that `make` gives, or gave before of equal `given` by the same modules."""

@@ -58,7 +58,7 @@ class Region:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VariedTissue(Tissue):
+class HeterogeneousTissue(Tissue):
     """Tissue round regions; where several meet, the last of them counts.
 
     `mapped`: Young's modulus [Pa] (...) at points (..., 3) outside all regions, NaN where nothing
@@ -89,7 +89,7 @@ class Composition:
     its inverse there times this share [1/Pa]. The rest is the tissue around.
     """
 
-    tissue: VariedTissue
+    tissue: HeterogeneousTissue
     share: Floats
     mapped_share: Floats
     mapped: Floats
@@ -124,7 +124,7 @@ class Composition:
 
 def composition(tissue: Tissue | None, count: int, points: Points) -> Composition | None:
     """What each of so many cells is made of; None for tissue that is the same everywhere."""
-    if not isinstance(tissue, VariedTissue):
+    if not isinstance(tissue, HeterogeneousTissue):
         return None
     share = np.zeros((count, len(tissue.regions)))
     mapped_share, mapped = np.zeros(count), np.zeros(count)
@@ -162,7 +162,7 @@ def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
 
 def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
     """What each tetrahedron is made of; None for tissue that is the same everywhere."""
-    if not isinstance(tissue, VariedTissue):  # and SciPy's statistics take a while to load
+    if not isinstance(tissue, HeterogeneousTissue):  # and SciPy's statistics take a while to load
         return None
     corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
@@ -171,7 +171,7 @@ def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition |
 def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
     """How much of the organ is of other tissue than around."""
     made = of_tetrahedra(mesh, tissue)
-    if made is None or not isinstance(tissue, VariedTissue):
+    if made is None or not isinstance(tissue, HeterogeneousTissue):
         return ()
     size = volumes(mesh)
     found = [

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 
-class Tally(NamedTuple):
+class SweepStatus(NamedTuple):
     """Counts of a sweep: `stored` were there before; `failed` includes the crashed."""
 
     total: int
@@ -30,7 +30,7 @@ class Tally(NamedTuple):
         ran = self.done + self.failed
         return self.seconds / ran * (self.total - self.finished) if ran else None
 
-    def counting(self, done: bool, seconds: float) -> Tally:
+    def counting(self, done: bool, seconds: float) -> SweepStatus:
         """With one more run, done or not, after so many seconds of the sweep."""
         return self._replace(
             done=self.done + done, failed=self.failed + (not done), seconds=seconds
@@ -46,7 +46,7 @@ class Tally(NamedTuple):
         return ", ".join(parts)
 
 
-Tell = Callable[[Tally], None]
+ReportStatus = Callable[[SweepStatus], None]
 
 SECONDS = 15.0
 """Between two lines where stderr is no terminal."""
@@ -59,38 +59,38 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def silent(_: Tally) -> None:
+def silent(_: SweepStatus) -> None:
     """Tell nothing."""
 
 
 @dataclass
-class TallyLines:
+class StatusLines:
     """A line at the beginning, at the end, and every so many seconds between."""
 
     name: str
     seconds: float = SECONDS
     told: float = float("-inf")
 
-    def __call__(self, tally: Tally) -> None:
+    def __call__(self, status: SweepStatus) -> None:
         """Tell, if it is time."""
         now = time.monotonic()
-        if now - self.told >= self.seconds or tally.finished == tally.total:
+        if now - self.told >= self.seconds or status.finished == status.total:
             self.told = now
-            print(f"{self.name}: {tally}", file=sys.stderr, flush=True)  # noqa: T201 - its job
+            print(f"{self.name}: {status}", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 
 @contextmanager
-def on_stderr(name: str) -> Iterator[Tell]:
+def on_stderr(name: str) -> Iterator[ReportStatus]:
     """A bar if stderr is a terminal, else lines."""
     if not sys.stderr.isatty():
-        yield TallyLines(name)
+        yield StatusLines(name)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     columns = (TextColumn(name), BarColumn(), TextColumn("{task.fields[tally]}"))
     with Progress(*columns, console=Console(stderr=True)) as bars:
-        bar = bars.add_task(name, tally="")
-        yield lambda tally: bars.update(
-            bar, total=tally.total, completed=tally.finished, tally=str(tally)
+        bar = bars.add_task(name, status="")
+        yield lambda status: bars.update(
+            bar, total=status.total, completed=status.finished, status=str(status)
         )

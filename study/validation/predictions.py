@@ -41,7 +41,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Answer:
+class Prediction:
     """States at the `factors` (k,) that were reached; `failure` says why there are no more.
 
     `displacement` [m] (k, q, 3) at the points watched; `force` [N] (k,) of the whole body on the
@@ -55,25 +55,27 @@ class Answer:
     failure: str = ""
 
 
-Solve = Callable[[Specimen, int, float, tuple[float, ...]], Answer]
+Solve = Callable[[Specimen, int, float, tuple[float, ...]], Prediction]
 """From a specimen, the number of its mesh or spacing, Young's modulus [Pa] and the factors."""
 
 
 def neo_hookean(
     specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
-) -> Answer:
+) -> Prediction:
     """Finite elements at large strain."""
     solid, drive, watched = _elements(specimen, level, modulus)
     path = solve_driven(solid, drive, factors)
     return _told(specimen, solid, watched, path.states, path.failure)
 
 
-def linear(specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]) -> Answer:
+def linear(
+    specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
+) -> Prediction:
     """Finite elements of linear elasticity: one solution, in proportion."""
     solid, drive, watched = _elements(specimen, level, modulus)
     whole = _told(specimen, solid, watched, (solve_linear(solid, drive),), "")
     share = np.array(factors)
-    return Answer(
+    return Prediction(
         share,
         share[:, None, None] * whole.displacement,
         share * whole.force,
@@ -121,11 +123,11 @@ def _told(
     watched: csr_array,
     states: tuple[DrivenState, ...],
     failure: str,
-) -> Answer:
+) -> Prediction:
     face, axis = specimen.face(solid.points), specimen.along[0]
     moved = [watched @ state.displacement for state in states]
     force = [specimen.parts * state.reaction[face, axis].sum() for state in states]
-    return Answer(
+    return Prediction(
         np.array([state.factor for state in states]),
         np.reshape(moved, (len(states), watched.shape[0], 3)),
         np.array(force),
@@ -179,7 +181,7 @@ def _network(specimen: Specimen, level: int, chosen: _Springs) -> tuple[CellLatt
 
 def of_lattice(
     make: Make, specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
-) -> Answer:
+) -> Prediction:
     """Rests of a lattice."""
     chosen = make(specimen, level, modulus)
     lattice, net = _network(specimen, level, chosen)
@@ -188,7 +190,7 @@ def of_lattice(
     watched, _ = lattice.interpolation(specimen.watched)
     moved = [watched @ rest.displacement for rest in found.rests]
     force = [specimen.parts * rest.reaction[face, axis].sum() for rest in found.rests]
-    return Answer(
+    return Prediction(
         np.array([rest.factor for rest in found.rests]),
         np.reshape(moved, (len(found.rests), len(specimen.watched), 3)),
         np.array(force),

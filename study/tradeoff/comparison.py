@@ -14,15 +14,15 @@ import numpy as np
 
 from study.models.lattice import LatticeModel
 from study.models.spacing_error import COARSER, ORDER, force_differences
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
+from study.tradeoff.contenders import Configuration, contender, fraction
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lineup import Configuration, contender, fraction
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import SolvedReference, Truth
+from study.tradeoff.reference import ReferenceSolution, SolvedReference
 
 FINEST = 0.5
 """Spacing of the lattice that others are compared with, times that of the scene's own lattice."""
@@ -31,19 +31,19 @@ Family = tuple[str, bool]
 
 
 @dataclass(frozen=True)
-class Judge:
+class Comparison:
     """The reference, None where there is none to compare with, and the finest lattices.
 
     `solved`: the record of the reference; `why` there is none, if it was asked for.
     """
 
-    given: Stated
-    reference: Truth | None
+    given: SceneProblem
+    reference: ReferenceSolution | None
     solved: SolvedReference | None
-    finest: Mapping[Family, Truth]
+    finest: Mapping[Family, ReferenceSolution]
     why: str = ""
 
-    def truth(self, one: Configuration) -> Truth:
+    def truth(self, one: Configuration) -> ReferenceSolution:
         """What a configuration is compared with."""
         return self.finest[family(one)] if self.reference is None else self.reference
 
@@ -109,7 +109,7 @@ def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
     return Configuration(name, {"spacing": spacing, "volume_term": volume_term, **step})
 
 
-def truth_of(outcomes: Sequence[Outcome], given: Stated) -> Truth:
+def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolution:
     """The finest lattice of a family as what is compared with, from both runs of `lattices`.
 
     Its own errors are what halving the spacing changed, at an assumed order of one. ValueError
@@ -138,14 +138,14 @@ def _said(outcomes: Sequence[Outcome]) -> str:
     return ", ".join(one.message or "diverged" for one in lost)
 
 
-def _whole(outcome: Outcome, given: Stated) -> Truth | None:
+def _whole(outcome: Outcome, given: SceneProblem) -> ReferenceSolution | None:
     """What a run gave, as if it were exact; None of one that was lost."""
     found = None if outcome.value is None else restored(Observed, outcome.value)
     if found is None or found.field is None or found.curves is None or found.inverted_cells:
         return None
     samples, probes = len(given.problem.observation.times), len(given.problem.probes)
     tools = len(given.problem.rigid_tools)
-    return Truth(
+    return ReferenceSolution(
         np.reshape(found.field, (-1, 3)),
         np.reshape(found.curves, (samples, probes, 3)),
         0.0,

@@ -10,19 +10,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 
 Floats = NDArray[np.float64]
 
 
 def with_large_displacements(
-    known: Truth, linear: Outcome, near: Outcome, far: Outcome, given: Stated
-) -> Truth | None:
+    known: ReferenceSolution, linear: Outcome, near: Outcome, far: Outcome, given: SceneProblem
+) -> ReferenceSolution | None:
     """The reference with what geometry changes, None where one of the runs was not whole.
 
     `linear`: elements alone; `near` and `far`: corrected by lattices, of which the second's finest
@@ -38,10 +38,10 @@ def with_large_displacements(
     volumes = given.problem.volume_rule.weights
     own = relative_l2(whole + field_near - field_far, whole, volumes)
     apart = relative_l2_of_curves(curves_near - curves_far, moved)
-    return Truth(whole, moved, known.field_error + own, known.curve_errors + apart)
+    return ReferenceSolution(whole, moved, known.field_error + own, known.curve_errors + apart)
 
 
-def _seen(outcome: Outcome, known: Truth) -> tuple[Floats, Floats] | None:
+def _seen(outcome: Outcome, known: ReferenceSolution) -> tuple[Floats, Floats] | None:
     """Field and curves of a run, None where it was not whole."""
     if outcome.value is None:
         return None
