@@ -22,7 +22,7 @@ from study.results.folder import write
 from study.run.study import run_study
 from study.scene.file import read_scene
 from study.similarity.score import MEASURES
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import study as tradeoff
 from study.tradeoff.contenders import configurations
@@ -235,7 +235,7 @@ def test_the_toy_model_is_timed_by_the_tradeoff(scene, tmp_path):
     chosen = configurations(given, ["toy"])
     assert [one.contender for one in chosen] == ["toy"]
     assert "toy" in {one.contender for one in configurations(given)}
-    found = tradeoff.study(given, chosen, Store(tmp_path / "runs"), How(), 1, Silent())
+    found = tradeoff.study(given, chosen, Store(tmp_path / "runs"), Backend(), 1, Silent())
     (entry,) = found.entries
     assert entry.errors.status == "resolved"
     assert entry.cost.timing.step[1] > 0.0

@@ -700,7 +700,7 @@ class Told:
 
 
 def test_stages_of_several_processes_are_told_to_one(monkeypatch):
-    monkeypatch.setattr("study.stages.job_pool.PAUSE", 0.0)
+    monkeypatch.setattr("study.stages.job_pool.PROGRESS_INTERVAL", 0.0)
 
     def work(progress):
         with progress.stage("within") as advance:

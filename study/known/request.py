@@ -16,7 +16,7 @@ from study.known.trial import attempted
 from study.progress import Progress
 from study.run.suiting import read_suited
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
 
@@ -63,7 +63,7 @@ class StabilityRequest:
 
     def refuse(self) -> None:
         """ValueError, before anything is run, for a scene, folder or workers that will not do."""
-        _ = How(self.workers, self.scheduler)
+        _ = Backend(self.workers, self.scheduler)
         for folder in (self.folder, self.store.folder):
             refuse_unwritable(folder, lambda _: None, "stability study")
         from study.known.stability.cases import user_scene  # compiled, as suite's
@@ -81,9 +81,9 @@ def study(request: StabilityRequest, progress: ReportStatus = silent) -> list[Ca
     """Verdicts on all cases asked for, which are also written as a table."""
     request.refuse()
     chosen = request.cases()
-    how = How(request.workers, request.scheduler)
+    backend = Backend(request.workers, request.scheduler)
     with claimed(request.folder):
-        outcomes = run([case.task for case in chosen], request.store, how, progress)
+        outcomes = run([case.task for case in chosen], request.store, backend, progress)
         verdicts = judged(chosen, outcomes)
         with naming(request.folder):
             request.folder.mkdir(parents=True, exist_ok=True)

@@ -30,7 +30,7 @@ from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.canonical import Plain
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
 from study.sweep.task import Task
@@ -77,9 +77,9 @@ class OrganRequest:
         return Store(self.folder.with_name(f"{self.folder.name}-runs"))
 
     @property
-    def how(self) -> How:
+    def backend(self) -> Backend:
         """Where to run."""
-        return How(self.workers, self.scheduler)
+        return Backend(self.workers, self.scheduler)
 
     @cached_property
     def given(self) -> Plain:
@@ -126,7 +126,7 @@ def _refuse_moved(scene: Scene) -> None:
 
 def planned(request: OrganRequest) -> str:
     """What a request would run, and for how long. ValueError of one that cannot be run."""
-    _ = request.how
+    _ = request.backend
     return str(plan([*request.tasks(), *request.again_tasks()], request.store))
 
 
@@ -144,10 +144,10 @@ def study(request: OrganRequest, progress: ReportStatus = silent) -> Found:
     Raises ValueError for a scene with nothing to draw, a size that is no power of two, a folder
     that cannot be written, or a block that failed.
     """
-    how = request.how
+    backend = request.backend
     tasks, again = request.tasks(), request.again_tasks()
     request.folder.mkdir(parents=True, exist_ok=True)
-    outcomes = run([*tasks, *again], request.store, how, progress)
+    outcomes = run([*tasks, *again], request.store, backend, progress)
     found = _found(gathered(outcomes), len(tasks), request.about)
     _write(found, request)
     return found

@@ -18,7 +18,7 @@ from study.robustness.unknowns import UNKNOWNS, Draw, draws
 from study.scene.file import read_scene
 from study.similarity.batch import COLUMNS
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
 from study.sweep.task import Task
@@ -87,10 +87,10 @@ def study(request: RobustnessRequest, progress: ReportStatus = silent) -> list[r
     Raises ValueError for a size that is no power of two, a folder that cannot be written, or a
     block that failed.
     """
-    how = How(request.workers, request.scheduler)
+    backend = Backend(request.workers, request.scheduler)
     tasks = request.tasks()
     request.folder.mkdir(parents=True, exist_ok=True)
-    found = _gathered(run(tasks, request.store, how, progress))
+    found = _gathered(run(tasks, request.store, backend, progress))
     nearest, table_iii = list(summary.nearest(found)), list(summary.table_three(found))
     write_table(request.folder / NEAREST, rows.Nearest, nearest)
     write_table(request.folder / DIFFERENCES, rows.Difference, summary.differences(found))

@@ -33,7 +33,7 @@ from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.tradeoff import study
 from study.tradeoff.comparison import Comparison
@@ -132,7 +132,7 @@ def recommend(
     scene: Scene,
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
     *,
     known_place: bool = False,
@@ -146,17 +146,17 @@ def recommend(
     spacings = every[: len(FITTED)] if study.has_reference(scene) else every
     tried = [_configuration(scene, h) for h in spacings]
     single = [_configuration(scene, spacings[-1], SINGLE)] if may_be_single(scene) else []
-    comparison, outcomes = study.judged(coarser, [*tried, *single], store, how)
+    comparison, outcomes = study.judged(coarser, [*tried, *single], store, backend)
     given, followed = comparison.given, None
     if known_place and comparison.reference is not None:
-        followed = _followed(given, comparison.reference, store, how)
+        followed = _followed(given, comparison.reference, store, backend)
         comparison = replace(comparison, reference=followed.known)
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
     promises = _promises(comparison, tried, outcomes, every)
     candidates = _candidates(given, promises, added, wanted, progress)
     if followed is not None:
         candidates += _bound(given, followed, wanted, progress)
-    found = _verified(comparison, candidates, wanted, store, how, progress)
+    found = _verified(comparison, candidates, wanted, store, backend, progress)
     return replace(found, against=comparison.words if comparison.finest else "")
 
 
@@ -282,13 +282,15 @@ class Followers:
     known: ReferenceSolution
 
 
-def _followed(given: SceneProblem, known: ReferenceSolution, store: Store, how: How) -> Followers:
+def _followed(
+    given: SceneProblem, known: ReferenceSolution, store: Store, backend: Backend
+) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
     Without runs that tell what geometry changes, those of small displacements are left out.
     """
     chosen = list(bound(given.scene))
-    _, outcomes = study.judged(given.scene, chosen, store, how)
+    _, outcomes = study.judged(given.scene, chosen, store, backend)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
@@ -357,12 +359,12 @@ def _verified(
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
 ) -> Recommended:
     """The best candidate run and timed afresh, or the best of the others if it fails that."""
     given, chosen = comparison.given, best(candidates, wanted)
-    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, how)
+    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, backend)
     measured = comparison.errors(chosen.configuration, outcome)
     (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
@@ -373,7 +375,7 @@ def _verified(
     met = met and (wanted.error is None or (measured.judged or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(comparison, others, wanted, store, how, progress)
+        return _verified(comparison, others, wanted, store, backend, progress)
     wall = cost.timing.step[1] / cost.step
     return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 

@@ -19,7 +19,7 @@ from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.plan import plan
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
 from study.tradeoff.contenders import configurations, is_moved
@@ -48,9 +48,9 @@ class TradeoffRequest:
         return Path(self.scene).stem
 
     @property
-    def how(self) -> How:
+    def backend(self) -> Backend:
         """Where to run."""
-        return How(self.workers, self.scheduler)
+        return Backend(self.workers, self.scheduler)
 
     @property
     def folder(self) -> Path:
@@ -68,7 +68,7 @@ def _ready(request: TradeoffRequest) -> Scene:
     ValueError, before anything is run, for a scene, a folder or workers that will not do.
     """
     scene = sampled(request.read())
-    _ = request.how
+    _ = request.backend
     study.refuse_unwritable(request.folder)
     _set_up(scene)
     return scene
@@ -94,9 +94,9 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     scene, folder = _ready(request), request.folder
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
-    how = request.how
+    backend = request.backend
     with study.place(folder) as partial:  # refused now, not after the work
-        found = study.study(scene, chosen, _store(folder), how, repeats, progress)
+        found = study.study(scene, chosen, _store(folder), backend, repeats, progress)
         study.write(found, scene, repeats, partial)
     return [*table.lines(found.entries), *_against(found), f"table in {folder / study.TABLE}"]
 
@@ -150,7 +150,7 @@ def advise(
     if known_place:
         model(given, "corrected").prepare(problem)
     found = recommend.recommend(
-        sampled(given), wanted, store, request.how, progress, known_place=known_place
+        sampled(given), wanted, store, request.backend, progress, known_place=known_place
     )
     noted = dict.fromkeys((*given.remarks, *problem.notes))
     notes = (f"note: {note}" for note in noted)

@@ -20,7 +20,7 @@ from study.run.scene_problem import SceneProblem, scene_arguments, scene_problem
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.canonical import Plain, restored
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import on_stderr
 from study.sweep.store import Store
 from study.sweep.task import Task
@@ -69,7 +69,7 @@ def _finest(scene: Scene, chosen: Sequence[Configuration]) -> list[Configuration
 
 
 def judged(
-    scene: Scene, chosen: Sequence[Configuration], store: Store, how: How
+    scene: Scene, chosen: Sequence[Configuration], store: Store, backend: Backend
 ) -> tuple[Comparison, list[Outcome]]:
     """What configurations are compared with, and the outcome of each.
 
@@ -78,7 +78,7 @@ def judged(
     if not has_reference(scene):
         refuse_unlike(scene, chosen)
     with on_stderr("errors") as tell:
-        outcomes = run(tasks(scene, chosen), store, how, tell)
+        outcomes = run(tasks(scene, chosen), store, backend, tell)
     given, known, value, why = scene_problem(**scene_arguments(scene)), None, None, ""
     if has_reference(scene):
         first, *outcomes = outcomes
@@ -108,13 +108,13 @@ def study(
     scene: Scene,
     chosen: Sequence[Configuration],
     store: Store,
-    how: How,
+    backend: Backend,
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> Found:
     """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
-    comparison, outcomes = judged(scene, chosen, store, how)
+    comparison, outcomes = judged(scene, chosen, store, backend)
     entries = compared(comparison, chosen, outcomes, repeats, progress, clock)
     known = comparison.reference
     own = [] if known is None else map(float, known.curve_errors)
