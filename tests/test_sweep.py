@@ -329,7 +329,7 @@ def test_progress_counts_stored_done_and_failed_and_says_how_long_it_takes(store
     run(squares(2), store)
     told = []
     run([*squares(4), task("fail", x=1)], store, progress=told.append)
-    assert [tally[:4] for tally in told] == [
+    assert [status[:4] for status in told] == [
         (5, 2, 0, 0), (5, 2, 1, 0), (5, 2, 2, 0), (5, 2, 2, 1),
     ]  # fmt: skip
     assert told[0].seconds_left is None

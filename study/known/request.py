@@ -1,4 +1,4 @@
-"""`verify` and `stability` as the command line asks for them: cases run, stored and judged."""
+"""Requests of the commands `verify` and `stability`: cases run, stored and judged."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from study.sweep.store import Store
 
 
 def verify(progress: Progress, *, quick: bool = False) -> list[CaseVerdict]:
-    """Verdicts on all problems with exact solutions, or on those that take about a second.
+    """Verdicts on all problems with exact solutions, or with `quick` on those of about a second.
 
-    They are solved here and now, one after another, and nothing is stored.
+    They are solved in this process, one after another, and nothing is stored.
     """
     return [tried(case, progress) for case in PROBLEMS if case.quick or not quick]
 
@@ -39,7 +39,7 @@ def tried(case: Case, progress: Progress) -> CaseVerdict:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityRequest:
-    """A scene by name or file, the folder to write, where to run, and whether only quick cases."""
+    """A scene by name or file, the folder to write, where to run, and which cases."""
 
     scene: str = "block"
     out: Path | None = None
@@ -62,7 +62,7 @@ class StabilityRequest:
         return stability_cases(read_suited(self.scene, ()), quick=self.quick)
 
     def refuse(self) -> None:
-        """ValueError, before anything is run, for a scene, folder or workers that will not do."""
+        """Raise ValueError, before anything is run, for an unsuitable scene, folder or workers."""
         _ = Backend(self.workers, self.scheduler)
         for folder in (self.folder, self.store.folder):
             refuse_unwritable(folder, lambda _: None, "stability study")
@@ -78,7 +78,7 @@ def planned(request: StabilityRequest) -> str:
 
 
 def study(request: StabilityRequest, progress: ReportStatus = silent) -> list[CaseVerdict]:
-    """Verdicts on all cases asked for, which are also written as a table."""
+    """Verdicts on all requested cases, which are also written as a table."""
     request.refuse()
     chosen = request.cases()
     backend = Backend(request.workers, request.scheduler)
@@ -106,5 +106,5 @@ def _findings(outcome: Outcome) -> tuple[Finding, ...]:
 
 
 def all_passed(verdicts: Sequence[CaseVerdict]) -> bool:
-    """Whether a command that ran these cases ends well."""
+    """Whether all cases passed, so that the command succeeds."""
     return all(verdict.passed for verdict in verdicts)

@@ -73,8 +73,8 @@ class Results:
     """Content of a results folder.
 
     `record`: the numbers; then the rows of the tables. `fields`: arrays of the surface and of each
-    model's displacement on it, `fuzzy`: sets and output surfaces, both to be drawn and empty where
-    a scene has none.
+    model's displacement on it; `fuzzy`: sets and output surfaces. Both are for figures, and empty
+    where a scene has none.
     """
 
     scene: Scene
@@ -95,7 +95,7 @@ class Results:
 
     @classmethod
     def load(cls, folder: Path | str) -> Results:
-        """Content of a folder, checked whole; see `read`."""
+        """Content of a folder, fully checked; see `read`."""
         return read(Path(folder))
 
     def model(self, name: str) -> ModelRecord:
@@ -106,9 +106,9 @@ class Results:
         raise KeyError(f"{name}: not among {', '.join(one.name for one in self.record.models)}")
 
     def tool_force(self, model: str, tool: str) -> ToolCurve:
-        """Force of a rigid tool on a model's body, up to where a run was lost.
+        """Force of a rigid tool on a model's body, up to the end of the run.
 
-        KeyError for a model or tool that there is not.
+        KeyError for an unknown model or tool.
         """
         self.model(model)
         if tool not in {one.tool for one in self.record.tools}:
@@ -119,8 +119,8 @@ class Results:
     def curve(self, model: str, probe: str) -> Motion:
         """Time [s], displacement [m] and velocity [m/s] along the push, (samples,) each.
 
-        Samples that a diverged run lost are missing. KeyError for a model or probe that there is
-        not.
+        Samples after the divergence of a run are missing. KeyError for an unknown model or control
+        point.
         """
         self.model(model)
         if probe not in self.record.probes:
@@ -130,9 +130,10 @@ class Results:
 
 
 def write(results: Results, folder: Path) -> None:
-    """Write the files of a results folder into a folder with nothing but fields; see `replacing`.
+    """Write the files of a results folder into a folder that holds nothing but fields.
 
-    Their checksums last: they cover the fields of all nodes that the models have left there.
+    The checksums are written last: they include the fields of all nodes that the models have
+    written.
     """
     (folder / SCENE).write_text(write_scene(results.scene), encoding="utf-8")
     write_table(folder / "curves.csv", CurveSample, results.curves)
@@ -162,11 +163,11 @@ def _write_record(record: StudyRecord, path: Path, sums: Mapping[str, str]) -> N
 
 
 def read(folder: Path) -> Results:
-    """Read a results folder and check it whole.
+    """Read a results folder and check it completely.
 
-    Raises ResultsError, with file and, in a table, line, for a folder that holds no results or
-    those of another version, that lacks a file or has one of another run, or in which a row or an
-    array is missing, one too many, changed or not of its scene.
+    Raises ResultsError, with the file and, in a table, the line: for a folder that holds no results
+    or those of another version, that lacks a file or has one of another run, or in which a row or
+    an array is missing, unexpected, changed or inconsistent with its scene.
     """
     try:
         table = _numbers(folder)
@@ -192,9 +193,9 @@ def read(folder: Path) -> Results:
 
 
 def summary(folder: Path, scene: Scene) -> Results | None:
-    """Numbers of a folder that a run of the scene has left: its record, differences of the field.
+    """Numbers of a folder that a run of the scene has left: its record and field differences.
 
-    None if it is not as that run left it; its content is taken for that of the scene.
+    None if the folder is not as that run left it; its content is assumed to be that of the scene.
     """
     try:
         table = _numbers(folder)
@@ -208,7 +209,7 @@ def summary(folder: Path, scene: Scene) -> Results | None:
 
 
 def _content(folder: Path, table: Mapping[str, object]) -> Results:
-    """All files in memory. ValueError naming file and line of what is damaged or does not fit."""
+    """All files in memory. ValueError naming file and line of what is damaged or inconsistent."""
     record, scene = _record(table), _scene(folder)
     results = Results(
         scene,
@@ -241,7 +242,7 @@ def _refuse(folder: Path, name: str) -> NoReturn:
 
 
 def _check_mixed(folder: Path, table: Mapping[str, object], sums: Mapping[str, str]) -> None:
-    """Checksums that somebody made again do not make the files of two runs one."""
+    """Raise where files of two runs were mixed, even if somebody recomputed the checksums."""
     wanted = table.get(CHECKSUMS)
     wanted = wanted if isinstance(wanted, dict) else {}
     for name in sorted(sums.keys() | wanted.keys() - {MARK}):
@@ -274,7 +275,7 @@ def _finite(text: str) -> float:
 
 
 def _record(table: Mapping[str, object]) -> StudyRecord:
-    """ValueError naming the key that is missing or no value of its kind."""
+    """Raise ValueError naming a key that is missing or has a value of the wrong type."""
     from pydantic import ValidationError
 
     try:
@@ -309,7 +310,7 @@ def _check_version(folder: Path, table: Mapping[str, object]) -> None:
 
 
 def replacing(folder: Path) -> AbstractContextManager[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
     FolderError before the block if `folder` holds anything but results, or cannot be written.
     """
@@ -335,9 +336,9 @@ def _foreign(present: set[str]) -> str | None:
 
 @contextmanager
 def told_to_start_again() -> Iterator[None]:
-    """Give an OSError of the block that says nothing of how to go on a note that does.
+    """Add a note on how to continue to an OSError of the block that has none.
 
-    Such is one of moving results into place, when `continuing` has removed what it kept.
+    Such an error occurs when results are moved into place, after `continuing` removed its states.
     """
     try:
         yield
@@ -349,10 +350,10 @@ def told_to_start_again() -> Iterator[None]:
 
 @contextmanager
 def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
-    """A folder beside `folder` for what an interrupted run goes on from; success removes it.
+    """A folder beside `folder` for the states of an interrupted run; success removes it.
 
-    ResultsError if it is of another scene than the one that is to be resumed. What the machine or a
-    signal ends in the block has a note of how to go on.
+    ResultsError if the states are of another scene than the one to be resumed. What the machine or
+    a signal ends in the block gets a note on how to continue.
     """
     folder = folder.resolve()
     state = folder.with_name(f".{folder.name}.state")
@@ -374,7 +375,7 @@ def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
 
 
 def _check_same(state: Path, scene: Scene) -> None:
-    """A state is of one scene: another would be refused by its first lattice, after hours maybe."""
+    """Raise if the states are of another scene, before any model is run."""
     try:
         before = tomllib.loads((state / SCENE).read_text(encoding="utf-8"))
     except (OSError, ValueError):  # there is none, or a kill left half of it: each state tells
@@ -390,7 +391,7 @@ def _check_same(state: Path, scene: Scene) -> None:
 
 
 def _kept(state: Path) -> list[str]:
-    """Names of the models that have a state; fields without one are of no use."""
+    """Names of the models that have a state; fields without a state are of no use."""
     return sorted(path.stem for path in state.glob("[!.]*.npz")) if state.is_dir() else []
 
 

@@ -59,9 +59,9 @@ class BandSample(NamedTuple):
 
 
 class CertifiedSample(NamedTuple):
-    """Bound of what a superposition's displacement is off all unknowns: certified.csv.
+    """Bound on the displacement error of a superposition against the unreduced model.
 
-    The length of the error, not only along the push, is at most this at that time.
+    A row of certified.csv. The magnitude of the error vector is at most this at that time.
     """
 
     model: str
@@ -125,8 +125,8 @@ class ScoreError(NamedTuple):
 class ScoreDifference(NamedTuple):
     """A model's score less that of another, each part of its error paired: score_differences.csv.
 
-    The same blocks, samples, windows and axes count for both, so that what moves both alike does
-    not count. `numerical`: sum of the relative errors of the three curves.
+    Blocks, samples, windows and axes are the same for both, so that what affects both alike
+    cancels. `numerical`: sum of the relative errors of the three curves.
     """
 
     model: str

@@ -58,7 +58,7 @@ def _of_many(thing: object, arrays: Arrays) -> Any:
 
 
 def restored(kind: type[Value], plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Value:
-    """A value of type `kind` from the output of `flattened`. ValueError if it is of another type."""
+    """A value of type `kind` from the output of `flattened`. ValueError if it has another type."""
     try:
         found: Value = _made(kind, plain, arrays)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

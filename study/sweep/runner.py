@@ -1,4 +1,4 @@
-"""Run the tasks that have no stored result, here or on workers, and store results as they arrive."""
+"""Run the tasks that have no stored result, here or on workers, and store each as it arrives."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def _environment(wanted: dict[str, str]) -> Iterator[None]:
 
 
 def one_each(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Task, Attempt]]:
-    """Each task with its outcome, in the order they end. ValueError if a cluster cannot run them."""
+    """Each task with its outcome, as they end. ValueError if the cluster cannot run them."""
     waiting = deque(tasks)
     running: dict[Future[Attempt], Running] = {}
     while waiting or running:

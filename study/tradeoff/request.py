@@ -1,4 +1,4 @@
-"""`tradeoff` and `recommend` as the command line asks for them."""
+"""Requests of the commands `tradeoff` and `recommend`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class TradeoffRequest:
 
     @property
     def name(self) -> str:
-        """Of the scene, without its folder."""
+        """Name of the scene, without its folder."""
         return Path(self.scene).stem
 
     @property
@@ -54,7 +54,7 @@ class TradeoffRequest:
 
     @property
     def folder(self) -> Path:
-        """Of the table."""
+        """Folder of the table."""
         return self.out or Path("results") / f"{self.name}-tradeoff"
 
     def read(self) -> Scene:
@@ -65,7 +65,7 @@ class TradeoffRequest:
 def _ready(request: TradeoffRequest) -> Scene:
     """The scene as the study samples it.
 
-    ValueError, before anything is run, for a scene, a folder or workers that will not do.
+    ValueError, before anything is run, for an unsuitable scene, folder or workers.
     """
     scene = sampled(request.read())
     _ = request.backend
@@ -75,7 +75,7 @@ def _ready(request: TradeoffRequest) -> Scene:
 
 
 def _set_up(scene: Scene) -> Problem:
-    """The problem of a scene on which what others are compared with can run. ValueError if not."""
+    """The problem of a scene, on which its reference can run. ValueError if it cannot."""
     problem = scene_problem(**scene_arguments(scene)).problem
     compared_with = "fem" if study.has_reference(scene) else "tissue"
     prepare_models([model(scene, compared_with)], problem)
@@ -102,7 +102,7 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
 
 
 def _against(found: study.Found) -> list[str]:
-    """What the errors are of and against, and how large its own is."""
+    """The criterion and reference of the errors, and the reference's own error."""
     comparison = found.comparison
     if comparison.reference is not None and not comparison.finest:
         own = 100 * comparison.reference.field_error
@@ -162,7 +162,7 @@ def advise(
 
 
 def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -> None:
-    """ValueError for demands that scenes of more than one load of a given force do not have."""
+    """Raise ValueError for demands that are undefined for more than one load of given force."""
     beside = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in scene.features]
     if known_place and beside:
         raise ValueError(
@@ -176,7 +176,7 @@ def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -
 
 
 def _busy() -> list[str]:
-    """A line where others had the machine too."""
+    """A line if other processes were using the machine too."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     if load <= cores:
         return []
@@ -187,7 +187,7 @@ def _busy() -> list[str]:
 
 
 def _suffix(wanted: Demand, absolute: float | None = None) -> str:
-    """Of a file name, with an error [m] as it was given."""
+    """Part of a file name, with an error [m] as it was given."""
     rate = [] if wanted.rate is None else [f"{wanted.rate:g}Hz"]
     if absolute is not None:
         return "-".join([*rate, f"{1e3 * absolute:g}mm"])

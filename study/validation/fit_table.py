@@ -34,7 +34,7 @@ def write(fit: Fit, path: Path) -> None:
 
 
 def lines(fit: Fit) -> Iterator[str]:
-    """A line per quantity, and how well the curve is met."""
+    """A line per quantity, and the goodness of fit."""
     for one in fit.quantities:
         unit = f" {one.unit}" if one.unit else ""
         own = "" if math.isnan(one.numerical) else f"; the model's own error {one.numerical:.2g}"
@@ -53,7 +53,7 @@ def _about_scatter(fit: Fit) -> str:
 
 
 def as_json(fit: Fit) -> str:
-    """Quantities with their intervals, and what is left."""
+    """Quantities with their intervals, and the residual."""
     quantities = [
         {
             "key": one.key,
