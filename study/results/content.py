@@ -87,7 +87,7 @@ def check(results: Results) -> None:
     _check_ratings(results)
     _check_score_errors(results)
     _check_score_differences(results)
-    differences = [row[:-1] for row in results.field_differences]
+    differences = [row[:3] for row in results.field_differences]
     _check_keys("errors.csv", differences, [] if scene.is_point else _different(record))
     _check_sensitivity(results)
     _check_fields(results)

@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from study.results.content import check
 from study.results.errors import ResultsError
 from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
 from study.results.tables import (
+    TABLES,
     BandSample,
     CertifiedSample,
     CurveSample,
@@ -46,6 +47,7 @@ from study.results.tables import (
     ScoreError,
     SensitivityEntry,
     SimilarityScore,
+    TableFile,
     ToolForceSample,
     ToolForceScore,
     read_table,
@@ -136,24 +138,19 @@ def write(results: Results, folder: Path) -> None:
     written.
     """
     (folder / SCENE).write_text(write_scene(results.scene), encoding="utf-8")
-    write_table(folder / "curves.csv", CurveSample, results.curves)
-    write_table(folder / "bands.csv", BandSample, results.bands)
-    write_table(folder / "certified.csv", CertifiedSample, results.certified)
-    if results.record.tools:
-        write_table(folder / "tool_force.csv", ToolForceSample, results.tool_forces)
-        write_table(folder / "tool_similarity.csv", ToolForceScore, results.tool_scores)
-    write_table(folder / "similarity.csv", SimilarityScore, results.scores)
-    write_table(folder / "iso_18571.csv", Iso18571Rating, results.ratings)
-    write_table(folder / "score_errors.csv", ScoreError, results.score_errors)
-    write_table(folder / "score_differences.csv", ScoreDifference, results.score_differences)
-    write_table(folder / "errors.csv", FieldDifference, results.field_differences)
-    write_table(folder / "sensitivity.csv", SensitivityEntry, results.sensitivity)
+    for table in _tables(results.record):
+        write_table(folder / table.file, table.kind, getattr(results, table.attribute))
     for stem, arrays in (("fields", results.fields), ("fuzzy", results.fuzzy)):
         if arrays:
             np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
     sums = manifest.digests(folder)
     _write_record(results.record, folder / MARK, sums)
     manifest.write(folder, sums | {MARK: manifest.digest(folder / MARK)})
+
+
+def _tables(record: StudyRecord) -> Iterator[TableFile]:
+    """The tables that a folder with this record has."""
+    return (table for table in TABLES if record.tools or not table.of_tools)
 
 
 def _write_record(record: StudyRecord, path: Path, sums: Mapping[str, str]) -> None:
@@ -211,22 +208,15 @@ def summary(folder: Path, scene: Scene) -> Results | None:
 def _content(folder: Path, table: Mapping[str, object]) -> Results:
     """All files in memory. ValueError naming file and line of what is damaged or inconsistent."""
     record, scene = _record(table), _scene(folder)
+    rows: dict[str, Any] = {
+        one.attribute: read_table(folder / one.file, one.kind) for one in _tables(record)
+    }
     results = Results(
         scene,
         record,
-        read_table(folder / "curves.csv", CurveSample),
-        read_table(folder / "bands.csv", BandSample),
-        read_table(folder / "certified.csv", CertifiedSample),
-        read_table(folder / "tool_force.csv", ToolForceSample) if record.tools else (),
-        read_table(folder / "tool_similarity.csv", ToolForceScore) if record.tools else (),
-        read_table(folder / "similarity.csv", SimilarityScore),
-        read_table(folder / "iso_18571.csv", Iso18571Rating),
-        read_table(folder / "score_errors.csv", ScoreError),
-        read_table(folder / "score_differences.csv", ScoreDifference),
-        read_table(folder / "errors.csv", FieldDifference),
-        read_table(folder / "sensitivity.csv", SensitivityEntry),
-        npz.read(folder / "fields.npz"),
-        npz.read(folder / "fuzzy.npz"),
+        **rows,
+        fields=npz.read(folder / "fields.npz"),
+        fuzzy=npz.read(folder / "fuzzy.npz"),
     )
     check(results)
     if manifest.digest(folder / SCENE) != record.provenance.scene_sha256:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from study.results.errors import ResultsError
+from study.results.tables import TABLES
 
 NAME = "SHA256SUMS"
 REPORT, PAGE = "report.pdf", "report.html"
@@ -19,13 +20,14 @@ MESH = "mesh.msh"
 """The tetrahedra of a run, if requested."""
 DATA = frozenset(
     {
-        *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
-        *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
-        *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
-        *("tool_force.csv", "tool_similarity.csv", MESH),
+        *("results.json", "scene.toml", "fields.npz", "fuzzy.npz", MESH),
+        *(table.file for table in TABLES),
     }
 )
-ALWAYS = DATA - {"fields.npz", "fuzzy.npz", "tool_force.csv", "tool_similarity.csv", MESH}
+ALWAYS = DATA - {
+    *("fields.npz", "fuzzy.npz", MESH),
+    *(table.file for table in TABLES if table.of_tools),
+}
 """Files of every run; fields, fuzzy systems and rigid tools depend on the scene."""
 LINE = re.compile(r"(?P<digest>[0-9a-f]{64}) [ *](?P<name>[^/\0]+)")
 REMEDY = "restore the folder as the run left it, or run the scene again"

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple, TypeVar, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 
 class CurveSample(NamedTuple):
@@ -200,6 +200,33 @@ def paired(keys: Sequence[Key]) -> Iterator[tuple[Key, Key]]:
     for place in dict.fromkeys(key[1:] for key in keys):
         yield from combinations([key for key in keys if key[1:] == place], 2)
 
+
+class TableFile(NamedTuple):
+    """A CSV table of a results folder: its file, the attribute of `Results`, and the kind of row.
+
+    `of_tools`: whether only scenes with rigid tools have it.
+    """
+
+    file: str
+    attribute: str
+    kind: type[Any]
+    of_tools: bool = False
+
+
+TABLES = (
+    TableFile("curves.csv", "curves", CurveSample),
+    TableFile("bands.csv", "bands", BandSample),
+    TableFile("certified.csv", "certified", CertifiedSample),
+    TableFile("tool_force.csv", "tool_forces", ToolForceSample, of_tools=True),
+    TableFile("tool_similarity.csv", "tool_scores", ToolForceScore, of_tools=True),
+    TableFile("similarity.csv", "scores", SimilarityScore),
+    TableFile("iso_18571.csv", "ratings", Iso18571Rating),
+    TableFile("score_errors.csv", "score_errors", ScoreError),
+    TableFile("score_differences.csv", "score_differences", ScoreDifference),
+    TableFile("errors.csv", "field_differences", FieldDifference),
+    TableFile("sensitivity.csv", "sensitivity", SensitivityEntry),
+)
+"""All CSV tables; a table is written, read and summed up by its line here."""
 
 Entry = TypeVar("Entry", bound=NamedTuple)
 
