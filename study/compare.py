@@ -249,8 +249,8 @@ def _record(first: Results, second: Results) -> Iterator[Difference]:
 def _numbers(results: Results) -> Flat:
     plain = asdict(results.record)
     plain["models"] = {model["name"]: model for model in plain["models"]}
-    told = {key: value for key, value in plain.items() if key not in WORDS}
-    return {key: value for key, value in _flat(told).items() if not key.endswith(WALL)}
+    compared = {key: value for key, value in plain.items() if key not in WORDS}
+    return {key: value for key, value in _flat(compared).items() if not key.endswith(WALL)}
 
 
 def _flat(table: object, before: str = "") -> Flat:

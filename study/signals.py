@@ -40,7 +40,10 @@ def numbers() -> list[int]:
 
 def leave_at_once(number: int, _: FrameType | None) -> NoReturn:
     """Exit before anything was done, where an exception would surface within the imports."""
-    _say(f"liver-study: {told(number)} before it began; there is nothing to --resume, start again")
+    _say(
+        f"liver-study: {message_for(number)} before it began; there is nothing to --resume, "
+        "start again"
+    )
     os._exit(EXIT_MACHINE)
 
 
@@ -50,7 +53,7 @@ def stop(number: int, _: FrameType | None) -> NoReturn:
         _say("liver-study: stopped at once; the next run removes what is half-written")
         os._exit(EXIT_MACHINE)
     ask_to_stop(number)
-    raise Stopped(told(number))
+    raise Stopped(message_for(number))
 
 
 def ask_to_stop(number: int) -> None:
@@ -69,10 +72,10 @@ def asked() -> bool:
 def stop_if_asked() -> None:
     """Raise Stopped if the program was asked to stop."""
     if _asked:
-        raise Stopped(told(_asked[0]))
+        raise Stopped(message_for(_asked[0]))
 
 
-def told(number: int) -> str:
+def message_for(number: int) -> str:
     """The message for a signal."""
     return "interrupted" if number == signal.SIGINT else f"stopped by {signal.Signals(number).name}"
 

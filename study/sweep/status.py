@@ -69,13 +69,13 @@ class StatusLines:
 
     name: str
     seconds: float = SECONDS
-    told: float = float("-inf")
+    last_printed: float = float("-inf")
 
     def __call__(self, status: SweepStatus) -> None:
         """Print a line, if it is time."""
         now = time.monotonic()
-        if now - self.told >= self.seconds or status.finished == status.total:
-            self.told = now
+        if now - self.last_printed >= self.seconds or status.finished == status.total:
+            self.last_printed = now
             print(f"{self.name}: {status}", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 

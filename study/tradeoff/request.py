@@ -128,7 +128,7 @@ def advise(
 
     An `error` that is a length is taken as a share of the largest displacement at rest.
     """
-    absolute, told = length(error), list[str]()
+    absolute, preamble = length(error), list[str]()
     given = request.read()
     _refuse_demand(given, absolute, known_place=known_place)
     wanted = demand(rate, "1" if absolute else error)
@@ -142,7 +142,7 @@ def advise(
         share = as_share(absolute, reach)
         wanted = demand(rate, share)
         at_rest_name = "elements yield" if problem.has_further_loads else YIELDS
-        told = [
+        preamble = [
             f"an error of {1e3 * absolute:.3g} mm is taken as {share} of the {1e3 * reach:.3g} mm "
             f"by which the {at_rest_name} at most at rest; errors are of the whole field"
         ]
@@ -154,7 +154,7 @@ def advise(
     )
     noted = dict.fromkeys((*given.remarks, *problem.notes))
     notes = (f"note: {note}" for note in noted)
-    lines = [*told, *notes, *recommend.lines(found), *_busy()]
+    lines = [*preamble, *notes, *recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
     write_text(path, recommend.recommended_scene(given, found))

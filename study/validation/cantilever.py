@@ -8,7 +8,7 @@ point on a path of increasing load. Markers stand off the surface and rotate wit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ FACTORS = ((0.92, 1.06), (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.6, 3.2))
 INWARDS = 2e-3
 """[m] over which the rotation of the surface is evaluated."""
 FITTED = "modulus, to the tip's way with 101 g"
+NOTHING_FITTED = "nothing: the modulus is that of 101 g"
 TIP, EACH = "tip down, mean of markers", "markers, rms of the difference"
 VIBRATION, VIBRATION_SPREAD = 7.76, 0.03
 """[Hz], of free motion about the rest under its weight, after the beam was let go: of marker
@@ -160,9 +161,39 @@ def _uncertainty(case: Markers) -> tuple[float, float]:
 def _rows(
     kind: Kind, cases: tuple[Markers, ...], seen: list[_Seen], sizes: list[float]
 ) -> Iterator[Comparison]:
-    best = seen[-1]
+    yield _frequency_row(kind, seen, sizes)
+    for i, (case, name) in enumerate(zip(cases, ("weight alone", "101 g"), strict=True)):
+        measured = -1e3 * float(case.moved[..., 2].mean())
+        down, each = _uncertainty(case)
+        row = Comparison(
+            problem=NAME,
+            case=name,
+            faces="clamped",
+            model=kind.label,
+            quantity=TIP,
+            unit="mm",
+            measured=measured,
+            uncertainty=1e3 * down,
+            found=1e3 * seen[-1].down[i],
+            numerical=1e3 * own_error([one.down[i] for one in seen], sizes),
+            modulus=seen[-1].modulus,
+            fitted=FITTED if i else NOTHING_FITTED,
+            note=seen[-1].failure,
+        )
+        yield row
+        yield replace(
+            row,
+            quantity=EACH,
+            measured=0.0,
+            uncertainty=1e3 * each,
+            found=1e3 * seen[-1].apart[i],
+            numerical=1e3 * own_error([one.apart[i] for one in seen], sizes),
+        )
+
+
+def _frequency_row(kind: Kind, seen: list[_Seen], sizes: list[float]) -> Comparison:
     frequencies = [one.frequency for one in seen]
-    yield Comparison(
+    return Comparison(
         problem=NAME,
         case="weight alone",
         faces="clamped",
@@ -173,30 +204,7 @@ def _rows(
         uncertainty=VIBRATION_SPREAD,
         found=frequencies[-1],
         numerical=own_error(frequencies, sizes),
-        modulus=best.modulus,
-        fitted="nothing: the modulus is that of 101 g",
-        note=best.failure,
+        modulus=seen[-1].modulus,
+        fitted=NOTHING_FITTED,
+        note=seen[-1].failure,
     )
-    for i, (case, name) in enumerate(zip(cases, ("weight alone", "101 g"), strict=True)):
-        measured = -1e3 * float(case.moved[..., 2].mean())
-        quantities = (
-            (TIP, measured, [one.down[i] for one in seen]),
-            (EACH, 0.0, [one.apart[i] for one in seen]),
-        )
-        spread = _uncertainty(case)
-        for (quantity, value, found), uncertainty in zip(quantities, spread, strict=True):
-            yield Comparison(
-                problem=NAME,
-                case=name,
-                faces="clamped",
-                model=kind.label,
-                quantity=quantity,
-                unit="mm",
-                measured=value,
-                uncertainty=1e3 * uncertainty,
-                found=1e3 * float(found[-1]),
-                numerical=1e3 * own_error(found, sizes),
-                modulus=best.modulus,
-                fitted=FITTED if i else "nothing: the modulus is that of 101 g",
-                note=best.failure,
-            )

@@ -48,8 +48,8 @@ def lines(fit: Fit) -> Iterator[str]:
 def _about_scatter(fit: Fit) -> str:
     if not fit.scatter_known:
         return "the intervals are by what is left: no uncertainty was given with the curve"
-    told = f"what is left is {fit.chi:.2g} times the uncertainty given"
-    return f"{told}; above 1 the intervals are widened by it" if fit.chi > 1.0 else told
+    text = f"what is left is {fit.chi:.2g} times the uncertainty given"
+    return f"{text}; above 1 the intervals are widened by it" if fit.chi > 1.0 else text
 
 
 def as_json(fit: Fit) -> str:

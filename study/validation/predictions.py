@@ -65,7 +65,7 @@ def neo_hookean(
     """Finite elements at large strain."""
     solid, drive, watched = _elements(specimen, level, modulus)
     path = solve_driven(solid, drive, factors)
-    return _told(specimen, solid, watched, path.states, path.failure)
+    return _prediction(specimen, solid, watched, path.states, path.failure)
 
 
 def linear(
@@ -73,7 +73,7 @@ def linear(
 ) -> Prediction:
     """Finite elements of linear elasticity: one solution, scaled."""
     solid, drive, watched = _elements(specimen, level, modulus)
-    whole = _told(specimen, solid, watched, (solve_linear(solid, drive),), "")
+    whole = _prediction(specimen, solid, watched, (solve_linear(solid, drive),), "")
     share = np.array(factors)
     return Prediction(
         share,
@@ -117,7 +117,7 @@ def _nothing(solid: MixedSolid) -> csr_array:
     return csr_array((0, len(solid.points)))
 
 
-def _told(
+def _prediction(
     specimen: Specimen,
     solid: MixedSolid,
     watched: csr_array,

@@ -109,17 +109,17 @@ def fall(integrator: str, nu: float | None, weights: float) -> Finding:
     steps = [Fixed(interval / whole_steps(interval, part * limit)) for part in FRACTIONS]
     fixed = [_run(assembly, material, integrator, step, interval) for step in steps]
     complete = sum(one.trajectory.status == "finished" for one, _ in fixed)
-    told = (
+    message = (
         f"{complete} of {len(fixed)} fixed steps complete; smallest step "
         f"{found.smallest_step / limit:.2g} of the limit, strain {found.largest_strain:.2g}, "
         f"{found.inverted_cells} cells inverted"
     )
     if found.trajectory.ended_at is None:
-        return _balanced(integrator, ledger.balance(interval), told)
+        return _balanced(integrator, ledger.balance(interval), message)
     finest = fixed[-1][0].trajectory.ended_at
     if complete or finest is None:
-        return Finding("error", message=f"lost by its step: {told}")
-    return value(finest, found.trajectory.ended_at, told, "diverged")
+        return Finding("error", message=f"lost by its step: {message}")
+    return value(finest, found.trajectory.ended_at, message, "diverged")
 
 
 def _balanced(integrator: str, balance: Floats, message: str) -> Finding:

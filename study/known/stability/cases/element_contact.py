@@ -85,8 +85,8 @@ def hits(speed: float) -> Finding:
     found = run(_block(), (tool,), RayleighDamping(30.0), np.zeros_like, seen, fem.Method(), _quiet)
     force = found.trajectory.tool_force[:, 0] @ DOWN
     pressing = float(-force.min())
-    told = f"{pressing:.3g} N at most, {found.trajectory.status}"
-    return at_most(1e-9 * max(pressing, 1e-9), float(force.max()), told)
+    message = f"{pressing:.3g} N at most, {found.trajectory.status}"
+    return at_most(1e-9 * max(pressing, 1e-9), float(force.max()), message)
 
 
 def through() -> Finding:

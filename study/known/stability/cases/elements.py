@@ -127,8 +127,8 @@ def turned() -> Finding:
     mesh = block_mesh(COLUMN, CELL)
     tetrahedra = mesh.tetrahedra.copy()
     tetrahedra[::4, 2:] = tetrahedra[::4, :1:-1]
-    mended = repair_tetrahedra(_draft(mesh.points, tetrahedra))
-    found = volumes(TetrahedralMesh(mended.points, mended.elements))
+    repaired = repair_tetrahedra(_draft(mesh.points, tetrahedra))
+    found = volumes(TetrahedralMesh(repaired.points, repaired.elements))
     return value(float(np.prod(COLUMN)), float(found.sum()), "m^3")
 
 
@@ -137,8 +137,8 @@ def flat_in_file() -> Finding:
     mesh = block_mesh(COLUMN, CELL)
     points = np.vstack([mesh.points, mesh.points[mesh.tetrahedra[0, :3]].mean(axis=0)])
     extra = np.append(mesh.tetrahedra[0, :3], len(mesh.points))
-    mended = repair_tetrahedra(_draft(points, np.vstack([mesh.tetrahedra, extra])))
-    return value(float(np.prod(COLUMN)), float(len(mended.elements)))
+    repaired = repair_tetrahedra(_draft(points, np.vstack([mesh.tetrahedra, extra])))
+    return value(float(np.prod(COLUMN)), float(len(repaired.elements)))
 
 
 def beside_organ(*, support: bool) -> Finding:
