@@ -46,7 +46,7 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
 def describe_mesh(
     path: Path, unit: str | None, axes: str | None = None, pieces: str = "one"
 ) -> list[str]:
-    """Lines on a mesh file: what it holds, what was repaired, its quality."""
+    """Lines on a mesh file: its content, the repairs made, and its quality."""
     from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
 

@@ -24,7 +24,7 @@ from study.scene import Patient, Scene
 from study.scene.file import SceneError, read_scene, resolved, validate
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import recommend
 from study.tradeoff import study as study_module
@@ -230,7 +230,7 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
     settings = {"spacing": spacing, "volume_term": True, "step_fraction": 0.8}
     chosen = Configuration("volume-springs", settings)
     judge, (outcome,) = study_module.judged(
-        sampled(scene), [chosen], Store(tmp_path / "runs"), How()
+        sampled(scene), [chosen], Store(tmp_path / "runs"), Backend()
     )
     known, measured = judge.reference, judge.errors(chosen, outcome)
     assert measured.status == "resolved"

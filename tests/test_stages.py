@@ -700,7 +700,7 @@ class Told:
 
 
 def test_stages_of_several_processes_are_told_to_one(monkeypatch):
-    monkeypatch.setattr("study.stages.job_pool.PAUSE", 0.0)
+    monkeypatch.setattr("study.stages.job_pool.PROGRESS_INTERVAL", 0.0)
 
     def work(progress):
         with progress.stage("within") as advance:
@@ -716,11 +716,11 @@ def test_stages_of_several_processes_are_told_to_one(monkeypatch):
 PARENT = """
 import os, sys, time
 from study.progress import Silent
-from study.stages.job_pool import Job, lanes
+from study.stages.job_pool import Job, job_pool
 def work(_):
     print(os.getpid(), flush=True)
     time.sleep(60)
-with lanes(2, Silent()) as side:
+with job_pool(2, Silent()) as side:
     side.start(Job("a", work))
     side.start(Job("b", work))
     side.results()

@@ -18,7 +18,7 @@ from study.progress import Silent
 from study.run import scene_problem as scene_problem_module
 from study.run.scene_problem import scene_arguments
 from study.scene.file import read_scene
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import recommend as advice
@@ -58,7 +58,7 @@ CHOSEN = [*VOLUME, LINEAR, RITZ, TOO_LONG, NO_MESH]
 def found(tmp_path_factory):
     scene = sampled(read_scene("block", SMALL))
     store = Store(tmp_path_factory.mktemp("runs"))
-    return study_module.study(scene, CHOSEN, store, How(), 2, Silent())
+    return study_module.study(scene, CHOSEN, store, Backend(), 2, Silent())
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from study.commands import EXIT_BAD_INPUT
 from study.progress import Silent
 from study.run.scene_problem import scene_arguments, scene_problem
 from study.scene.file import read_scene
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import study as study_module
@@ -131,7 +131,7 @@ def test_a_configuration_is_judged_by_the_force(given, away, status):
 def found(scene, tmp_path_factory):
     chosen = [of(2.0), of(1.5), of(1.0), of(FINEST)]
     store = Store(tmp_path_factory.mktemp("runs"))
-    return study_module.study(scene, chosen, store, How(), 1, Silent())
+    return study_module.study(scene, chosen, store, Backend(), 1, Silent())
 
 
 def test_force_errors_fall_with_the_spacing_and_stand_in_the_table(found, scene, tmp_path):
@@ -241,7 +241,7 @@ def test_several_loads_and_gravity_are_judged_by_the_reference(tmp_path):
         "volume-springs", {"spacing": 0.01, "volume_term": True, "step_fraction": 0.8}
     )
     store = Store(tmp_path / "runs")
-    found = study_module.study(scene, [elements, springs], store, How(), 1, Silent())
+    found = study_module.study(scene, [elements, springs], store, Backend(), 1, Silent())
     assert [one.errors.status for one in found.entries] == ["resolved"] * 2
     assert [one.errors.of_force for one in found.entries] == [False] * 2
     assert found.comparison.reference is not None

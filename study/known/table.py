@@ -137,10 +137,10 @@ def _worst(verdicts: Sequence[CaseVerdict]) -> str:
 
 def _told(verdict: CaseVerdict) -> str:
     found = verdict.finding
-    told = f"expected {verdict.case.expectation}; {found.ending}"
+    outcome = f"expected {verdict.case.expectation}; {found.ending}"
     if found.measured is not None:
-        told += f", {found.measured:.6g} beside {found.predicted:.6g}"
-    return f"{told}. {found.message}"
+        outcome += f", {found.measured:.6g} beside {found.predicted:.6g}"
+    return f"{outcome}. {found.message}"
 
 
 def _record(finding: Finding, passed: bool | None) -> dict[str, str | float | None]:

@@ -17,7 +17,7 @@ from study.run.visual_output import VisualOutput, visual_output, with_visual_out
 from study.scene import Scene
 from study.scene.part import without
 from study.scene.problem import problem_of
-from study.stages.fingerprint import text
+from study.stages.fingerprint import fingerprint
 
 Floats = NDArray[np.float64]
 
@@ -101,4 +101,4 @@ class ProblemBuilder:
     @property
     def mesh(self) -> str:
         """SHA-256 of the tetrahedra: some meshers produce different ones in every call."""
-        return text(self.problem.geometry.mesh)
+        return fingerprint(self.problem.geometry.mesh)

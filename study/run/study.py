@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,8 @@ from study.results.records import (
     StudyRecord,
 )
 from study.results.tables import (
+    BandSample,
+    CertifiedSample,
     FieldDifference,
     Iso18571Rating,
     ScoreDifference,
@@ -236,13 +239,17 @@ def _similarity_tables(
     with progress.stage(SIMILARITY):
         scores, unscored = similarity_rows(response, scorable, compared_with)
         errors, differences = error_rows(response, scorable, records, scores)
-        ratings = tuple(rating_rows(response, scorable, scores))
         has_field = response.volumes.size > 0
-        field_differences = difference_rows(response, scorable, compared_with) if has_field else ()
-        tool_scores, tool_notes = force_scores(response, scorable, compared_with)
-        notes = (*unscored, *tool_notes)
+        of_field = difference_rows(response, scorable, compared_with) if has_field else ()
+        tool_scores, unscored_tools = force_scores(response, scorable, compared_with)
         return SimilarityTables(
-            scores, notes, ratings, errors, differences, tuple(field_differences), tool_scores
+            scores=scores,
+            unscored=(*unscored, *unscored_tools),
+            ratings=tuple(rating_rows(response, scorable, scores)),
+            errors=errors,
+            differences=differences,
+            field_differences=tuple(of_field),
+            tool_scores=tool_scores,
         )
 
 
@@ -254,26 +261,61 @@ def _results(
     made_by: Provenance,
 ) -> Results:
     runs, response = found.runs, found.response
+    trajectories = {name: run.trajectory for name, run in runs.items()}
+    return Results(
+        scene,
+        _record(scene, fuzzy, found, similarity.unscored, made_by),
+        curves=tuple(curve_rows(response, trajectories)),
+        bands=tuple(_bands(found)),
+        certified=tuple(_certified(found)),
+        tool_forces=tuple(force_rows(response, trajectories)),
+        tool_scores=similarity.tool_scores,
+        scores=similarity.scores,
+        ratings=similarity.ratings,
+        score_errors=similarity.errors,
+        score_differences=similarity.differences,
+        field_differences=similarity.field_differences,
+        sensitivity=fuzzy.sensitivity,
+        fields=found.fields,
+        fuzzy=fuzzy.arrays,
+    )
+
+
+def _bands(found: StudyRuns) -> Iterator[BandSample]:
+    for name, run in found.runs.items():
+        if run.bounds is not None:
+            yield from band_rows(found.response, name, run.bounds)
+
+
+def _certified(found: StudyRuns) -> Iterator[CertifiedSample]:
+    for name, run in found.runs.items():
+        if run.certified is not None:
+            yield from certified_rows(found.response, name, run.certified)
+
+
+def _record(
+    scene: Scene,
+    fuzzy: FuzzyResults,
+    found: StudyRuns,
+    unscored: Sequence[str],
+    made_by: Provenance,
+) -> StudyRecord:
+    runs = found.runs
     models = tuple(run.record for run in runs.values())
     # Models on one lattice share the check of its mass, which is listed once.
     checks = tuple(dict.fromkeys(check for run in runs.values() for check in run.checks))
-    checks += tuple(requirement_checks(scene, response.probes, runs))
-    record = StudyRecord(
+    checks += tuple(requirement_checks(scene, found.response.probes, runs))
+    of_models = (note for run in runs.values() for note in run.notes)
+    return StudyRecord(
         title=scene.title,
-        probes=response.probes,
+        probes=found.response.probes,
         fuzzy=fuzzy.record,
         models=models,
         references=tuple(references(scene)),
         checks=checks,
         warnings=warnings(scene, models, checks),
         assumptions=assumptions(scene, found.control_point),
-        notes=(
-            *scene.remarks,
-            *fuzzy.notes,
-            *found.notes,
-            *(note for run in runs.values() for note in run.notes),
-            *similarity.unscored,
-        ),
+        notes=(*scene.remarks, *fuzzy.notes, *found.notes, *of_models, *unscored),
         strain_limit=STRAIN_LIMIT,
         study_wall_s=None,
         provenance=made_by,
@@ -281,33 +323,5 @@ def _results(
         lattice_limits=found.lattice_limits,
         control_point=found.control_point,
         budgets=found.budgets,
-        tools=tuple(largest_forces(response, runs)),
-    )
-    trajectories = {name: run.trajectory for name, run in runs.items()}
-    return Results(
-        scene,
-        record,
-        tuple(curve_rows(response, trajectories)),
-        tuple(
-            row
-            for name, run in runs.items()
-            if run.bounds is not None
-            for row in band_rows(response, name, run.bounds)
-        ),
-        tuple(
-            row
-            for name, run in runs.items()
-            if run.certified is not None
-            for row in certified_rows(response, name, run.certified)
-        ),
-        tuple(force_rows(response, trajectories)),
-        similarity.tool_scores,
-        similarity.scores,
-        similarity.ratings,
-        similarity.errors,
-        similarity.differences,
-        similarity.field_differences,
-        fuzzy.sensitivity,
-        found.fields,
-        fuzzy.arrays,
+        tools=tuple(largest_forces(found.response, runs)),
     )

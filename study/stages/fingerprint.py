@@ -1,8 +1,8 @@
-"""What a stage depends on, as one text: the values it is given, and the program that it runs.
+"""The key of a stage: a hash of the values that it is given and of the program that it runs.
 
-A value is told by what is in it, with the names of its classes and functions, whose sources, and
-all that these import, are the program. What has no such text, such as a function made within
-another, makes a stage that is not kept.
+A value is described by its content and by the names of its classes and functions. The program is
+the source of these and of everything that they import. A value that cannot be described, such as a
+function defined within another, makes a stage that is not stored.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from study.sweep.canonical import digest
 from study.sweep.program import program
 
 KEEPING = ("study.stages.serialisation", "study.stages.store")
-"""Modules that what is kept passes through."""
+"""Modules that every stored value passes through."""
 
 
 class NoFingerprintError(TypeError):
-    """A value that has no text of its own."""
+    """A value that cannot be described."""
 
 
 def key(stage: str, *things: object, modules: tuple[str, ...] = ()) -> str | None:
-    """SHA-256 of a stage's name, of what it is given, and of the program; None if it has none.
+    """SHA-256 of a stage's name, of the values given and of the program; None if there is none.
 
-    `modules`: names of those that the stage runs beside the classes and functions in its values.
+    `modules`: names of the modules that the stage runs beside the classes and functions in its
+    values.
     """
     found: set[str] = {*modules, *KEEPING}
     try:
@@ -41,19 +42,19 @@ def key(stage: str, *things: object, modules: tuple[str, ...] = ()) -> str | Non
     return digest([stage, descriptions, programs, machine()])
 
 
-def text(thing: object) -> str:
-    """SHA-256 of a value alone. NotToldError if it has no text."""
+def fingerprint(thing: object) -> str:
+    """SHA-256 of a value alone. NoFingerprintError if it cannot be described."""
     return digest(_description(thing, set()))
 
 
 @functools.cache
 def machine() -> list[str]:
-    """What rounding depends on beside the program, and what a wall time is one of."""
+    """What rounding and wall times depend on beside the program."""
     return [platform.system(), platform.machine(), platform.processor(), *_processor()]
 
 
 def _processor() -> list[str]:
-    """Name and instructions of the processor as Linux tells them."""
+    """Name and instruction set of the processor, as reported by Linux."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -63,7 +64,7 @@ def _processor() -> list[str]:
 
 @functools.singledispatch
 def _description(thing: Any, modules: set[str]) -> Any:
-    """Of an object: its fields, or the array that it is."""
+    """Description of an object: its fields, or the array that it is."""
     if dataclasses.is_dataclass(thing):
         return [_class(thing, modules), *_fields(thing, modules)]
     array = getattr(thing, "__array__", None)
@@ -117,7 +118,7 @@ def _method(thing: MethodType, modules: set[str]) -> Any:
 @_description.register(type)
 @_description.register(FunctionType)
 def _named(thing: Any, modules: set[str]) -> Any:
-    """Module and name of what stands at the top of a module."""
+    """Module and name of a class or function defined at the top level of a module."""
     if thing.__module__ == "builtins":
         return thing.__qualname__
     if "<" in thing.__qualname__:  # within a function, and so of what that was given

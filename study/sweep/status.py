@@ -1,4 +1,4 @@
-"""How far a sweep is, and how a person is told: a bar on a terminal, else a line now and then."""
+"""Progress of a sweep, shown as a bar on a terminal and as occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class SweepStatus(NamedTuple):
-    """Counts of a sweep: `stored` were there before; `failed` includes the crashed."""
+    """Counts of a sweep: `stored` existed before; `failed` includes crashes."""
 
     total: int
     stored: int = 0
@@ -21,23 +21,23 @@ class SweepStatus(NamedTuple):
 
     @property
     def finished(self) -> int:
-        """How many need no more work in this sweep."""
+        """Number of tasks that need no more work in this sweep."""
         return self.stored + self.done + self.failed
 
     @property
     def seconds_left(self) -> float | None:
-        """At the rate so far; None before the first run has finished."""
+        """Remaining time at the rate so far; None before the first run has finished."""
         ran = self.done + self.failed
         return self.seconds / ran * (self.total - self.finished) if ran else None
 
     def counting(self, done: bool, seconds: float) -> SweepStatus:
-        """With one more run, done or not, after so many seconds of the sweep."""
+        """The status after one more run, done or not, at so many seconds of the sweep."""
         return self._replace(
             done=self.done + done, failed=self.failed + (not done), seconds=seconds
         )
 
     def __str__(self) -> str:
-        """For a person."""
+        """For a reader."""
         parts = [f"{self.finished} of {self.total}"]
         parts += [f"{self.stored} from before"] if self.stored else []
         parts += [f"{self.failed} failed"] if self.failed else []
@@ -49,33 +49,33 @@ class SweepStatus(NamedTuple):
 ReportStatus = Callable[[SweepStatus], None]
 
 SECONDS = 15.0
-"""Between two lines where stderr is no terminal."""
+"""Time between two lines where stderr is no terminal."""
 
 
 def duration(seconds: float) -> str:
-    """A time for a person: "8 s", "3 min", "2.5 h"."""
+    """A time as text: "8 s", "3 min", "2.5 h"."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 def silent(_: SweepStatus) -> None:
-    """Tell nothing."""
+    """Report nothing."""
 
 
 @dataclass
 class StatusLines:
-    """A line at the beginning, at the end, and every so many seconds between."""
+    """A line at the beginning, at the end, and at regular intervals between."""
 
     name: str
     seconds: float = SECONDS
-    told: float = float("-inf")
+    last_printed: float = float("-inf")
 
     def __call__(self, status: SweepStatus) -> None:
-        """Tell, if it is time."""
+        """Print a line, if it is time."""
         now = time.monotonic()
-        if now - self.told >= self.seconds or status.finished == status.total:
-            self.told = now
+        if now - self.last_printed >= self.seconds or status.finished == status.total:
+            self.last_printed = now
             print(f"{self.name}: {status}", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 

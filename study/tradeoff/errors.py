@@ -1,4 +1,4 @@
-"""How far a configuration is from what it is compared with, where that can tell."""
+"""Errors of a configuration against its reference, where they exceed the reference's own error."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Errors:
     """Relative L2 errors, None where there is none or it is not resolved.
 
     Of the displacement: `field` over the organ at the peak; `tool` of the curve of the control
-    point at the tool and `worst` of any control point. Of the force on tools that are moved, the
-    largest of any: `force` over time and `peak_force`, and `discretisation` of it over time against
-    the finest lattice of the same springs. `of_force`: whether a configuration is judged by the
-    force. `status` is that of what it is judged by; `message` says what went wrong.
+    point at the tool and `worst` of any control point. Of the force on moved tools, the largest of
+    any: `force` over time and `peak_force`, and `discretisation` of it over time against the finest
+    lattice of the same springs. `of_force`: whether the force is the criterion of the
+    configuration. `status` refers to the criterion; `message` states what went wrong.
     """
 
     status: Status
@@ -45,7 +45,7 @@ class Errors:
 
     @property
     def judged(self) -> float | None:
-        """That which it is judged by."""
+        """The error that is the criterion."""
         return self.force if self.of_force else self.field
 
 
@@ -72,7 +72,7 @@ def errors(outcome: Outcome, reference: ReferenceSolution, given: SceneProblem) 
 def _of_force(
     measured: Errors, found: Floats, reference: ReferenceSolution, given: SceneProblem
 ) -> Errors:
-    """With the errors of the force, by which it is then judged."""
+    """Add the errors of the force, which is then the criterion."""
     over_time, peak = force_differences(given.problem, found, reference.force).max(axis=1)
     kept = resolved(over_time, float(reference.force_errors.max()))
     return replace(

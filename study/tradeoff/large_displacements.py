@@ -1,8 +1,8 @@
-"""The reference with large displacements, which linear elements lack: from corrected lattices.
+"""Large displacements added to the linear reference, from corrected lattices.
 
-What a corrected lattice moves beyond the same elements without it is what geometry changes. Added
-to the reference it gives what all models are judged by where the place of the load is known; its
-error is told by a second lattice, whose finest cells reach less far.
+The displacement of a corrected lattice less that of the same elements alone is the effect of
+geometric nonlinearity. Added to the reference it gives what all models are compared with where the
+place of the load is known. Its error follows from a second lattice with a smaller fine region.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ Floats = NDArray[np.float64]
 def with_large_displacements(
     known: ReferenceSolution, linear: Outcome, near: Outcome, far: Outcome, given: SceneProblem
 ) -> ReferenceSolution | None:
-    """The reference with what geometry changes, None where one of the runs was not whole.
+    """The reference with geometric nonlinearity, None where one of the runs did not finish.
 
-    `linear`: elements alone; `near` and `far`: corrected by lattices, of which the second's finest
-    cells reach farther.
+    `linear`: elements alone; `near` and `far`: corrected by lattices, the second with a larger fine
+    region.
     """
     seen = [_seen(one, known) for one in (linear, near, far)]
     if any(one is None for one in seen):
@@ -42,7 +42,7 @@ def with_large_displacements(
 
 
 def _seen(outcome: Outcome, known: ReferenceSolution) -> tuple[Floats, Floats] | None:
-    """Field and curves of a run, None where it was not whole."""
+    """Field and curves of a run, None where it did not finish."""
     if outcome.value is None:
         return None
     found = restored(Observed, outcome.value)

@@ -1,21 +1,22 @@
-"""The configuration that meets a demand on this machine: chosen by a fit, then run and timed.
+"""The configuration that meets a demand on this machine: predicted by a fit, then run and timed.
 
-Chosen from is the lattice stepped explicitly, with the volume term where the tissue's Poisson ratio
-asks for it, by its spacing and precision. Its error is run at a few coarse spacings and fitted by
-C h^p; what single precision adds is measured at the finest of them; its cost is timed at all. For a
-rate alone the most accurate that keeps up is recommended, for an error the cheapest that promises
-it. A promise is the fit with its spread, the reference's own error and what the precision adds; the
-recommended configuration is then run and timed afresh, and the next one taken where it does not
-keep up after all.
+Candidates are explicit lattices by spacing and precision, with the volume term where the tissue's
+Poisson ratio needs it. Errors are computed at a few coarse spacings and fitted by C h^p; the error
+added by single precision is measured at the finest of them; every candidate is timed. For a rate
+alone the most accurate real-time candidate is recommended, for an error the cheapest whose
+predicted error is small enough. A prediction includes the spread of the fit, the reference's own
+error and the error of the precision. The recommended configuration is then run and timed anew, and
+the next one is taken if it does not keep up after all.
 
-Where the place of the load is known beforehand, what follows it there only is chosen from too:
-Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
-few, and each promises what a run of it was off by, or the reference's own error if that is more.
-All are then judged by the reference with large displacements, `study.tradeoff.large_displacements`.
+Where the place of the load is known beforehand, models that depend on it are candidates too: Ritz
+vectors, graded lattices, and lattices of either kind corrected by finite elements. There are few of
+them, and the predicted error of each is that of a run of it, or the reference's own error if that
+is larger. All are then compared with the reference with large displacements,
+`study.tradeoff.large_displacements`.
 
-Where tools are moved the error is that of their force over time. Against the finest lattice of the
-same springs every spacing is run, for errors by contact jump with how cells lie; each promises what
-its run was off by, and the finest's own error on top.
+Under moved tools the criterion is the error of their force over time. Against the finest lattice of
+the same springs every spacing is run, since contact errors vary irregularly with the placement of
+cells; the predicted error is the measured one plus that of the finest lattice.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.tradeoff import study
 from study.tradeoff.comparison import Comparison
@@ -53,17 +54,17 @@ FITTED = (2.5, 2.0, 1.75, 1.5, 1.25, 1.0)
 FINER = (0.9, 0.8, 0.7, 0.6, 0.5)
 """Spacings, times that of the scene: those whose errors are fitted, and those left to the fit."""
 ELEMENTS = 0.5
-"""Element size of the reference chosen by, times that of the scene, in place of its accuracy.
+"""Element size of the reference used for the choice, over the scene's; replaces its accuracy.
 
-On the built-in liver 0.75 has an error of the field of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61
-and 71 s of processor time for all of `recommend`.
+On the built-in liver 0.75 has a field error of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61 and 71 s
+of processor time for all of `recommend`.
 """
 SPREAD = 2.8
-"""Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
+"""Standard deviations included in a prediction: Student's t at 95 % for a fit to six points."""
 FEWEST = 3
 SINGLE = "single"
 BESIDE = (2.0, 1.5, 1.0)
-"""Spacings of corrected lattices, times that of the scene."""
+"""Spacings of corrected lattices, over that of the scene."""
 SMALL_CELLS, REACHES = 0.5, (1.0, 1.5)
 """Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
 reach from the tool, in its radii."""
@@ -72,28 +73,28 @@ VECTORS = 16
 
 @dataclass(frozen=True)
 class Promise:
-    """A relative error and how far from it the measured one may lie, either way."""
+    """A predicted relative error, and how far the measured one may deviate either way."""
 
     error: float
     bar: float
 
     @property
     def most(self) -> float:
-        """Its upper end."""
+        """The upper end of the prediction."""
         return self.error + self.bar
 
     def rounded(self, more: float) -> Promise:
-        """With at most so much more by rounding."""
+        """The prediction with an additional rounding error."""
         return replace(self, bar=self.bar + more)
 
     def holds(self, measured: float) -> bool:
-        """Whether a measured error lies within."""
+        """Whether a measured error lies within the prediction."""
         return abs(measured - self.error) <= self.bar
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A configuration and what it is expected to give; `frame`: at the rate, if one is demanded."""
+    """A configuration with its prediction; `frame`: at the demanded rate, if there is one."""
 
     configuration: Configuration
     promise: Promise
@@ -102,21 +103,21 @@ class Candidate:
 
     @property
     def wall_per_second(self) -> float:
-        """Wall per simulated second."""
+        """Wall time per simulated second."""
         return self.cost.timing.step[1] / self.cost.step
 
     def meets(self, wanted: Demand) -> bool:
-        """Whether rate and error are promised."""
+        """Whether rate and error are predicted to meet the demand."""
         in_time = self.frame is None or self.frame.in_time
         return in_time and (wanted.error is None or self.promise.most <= wanted.error)
 
 
 @dataclass(frozen=True)
 class Recommended:
-    """A candidate, whether it meets the demand, and what it was measured to give.
+    """A candidate, whether it meets the demand, and its measured error and cost.
 
-    `others`: those that it was chosen from. `against`: what errors are against, where that is not
-    the converged reference.
+    `others`: the candidates. `against`: the reference of the errors, if it is not the converged
+    one.
     """
 
     candidate: Candidate
@@ -132,36 +133,36 @@ def recommend(
     scene: Scene,
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
     *,
     known_place: bool = False,
 ) -> Recommended:
-    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified.
+    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified by a run.
 
-    With `known_place` also among the lattices that follow one place of the load.
+    With `known_place` also among models that depend on the place of the load.
     """
     coarser = judged_by(scene)
     every = [tidy(times * scene.lattice.spacing) for times in (*FITTED, *FINER)]
     spacings = every[: len(FITTED)] if study.has_reference(scene) else every
     tried = [_configuration(scene, h) for h in spacings]
     single = [_configuration(scene, spacings[-1], SINGLE)] if may_be_single(scene) else []
-    comparison, outcomes = study.judged(coarser, [*tried, *single], store, how)
+    comparison, outcomes = study.judged(coarser, [*tried, *single], store, backend)
     given, followed = comparison.given, None
     if known_place and comparison.reference is not None:
-        followed = _followed(given, comparison.reference, store, how)
+        followed = _followed(given, comparison.reference, store, backend)
         comparison = replace(comparison, reference=followed.known)
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
     promises = _promises(comparison, tried, outcomes, every)
     candidates = _candidates(given, promises, added, wanted, progress)
     if followed is not None:
         candidates += _bound(given, followed, wanted, progress)
-    found = _verified(comparison, candidates, wanted, store, how, progress)
+    found = _verified(comparison, candidates, wanted, store, backend, progress)
     return replace(found, against=comparison.words if comparison.finest else "")
 
 
 def judged_by(scene: Scene) -> Scene:
-    """The scene with a reference of elements half as large, whatever accuracy it asks for."""
+    """The scene with a reference of elements half as large, whatever accuracy it requests."""
     chosen = scene.reference
     size = tidy(ELEMENTS * chosen.element_size)
     return replace(scene, reference=replace(chosen, element_size=size, accuracy=None))
@@ -177,7 +178,7 @@ class Fit:
     reference_error: float
 
     def promise(self, spacing: float) -> Promise:
-        """The error at a spacing [m]."""
+        """The predicted error at a spacing [m]."""
         error = self.constant * spacing**self.order
         return Promise(error, self.reference_error + self.spread * error)
 
@@ -188,7 +189,7 @@ def _promises(
     outcomes: Sequence[Outcome],
     every: Sequence[float],
 ) -> dict[float, Promise]:
-    """What a spacing [m] promises, in double precision."""
+    """The prediction for each spacing [m], in double precision."""
     spacings = [float(one.settings["spacing"]) for one in tried]
     if comparison.reference is None:
         return dict(_measured_promises(comparison, tried, outcomes))
@@ -203,7 +204,7 @@ def _promises(
 def _measured_promises(
     comparison: Comparison, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
 ) -> Iterator[tuple[float, Promise]]:
-    """What each run was off the finest lattice by, and the own error of that."""
+    """The measured error of each run, plus the own error of the finest lattice."""
     for one, outcome in zip(tried, outcomes, strict=False):
         known = comparison.truth(one)
         alike = replace(known, force_errors=np.zeros_like(known.force_errors))
@@ -214,7 +215,7 @@ def _measured_promises(
 
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
-    """By least squares in logarithms. ValueError if too few errors are resolved."""
+    """Least squares in logarithms. ValueError if too few errors are resolved."""
     if len(found) < FEWEST:
         raise ValueError(
             f"only {len(found)} of the spacings have an error above the reference's own "
@@ -238,9 +239,9 @@ def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Con
 
 
 def _added_by_single(outcomes: Sequence[Outcome], given: SceneProblem) -> dict[str, float]:
-    """What single precision changes of the field or the force, of a run in double and in single.
+    """Change of the field or the force by single precision, from runs in both precisions.
 
-    Relative L2; nothing where there is no such run, or it was not whole.
+    Relative L2; empty where such a run is missing or did not finish.
     """
     seen = [restored(Observed, one.value) for one in outcomes[:2] if one.value is not None]
     whole = [one for one in seen if one.field is not None]
@@ -262,7 +263,7 @@ def _candidates(
     wanted: Demand,
     progress: Progress,
 ) -> list[Candidate]:
-    """All spacings in each precision, which adds so much to the error, timed in turns."""
+    """All spacings in each precision with its rounding error, timed in turns."""
     pairs = [(h, precision) for h in promises for precision in added]
     chosen = [_configuration(given.scene, *pair) for pair in pairs]
     return [
@@ -275,20 +276,22 @@ def _candidates(
 
 @dataclass(frozen=True)
 class Followers:
-    """What follows one place of the load only, run; `known`: what all are then judged by."""
+    """Runs of models that depend on the place of the load; `known`: their reference."""
 
     chosen: tuple[Configuration, ...]
     outcomes: tuple[Outcome, ...]
     known: ReferenceSolution
 
 
-def _followed(given: SceneProblem, known: ReferenceSolution, store: Store, how: How) -> Followers:
+def _followed(
+    given: SceneProblem, known: ReferenceSolution, store: Store, backend: Backend
+) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
     Without runs that tell what geometry changes, those of small displacements are left out.
     """
     chosen = list(bound(given.scene))
-    _, outcomes = study.judged(given.scene, chosen, store, how)
+    _, outcomes = study.judged(given.scene, chosen, store, backend)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
@@ -299,7 +302,7 @@ def _followed(given: SceneProblem, known: ReferenceSolution, store: Store, how: 
 def _bound(
     given: SceneProblem, followed: Followers, wanted: Demand, progress: Progress
 ) -> list[Candidate]:
-    """Candidates of those that were run, timed in turns."""
+    """Candidates among those that were run, timed in turns."""
     known = followed.known
     found = [errors(one, known, given) for one in followed.outcomes]
     costed = _costs(given, followed.chosen, progress)
@@ -311,7 +314,7 @@ def _bound(
 
 
 def bound(scene: Scene) -> Iterator[Configuration]:
-    """What follows one place of the load only: a subspace, graded and corrected lattices."""
+    """Models that depend on the place of the load: a subspace, graded and corrected lattices."""
     yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
     step = {"step_fraction": FRACTION}
     for times in BESIDE:
@@ -325,7 +328,7 @@ def bound(scene: Scene) -> Iterator[Configuration]:
 
 
 def _as_measured(found: Errors, own: float) -> Promise:
-    """What a run was off by, with the reference's own error; that alone if it hides the other."""
+    """The measured error with the reference's own error; the latter alone if it is larger."""
     return Promise(found.field or 0.0, own)
 
 
@@ -339,7 +342,7 @@ def _frame(cost: Cost, wanted: Demand) -> Frame | None:
 
 
 def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
-    """The one to take, or the nearest where none meets the demand.
+    """The best candidate, or the nearest where none meets the demand.
 
     Nearest is the most accurate that keeps up; where none does, the fastest.
     """
@@ -357,12 +360,12 @@ def _verified(
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
 ) -> Recommended:
-    """The best candidate run and timed afresh, or the best of the others if it fails that."""
+    """The best candidate run and timed anew, or the best of the others if it fails."""
     given, chosen = comparison.given, best(candidates, wanted)
-    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, how)
+    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, backend)
     measured = comparison.errors(chosen.configuration, outcome)
     (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
@@ -373,22 +376,22 @@ def _verified(
     met = met and (wanted.error is None or (measured.judged or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(comparison, others, wanted, store, how, progress)
+        return _verified(comparison, others, wanted, store, backend, progress)
     wall = cost.timing.step[1] / cost.step
     return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 
 
 def recommended_scene(scene: Scene, found: Recommended) -> str:
-    """TOML text of the scene with the recommended lattice, promise and measurement above it.
+    """TOML text of the scene with the recommended lattice, its prediction and measurement.
 
-    It names the model that was measured, springs of the tissue's own modulus, and the reference.
+    It names the measured model, with springs of the tissue's own modulus, and the reference.
     """
     head = "".join(f"# {line}\n" for line in lines(found))
     return head + "\n" + write_scene(scene_with(scene, found.candidate.configuration))
 
 
 def lines(found: Recommended) -> list[str]:
-    """What is recommended, promised and measured, for a person."""
+    """The recommendation, its prediction and measurement, for a reader."""
     one, measured = found.candidate, found.measured
     promise = one.promise
     error = (
@@ -442,7 +445,7 @@ def _quantity(measured: Errors) -> str:
 
 
 def _beside_force(measured: Errors) -> Iterator[str]:
-    """What else was measured of a configuration that is judged by the force over time."""
+    """The other measured errors of a configuration whose criterion is the force over time."""
     told = {
         "the largest force": measured.peak_force,
         "the displacement at the control points": measured.worst,
@@ -458,10 +461,10 @@ def _beside_force(measured: Errors) -> Iterator[str]:
 def table_of(
     candidates: Sequence[Candidate], quantity: str = "field", taken: Candidate | None = None
 ) -> Iterator[str]:
-    """Those that none is both cheaper and more accurate than, and that taken; the cheapest first.
+    """The Pareto front of error and cost, and the candidate taken; the cheapest first.
 
-    For a rate alone a lattice in double precision is taken where it keeps up, though the same in
-    single is cheaper and promises the same but for its rounding.
+    For a rate alone a lattice in double precision is taken where it keeps up, though single
+    precision is cheaper with the same predicted error but for rounding.
     """
     places = [(one.promise.error, one.wall_per_second) for one in candidates]
     front = [

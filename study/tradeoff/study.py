@@ -1,4 +1,4 @@
-"""The study of one scene: errors through a sweep, then costs in this process."""
+"""The work-precision study of one scene: errors by a sweep, then costs in this process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from study.run.scene_problem import SceneProblem, scene_arguments, scene_problem
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.canonical import Plain, restored
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import on_stderr
 from study.sweep.store import Store
 from study.sweep.task import Task
@@ -33,12 +33,12 @@ from study.tradeoff.timing import Clock, in_turns
 
 TABLE, RECORD = "tradeoff.csv", "tradeoff.json"
 PICTURES = ("tradeoff.svg", "tradeoff.pdf")
-"""Drawn into the folder afterwards."""
+"""Files that are drawn into the folder afterwards."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """Entries of the table, what they are compared with, its curves' errors by control point."""
+    """Entries of the table, their reference, and its curves' errors by control point."""
 
     entries: list[Entry]
     comparison: Comparison
@@ -46,12 +46,12 @@ class Found:
 
 
 def has_reference(scene: Scene) -> bool:
-    """Whether finite elements are compared with: of moved tools where the scene names them."""
+    """Whether finite elements are the reference: under moved tools only if the scene names them."""
     return not is_moved(scene) or "fem" in scene.models
 
 
 def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
-    """The reference's run, those of the finest lattices, and one for each configuration."""
+    """The run of the reference, those of the finest lattices, and one for each configuration."""
     same = scene_arguments(scene)
     compared_with = [Task(reference.FUNCTION, same)] if has_reference(scene) else []
     runs: list[Plain] = [
@@ -62,23 +62,23 @@ def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
 
 
 def _finest(scene: Scene, chosen: Sequence[Configuration]) -> list[Configuration]:
-    """Lattices that others are compared with: only where tools are moved."""
+    """Lattices that others are compared with: only under moved tools."""
     if not is_moved(scene):
         return []
     return [one for family in lattices(scene, chosen).values() for one in family]
 
 
 def judged(
-    scene: Scene, chosen: Sequence[Configuration], store: Store, how: How
+    scene: Scene, chosen: Sequence[Configuration], store: Store, backend: Backend
 ) -> tuple[Comparison, list[Outcome]]:
     """What configurations are compared with, and the outcome of each.
 
-    ValueError where the reference, or of moved tools the finest lattices, could not be solved.
+    ValueError if the reference, or under moved tools the finest lattices, could not be solved.
     """
     if not has_reference(scene):
         refuse_unlike(scene, chosen)
     with on_stderr("errors") as tell:
-        outcomes = run(tasks(scene, chosen), store, how, tell)
+        outcomes = run(tasks(scene, chosen), store, backend, tell)
     given, known, value, why = scene_problem(**scene_arguments(scene)), None, None, ""
     if has_reference(scene):
         first, *outcomes = outcomes
@@ -108,13 +108,13 @@ def study(
     scene: Scene,
     chosen: Sequence[Configuration],
     store: Store,
-    how: How,
+    backend: Backend,
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> Found:
     """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
-    comparison, outcomes = judged(scene, chosen, store, how)
+    comparison, outcomes = judged(scene, chosen, store, backend)
     entries = compared(comparison, chosen, outcomes, repeats, progress, clock)
     known = comparison.reference
     own = [] if known is None else map(float, known.curve_errors)
@@ -129,7 +129,7 @@ def compared(
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> list[Entry]:
-    """An entry per configuration, all that ran timed in turns."""
+    """An entry per configuration; those that ran are timed in turns."""
     given = comparison.given
     found = [comparison.errors(one, outcome) for one, outcome in zip(chosen, outcomes, strict=True)]
     sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
@@ -153,9 +153,9 @@ def costs(
     *,
     sized: bool = False,
 ) -> list[Cost]:
-    """Setup and cost of configurations, at steps [s] that their runs took.
+    """Setup time and cost of configurations, at the steps [s] that their runs took.
 
-    `sized`: with the memory that each keeps, which makes its set-up slower.
+    `sized`: with the memory that each holds, which makes the setup slower.
     """
     with progress.stage("setting up") as advance:
         for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
@@ -179,7 +179,7 @@ def costs(
 
 
 def _weighed(given: SceneProblem, one: Configuration) -> tuple[Stepper, int]:
-    """A stepper, and the bytes of arrays and objects that it keeps; not of factors in C."""
+    """A stepper, and the bytes of arrays and objects that it holds, without factors in C."""
     tracemalloc.start()
     try:
         stepper = _stepper(given, one)
@@ -189,12 +189,12 @@ def _weighed(given: SceneProblem, one: Configuration) -> tuple[Stepper, int]:
 
 
 def _stepper(given: SceneProblem, one: Configuration) -> Stepper:
-    """Set up afresh: a lattice keeps what it assembled for the same problem."""
+    """Set up anew, since a lattice caches what it assembled for the same problem."""
     return one.model(given.scene).prepare(replace(given.problem)).stepper()
 
 
 def step_of(outcome: Outcome) -> float:
-    """Shortest step [s] of a run that was whole."""
+    """Shortest step [s] of a run that finished."""
     found = restored(observation.Observed, outcome.value or {})
     return float("inf") if found.step_s is None else found.step_s
 
@@ -230,7 +230,7 @@ def _solved(found: Found) -> Plain:
 
 
 def place(folder: Path) -> AbstractContextManager[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
     FolderError before the block if `folder` holds anything but a study, or cannot be written.
     """
@@ -238,7 +238,7 @@ def place(folder: Path) -> AbstractContextManager[Path]:
 
 
 def refuse_unwritable(folder: Path) -> None:
-    """FolderError if `write` would refuse the folder; nothing is left behind."""
+    """Raise FolderError if `write` would refuse the folder; nothing is left behind."""
     folders.refuse_unwritable(folder, _foreign, "trade-off study")
 
 

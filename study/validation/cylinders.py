@@ -1,8 +1,8 @@
-"""Silicone cylinders between plates: whether the force at 10 to 30 % follows from 1 to 5 %.
+"""Silicone cylinders between plates: prediction of the force at 10 to 30 % from that at 1 to 5 %.
 
-The modulus of each material is fitted to the rise of the force from 1 to 5 %; the forces beyond are
-predictions. Whether the plates hold the faces was not told, and both are computed. All models are
-in proportion to the modulus, so that one solution serves all materials.
+The modulus of each material is fitted to the increase of the force from 1 to 5 %; forces beyond are
+predictions. The friction of the plates was not reported, so both conditions are computed. All
+models scale with the modulus, so that one solution serves all materials.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ STRAINS = (*SLOPE, *PREDICTED)
 MODULUS = 1e4
 """[Pa], of the one solution."""
 LOAD_ZERO = 0.1
-"""[N], of the testing machine."""
+"""[N], zero error of the testing machine."""
 FITTED = "modulus, to the rise of the force from 1 to 5 %"
 
 
 def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:
-    """Of all materials, by both conditions of the faces and each kind of model."""
+    """For all materials, by both conditions of the faces and each kind of model."""
     for faces in FACES:
         specimen = cylinder(faces)
         for name in kinds:
@@ -46,7 +46,7 @@ def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iter
 def _curves(
     specimen: Specimen, kind: Kind, faces: str, levels: int
 ) -> tuple[list[Prediction], list[float]]:
-    """Answers on meshes or spacings, coarse to fine, and their sizes."""
+    """Predictions on meshes or spacings, coarse to fine, and their sizes."""
     whole = [mesh.size for mesh in specimen.meshes] if kind.elements else list(specimen.spacings)
     # Between sliding plates the strain is uniform, and elements of any size are exact.
     count = 2 if kind.elements and faces != BONDED else levels
@@ -84,5 +84,5 @@ def _of_material(
 
 
 def _padded(force: Floats) -> Floats:
-    """Forces at all strains, nan where the model did not get to."""
+    """Forces at all strains, nan where the model did not reach the strain."""
     return np.concatenate([force, np.full(len(STRAINS) - len(force), np.nan)])

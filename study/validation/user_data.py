@@ -32,7 +32,7 @@ DELIMITERS = ",;\t"
 
 @dataclass(frozen=True)
 class Curve:
-    """Values (k,) of a column at times [s] (k,) that grow; their standard uncertainty, or None."""
+    """Values (k,) of a column at increasing times [s] (k,); their standard uncertainty, or None."""
 
     column: str
     times: Floats
@@ -41,7 +41,7 @@ class Curve:
 
     @property
     def unit(self) -> str:
-        """Of the values."""
+        """Unit of the values."""
         return CURVES[self.column]
 
 
@@ -49,7 +49,7 @@ class Curve:
 class UserMarkers:
     """Places and displacements [m] (m, 3) of markers; their standard uncertainty [m] (m,).
 
-    `lines` (m,) of the file that they stand in, for messages.
+    `lines` (m,): line numbers in the file, for messages.
     """
 
     places: Floats
@@ -59,7 +59,7 @@ class UserMarkers:
 
 
 def read_curve(path: Path) -> Curve:
-    """A curve from a CSV file; ValueError naming file, line and column for one that is none."""
+    """A curve from a CSV file; ValueError naming file, line and column if it is malformed."""
     table = _table(path)
     found = [name for name in CURVES if name in table.header]
     if len(found) != 1:
@@ -72,7 +72,7 @@ def read_curve(path: Path) -> Curve:
 
 
 def read_markers(path: Path) -> UserMarkers:
-    """Markers from a CSV file; ValueError naming file, line and column for a file without."""
+    """Markers from a CSV file; ValueError naming file, line and column if it is malformed."""
     table = _table(path)
     numbers = table.numbers((*PLACES, *MOVES))
     return UserMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(table), table.lines)

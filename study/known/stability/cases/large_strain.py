@@ -78,14 +78,14 @@ def stretch(law: str, pressure: float) -> Finding:
     """Stretch of the column under a pressure over E, or at the last stable rest before it."""
     body = _column(pressure)
     path = solve(body, TISSUE, law)
-    told = path.failure and f"{path.failure}; compared at {path.reached:g} of it"
+    message = path.failure and f"{path.failure}; compared at {path.reached:g} of it"
     if not path.converged:
         path = solve(body, TISSUE, law, (path.reached,))
     # Height of the top over that of the base, both by their mean.
     u = path.states[-1].displacement.reshape(-1, 3)
     top, base = (np.abs(body.points[:, 2] - z) < 1e-9 for z in (EDGE, 0.0))
     found = 1.0 + (u[top, 2].mean() - u[base, 2].mean()) / EDGE
-    return value(_exact(law, pressure * path.reached), float(found), told)
+    return value(_exact(law, pressure * path.reached), float(found), message)
 
 
 def gives_way(pressure: float) -> Finding:
@@ -108,8 +108,8 @@ def balance(force: float) -> Finding:
     last = path.states[-1]
     inner = solid(body, tissue).internal_force(last.displacement)
     off = np.linalg.norm(inner - last.load_factor * body.load) / np.linalg.norm(body.load)
-    told = f"at {last.load_factor:g} of the load, strain {last.largest_strain:.2g}; {failure}"
-    return value(0.0, float(off) / last.load_factor, told)
+    message = f"at {last.load_factor:g} of the load, strain {last.largest_strain:.2g}; {failure}"
+    return value(0.0, float(off) / last.load_factor, message)
 
 
 def asked(

@@ -147,17 +147,17 @@ def moves(name: str, scene: Plain, mesh: str | None, times: float) -> Finding:
     longest = min(one.critical_time_step, own.step / FRACTIONS[0])
     equal = [one.simulate(part * longest).trajectory for part in FRACTIONS]
     complete = sum(other.status == "finished" for other in equal)
-    told = f"{complete} of {len(equal)} fixed steps complete"
+    message = f"{complete} of {len(equal)} fixed steps complete"
     if found.ended_at is None:
         whole = [other for other in equal if other.status == "finished"]
         if not whole:
-            return Finding("error", message=f"nothing to compare with: {told}")
-        return replace(beside(whole[-1].displacement, found.displacement), message=told)
+            return Finding("error", message=f"nothing to compare with: {message}")
+        return replace(beside(whole[-1].displacement, found.displacement), message=message)
     finest = equal[-1].ended_at
     if complete or finest is None:
-        return Finding("error", message=f"lost by its step: {told}")
+        return Finding("error", message=f"lost by its step: {message}")
     late = max(0.0, abs(found.ended_at - finest) - interval) / finest
-    return Finding("value", finest, found.ended_at, late, f"lost by its load: {told}")
+    return Finding("value", finest, found.ended_at, late, f"lost by its load: {message}")
 
 
 def _lattice(name: str, scene: Plain, mesh: str | None) -> tuple[PreparedLattice, Problem]:
