@@ -67,6 +67,7 @@ class CoupledStepper:
         self.reduced = remainder.linear()
         self.linear = remainder.linear_motion(self.reduced)
         self.every, self.waiting = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
+        self.delivered: Floats | None = None
         self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
         self.frame = Frame(self.elements, damping, self.every)
         below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
@@ -90,6 +91,7 @@ class CoupledStepper:
         while count > 0:
             taken = min(count, self.every - self.waiting)
             self.lattice.take_steps(taken)
+            self.delivered = None
             self.waiting += taken
             count -= taken
             if self.waiting >= self.every:
@@ -107,17 +109,19 @@ class CoupledStepper:
 
     def displacement(self) -> Floats:
         """Displacement [m] (v, 3) of the vertices of the elements' mesh, at the current time."""
-        self._catch_up()
-        coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
-        linear = self.shapes @ coordinates.astype(np.float32)
-        return np.asarray(linear.reshape(-1, 3) + self.shape.weights @ self.lattice.displacement())
+        if self.delivered is None:  # a frame that has just ended has delivered it
+            self._catch_up()
+            coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
+            linear = (self.shapes @ coordinates.astype(np.float32)).reshape(-1, 3)
+            self.delivered = linear + self.shape.weights @ self.lattice.displacement()
+        return self.delivered
 
     def restart(self) -> None:
         """Return all parts to rest."""
         self.lattice.restart()
         self.linear.restart()
         self.elements.restart()
-        self.waiting = 0
+        self.waiting, self.delivered = 0, None
 
     def stepper(self) -> Stepper:
         """The stepper of the model."""

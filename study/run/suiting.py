@@ -33,6 +33,7 @@ POWERS = {
     "support.stiffness": -1,
     "tool.radius": 1,
     "tool.force": 2,
+    "tool.displacement": 1,
     "lattice.spacing": 1,
     "reference.element_size": 1,
 }
