@@ -173,14 +173,14 @@ class ModelKind:
     `on_point` does so for a scene that is a single control mass point; None if the kind needs an
     organ. `assumptions` gives sentences on how the paper was interpreted and what is neglected.
 
-    is_reference        the others are compared with it; its model has the name of the kind
-    is_tuned            its stiffness is that of the fuzzy estimates
-    patient_specific    its stiffness is a patient's; excluded from trade-off and stability studies
-    follows_law         its springs have the law and damping of the scene
-    any_load            it can follow a load whose place was unknown when it was prepared
-    ignored_keys        tables and keys of a scene that do not affect its models, so that a run that
-                        differs only in these reuses their results
-    supported_features  names of `study.problem.features.FEATURES` that its models support
+        is_reference        the others are compared with it; its model has the name of the kind
+        is_tuned            its stiffness is that of the fuzzy estimates
+        patient_specific    its stiffness is a patient's; it has no part in trade-off and stability
+        follows_law         its springs have the law and damping of the scene
+        any_load            it can follow a load whose place was unknown when it was prepared
+        ignored_keys        tables and keys of a scene that do not affect its models; a run that
+                            differs only in these reuses their results
+        supported_features  names of `study.problem.features.FEATURES` that its models support
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
