@@ -18,7 +18,6 @@ from study.problem import way
 from study.problem.way import Turn, stations, turns
 from study.progress import Silent
 from study.results.folder import read, write
-from study.robustness import organ_request
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
@@ -369,8 +368,3 @@ def test_contenders_are_those_that_follow(scene):
     found = contenders_of(scene)
     assert {"corrected", "corrected-graded", "region", "finite-elements", "springs"} <= set(found)
     assert "superposition" not in found
-
-
-def test_draws_of_a_patient_refuse_a_tool_that_travels(scene):
-    with pytest.raises(ValueError, match=r"robustness: .* travels; leave out its path"):
-        organ_request._refuse_moved(scene)

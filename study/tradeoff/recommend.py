@@ -8,10 +8,11 @@ it. A promise is the fit with its spread, the reference's own error and what the
 recommended configuration is then run and timed afresh, and the next one taken where it does not
 keep up after all.
 
-Where the place of the load is known beforehand, what follows it there only is chosen from too:
-Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
-few, and each promises what a run of it was off by, or the reference's own error if that is more.
-All are then judged by the reference with large displacements, `study.tradeoff.geometry`.
+Where the place of the load is known beforehand, or its way, what follows it there only is chosen
+from too: Ritz vectors of a single load, graded lattices, and lattices of either kind corrected by
+finite elements. There are few, and each promises what a run of it was off by, or the reference's
+own error if that is more. All are then judged by the reference with large displacements,
+`study.tradeoff.geometry`.
 
 Where tools are moved the error is that of their force over time. Against the finest lattice of the
 same springs every spacing is run, for errors by contact jump with how cells lie; each promises what
@@ -41,7 +42,7 @@ from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.geometry import with_large_displacements
 from study.tradeoff.judge import Judge
-from study.tradeoff.lineup import Configuration, fraction, may_be_single
+from study.tradeoff.lineup import Configuration, contender, fraction, may_be_single
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
@@ -285,14 +286,15 @@ class Followers:
 def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
-    Without runs that tell what geometry changes, those of small displacements are left out.
+    Without runs that tell what geometry changes, those of small displacements are left out, and
+    always the elements alone of a scene that no superposition follows: they are no contender.
     """
     chosen = list(bound(given.scene))
     _, outcomes = study.judged(given.scene, chosen, store, how)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
-    first = 0 if whole is not None else 1
+    first = 0 if whole is not None and chosen[0].contender == "superposition" else 1
     return Followers(tuple(chosen[first:]), tuple(outcomes[first:]), whole or known)
 
 
@@ -311,8 +313,14 @@ def _bound(
 
 
 def bound(scene: Scene) -> Iterator[Configuration]:
-    """What follows one place of the load only: a subspace, graded and corrected lattices."""
-    yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
+    """What follows one place of the load only, or its way: graded and corrected lattices.
+
+    First linear elements by themselves: a subspace, or as many vectors as several loads need.
+    """
+    if contender("superposition").lacks(scene):
+        yield Configuration("fem", {"method": "ritz-vectors", "level": 0})
+    else:
+        yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
     step = {"step_fraction": FRACTION}
     for times in BESIDE:
         h = tidy(times * scene.lattice.spacing)
@@ -421,8 +429,8 @@ def lines(found: Recommended) -> list[str]:
         text.append(f"{_in_mb(one.cost.memory)} kept while it steps, on top of the program's")
     if not one.configuration.any_load:
         text.append(
-            "It follows this place of the load only. The error is that against linear elements "
-            "and what corrected lattices add to them."
+            "It follows this place of the load, or its way, only. The error is that against linear "
+            "elements and what corrected lattices add to them."
         )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "

@@ -11,7 +11,6 @@ import numpy as np
 
 from study.folders import check_file, write_text
 from study.models.table import model
-from study.problem.features import BESIDE_ONE_LOAD, FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.ready import set_up
@@ -162,12 +161,11 @@ def advise(
 
 
 def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -> None:
-    """ValueError for demands that scenes of more than one load of a given force do not have."""
-    beside = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in scene.features]
-    if known_place and beside:
+    """ValueError for demands that scenes of tools that are moved do not have."""
+    if known_place and is_moved(scene):
         raise ValueError(
-            f"--known-place: what follows one place of a load only cannot follow "
-            f"{' and '.join(beside)}; leave it out"
+            "--known-place: what follows one place is made of the vectors of a load of a given "
+            "force, and the force of a tool that is moved is a result; leave it out"
         )
     if absolute is not None and is_moved(scene):
         raise ValueError(
