@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fem_reference.model import start_of
+from fem_reference.observation import at_points, evaluation
 from fem_reference.subspace import ritz_subspace
 from reports import field_figures
 from reports.page import data as page_data
@@ -325,9 +327,23 @@ def _left(wanted, seen, spacing):
 
 
 def test_no_corrected_lattice_is_foretold_of_what_it_cannot_follow():
-    wanted, seen = looked("gravity.acceleration=9.81 m/s^2")
+    wanted, seen = looked("lattice.geometry=linear")
     assert seen.beyond is None
     assert not list(moved.corrected(wanted, seen))
+
+
+def test_what_is_foretold_of_elements_is_of_their_sag_too():
+    sagging = "gravity.acceleration=9.81 m/s^2", "gravity.towards=right"
+    wanted, seen = looked(*sagging)
+    assert list(moved.corrected(wanted, seen))
+    body = model(wanted, "fem").prepare(problem_of(wanted)).body()
+    finest = seen.elements.elements[-1]
+    assert finest.unknowns >= body.unknowns
+    sag = evaluation(body, seen.elements.problem.observation.probes)
+    _, light = looked()
+    added = finest.rest.probes - light.elements.elements[-1].rest.probes
+    known = at_points(sag, start_of(body))
+    assert np.linalg.norm(added - known) < 0.1 * np.linalg.norm(known)
 
 
 def test_rest_is_refused_of_a_tool_that_travels():

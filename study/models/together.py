@@ -68,6 +68,7 @@ class Together:
         self.every, self.waiting = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
         self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
         self.frame = Frame(self.elements, damping, self.every)
+        self.start = shape.start - shape.weights @ remainder.start
         below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
         own = shape.subspace.vectors @ self.elements.modes
         shapes = np.hstack([own, -below.reshape(len(own), -1)])
@@ -109,7 +110,8 @@ class Together:
         self._catch_up()
         coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
         linear = self.shapes @ coordinates.astype(np.float32)
-        return np.asarray(linear.reshape(-1, 3) + self.shape.weights @ self.lattice.displacement())
+        nonlinear = self.shape.weights @ self.lattice.displacement()
+        return np.asarray(self.start + linear.reshape(-1, 3) + nonlinear)
 
     def restart(self) -> None:
         """Put all parts at rest again."""
