@@ -27,6 +27,19 @@ def static_displacement(assembly: Assembly, material: Material) -> Floats:
     return extended(assembly, solved(stiffness, assembly.load.ravel())).reshape(-1, 3)
 
 
+def sag(assembly: Assembly, material: Material) -> Floats:
+    """Displacement [m] (n, 3) at rest under gravity alone, linearised at rest.
+
+    None of it counts where the given nodes are those at rest. ValueError if the support does not
+    hold the lattice.
+    """
+    burden = assembly.burden
+    if burden is None or burden.given_loaded or not burden.dead.any():
+        return np.zeros_like(assembly.load)
+    stiffness = stiffness_at_rest(assembly, material)
+    return extended(assembly, solved(stiffness, burden.dead.ravel())).reshape(-1, 3)
+
+
 def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> Floats:
     """Displacement [m] (3 n,) under nodal forces [N] (3 n,), to a residual of `tolerance` of them.
 
