@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.table1 import AETIOLOGIES
-from msm.settled import NoRestError
+from msm.dead_load import NoEquilibriumError
 from study.models.model import Simulation
 from study.models.table import models_of
 from study.problem.problem import Problem
@@ -135,7 +135,7 @@ def _scores(draw: OrganDraw, moduli: Mapping[str, float], scene: Scene, problem:
     models = models_of(drawn, {name: _estimate(name, e) for name, e in moduli.items()})
     try:
         found = {model.name: model.prepare(posed).simulate() for model in models}
-    except NoRestError:
+    except NoEquilibriumError:
         return np.tile(DIVERGED, (len(CONTENDERS), 1))
     truth = found.pop("basafa")
     named = {READING: found[READING]} | {name: found[f"msm-{name}"] for name in SYSTEMS}
