@@ -28,16 +28,16 @@ def static_displacement(assembly: Assembly, material: Material) -> Floats:
 
 
 def sag(assembly: Assembly, material: Material) -> Floats:
-    """Displacement [m] (n, 3) at rest under gravity alone, linearised at rest.
+    """Displacement [m] (n, 3) in equilibrium under gravity alone, linearised at rest.
 
-    None of it counts where the given nodes are those at rest. ValueError if the support does not
-    hold the lattice.
+    It is zero if the given nodes are those under gravity. ValueError if the support does not hold
+    the lattice.
     """
-    burden = assembly.burden
-    if burden is None or burden.given_loaded or not burden.dead.any():
+    loads = assembly.external_loads
+    if loads is None or loads.given_loaded or not loads.dead.any():
         return np.zeros_like(assembly.load)
     stiffness = stiffness_at_rest(assembly, material)
-    return extended(assembly, solved(stiffness, burden.dead.ravel())).reshape(-1, 3)
+    return extended(assembly, solved(stiffness, loads.dead.ravel())).reshape(-1, 3)
 
 
 def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> Floats:

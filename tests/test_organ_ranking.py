@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msm.settled import NoRestError
+from msm.dead_load import NoEquilibriumError
 from reports import organ_ranking as told
 from reports.ranking_study import FEWEST, movers
 from study.commands.flags import WorkerFlags
@@ -123,9 +123,9 @@ def test_a_draw_that_finds_no_rest_under_its_weight_counts_for_no_one(monkeypatc
     hung = organ.prepared(read_scene("block", HUNG))
 
     def lost(*_):
-        raise NoRestError("it falls", "hold it")
+        raise NoEquilibriumError("it falls", "hold it")
 
-    monkeypatch.setattr("msm.stepper.sagged", lost)
+    monkeypatch.setattr("msm.stepper.rest_under_dead_load", lost)
     assert np.isnan(scored(as_the_scene(hung), scene_problem(**scene_arguments(hung)))).all()
 
 

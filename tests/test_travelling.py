@@ -187,7 +187,7 @@ def test_a_lattice_carries_the_whole_force(scene, problem):
     times = np.array([0.05, 0.22, 0.4])
     first, *others = problem.factors(times).T
     whole = first[:, None, None] * found.load + np.einsum(
-        "kt,knd->tnd", np.array(others), found.burden.loads
+        "kt,knd->tnd", np.array(others), found.external_loads.loads
     )
     expected = -scene.tool.history.factor(times) * scene.tool.force
     np.testing.assert_allclose(whole.sum(axis=1)[:, 2], expected, rtol=1e-9)

@@ -299,12 +299,12 @@ def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> Sp
 
 
 def _weights_damped(lattice: PreparedLattice) -> PreparedLattice:
-    """The lattice that damps attached weights as it does tissue: elements and modes do so too."""
-    plain, burden = lattice.assembly, lattice.assembly.burden
-    if burden is None or not burden.attached.any():
+    """The lattice with attached weights damped as tissue, as in the elements and the modes."""
+    plain, loads = lattice.assembly, lattice.assembly.external_loads
+    if loads is None or not loads.attached_mass.any():
         return lattice
-    damped = replace(burden, attached=np.zeros_like(burden.attached))
-    return replace(lattice, assembly=replace(plain, burden=damped))
+    damped = replace(loads, attached_mass=np.zeros_like(loads.attached_mass))
+    return replace(lattice, assembly=replace(plain, external_loads=damped))
 
 
 def assumptions(scene: Scene) -> list[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.table1 import AETIOLOGIES
-from msm.settled import NoRestError
+from msm.dead_load import NoEquilibriumError
 from study.models.model import Simulation
 from study.models.table import models_of
 from study.problem.problem import Problem
@@ -136,7 +136,7 @@ def _scores(draw: OrganDraw, moduli: Mapping[str, float], scene: Scene, problem:
     try:
         posed = _posed(draw, drawn, problem)
         found = {model.name: model.prepare(posed).simulate() for model in models}
-    except (NoRestError, OffSurfaceError):
+    except (NoEquilibriumError, OffSurfaceError):
         return np.tile(DIVERGED, (len(CONTENDERS), 1))
     truth = found.pop("basafa")
     named = {READING: found[READING]} | {name: found[f"msm-{name}"] for name in SYSTEMS}
