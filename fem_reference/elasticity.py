@@ -39,28 +39,28 @@ from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
-# Degrees that the quadrature integrates: squares of quadratic functions; the load and the support
-# vary inside a facet, so more there. Gradients in curved cells are no polynomials at all.
+# Degrees of quadrature. MASS_ORDER integrates squares of quadratic functions exactly. Load and
+# support vary inside a facet and need more. Gradients in curved cells are not polynomial.
 CURVED_ORDER = 4
 MASS_ORDER = 4
 FACET_ORDER = 10
 ENTRIES = 2**16
-"""Of a matrix that are made at once."""
+"""Matrix blocks per batch."""
 ROUNDING = 1e-9
-"""Of lambda over mu, the difference of two moduli."""
+"""Rounding of lambda, a difference of two moduli, relative to mu."""
 
 
 class Loaded(NamedTuple):
-    """The element that is meant, and scikit-fem's basis of one component on the facets."""
+    """The chosen element, and scikit-fem's basis of one component on the boundary facets."""
 
     element: ElementName
     surface: Any
 
 
 class Outline(NamedTuple):
-    """A body's mesh and shape functions, by which fields on it are seen, without its matrices.
+    """Mesh and shape functions of a body, without its matrices, for the evaluation of fields.
 
-    `nodes`: scikit-fem's basis of one component, at a single point of every cell.
+    `nodes`: scikit-fem's basis of one component, with a single quadrature point per cell.
     """
 
     mesh: TetrahedralMesh
@@ -71,18 +71,17 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class Body:
-    """The discretised body; unknowns u [m] (3 nodes,), component by component of each node.
+    """The discretised body, with unknowns u [m] (n,) = (3 nodes,), the components node by node.
 
-    `nodes`: scikit-fem's basis of one component, vertices first, then edges; `stiffness` [N/m] has
-    the foundation in it, `support` [N/m] is the foundation alone; `mass` [kg], consistent; `load`
-    [N], the tool's force spread over the surface, its sum `force` along the tool; `gradients`: what
-    the stiffness is made of by the tissue's constants; `composition`: what each cell is made of,
-    None where all are of one tissue. `fixed` (3 nodes,): unknowns that do not move, None where all
-    do; they are coupled to nothing and without load, but keep a stiffness and a mass of their own.
-    `nodal_mass` [kg] (n,): the mass at each unknown, with what is coupled to fixed ones. `others`:
-    [N] (n,) each, of further loads; `dead` [N] (n,): what acts at all times, and has taken the body
-    to where its motion starts. `full` (loads,): share of each load in the rest under all of them,
-    None for all of each.
+    `nodes`: scikit-fem's basis of one component, vertices first, then edge nodes. `stiffness`
+    [N/m]: tissue and foundation; `support` [N/m]: foundation alone; `mass` [kg]: consistent mass;
+    `load` [N]: nodal forces of the tool, which sum to its force; `gradients`: integrals from which
+    the stiffness follows for any elastic constants; `composition`: tissue of each cell, None for a
+    homogeneous body. `fixed` (n,): constrained unknowns, None without any; they are decoupled and
+    without load, but keep their diagonal stiffness and mass. `nodal_mass` [kg] (n,): row sums of
+    the mass, including the coupling to constrained unknowns. `others` [N] (n,) each: further loads;
+    `dead` [N] (n,): dead load, under which the motion starts in equilibrium. `full` (loads,):
+    factor of each load in the static solution under all loads, None for 1 each.
     """
 
     mesh: TetrahedralMesh
@@ -102,20 +101,20 @@ class Body:
 
     @property
     def loads(self) -> Floats:
-        """Nodal forces [N] (n, loads) of all that have a history, each in full."""
+        """Nodal forces [N] (n, loads) of all loads with a history, each in full."""
         return np.column_stack([self.load, *self.others])
 
     @property
     def full_load(self) -> Floats:
-        """Nodal forces [N] (n,) of all loads in full: of one that travels, at one place."""
+        """Nodal forces [N] (n,) of all loads in full; a travelling load acts at one place."""
         loads = self.loads
         return np.asarray(loads.sum(axis=1) if self.full is None else loads @ self.full)
 
     @property
     def whole_load(self) -> Floats:
-        """Nodal forces [N] (n,) of all loads in full and of what acts at all times."""
-        whole = self.full_load
-        return np.asarray(whole if self.dead is None else whole + self.dead)
+        """Nodal forces [N] (n,) of all loads in full, dead load included."""
+        load = self.full_load
+        return np.asarray(load if self.dead is None else load + self.dead)
 
     @property
     def node_count(self) -> int:
@@ -129,7 +128,7 @@ class Body:
 
     @property
     def outline(self) -> Outline:
-        """What fields on it are seen by."""
+        """Mesh and shape functions of the body, for the evaluation of fields."""
         cells, centre = self.nodes, (np.full((3, 1), 0.25), np.ones(1))
         nodes = skfem.Basis(cells.mesh, cells.elem, cells.mapping, quadrature=centre)
         return Outline(self.mesh, self.element, nodes, self.unknowns)
@@ -140,21 +139,21 @@ class Body:
         return np.ascontiguousarray(self.nodes.doflocs.T)
 
     def inertia(self, acceleration: Floats) -> Floats:
-        """Nodal forces [N] (n,) of an acceleration [m/s^2] (n,), the mass times it."""
+        """Mass times an acceleration [m/s^2] (n,): nodal forces [N] (n,)."""
         if self._nodal is None:
             return np.asarray(self.mass @ acceleration)
         return np.asarray(self._nodal @ acceleration.reshape(-1, 3)).ravel()
 
     @cached_property
     def _nodal(self) -> csr_array | None:
-        """Mass of one component, a third of the whole; None where they are not alike."""
+        """Mass matrix of one component; None where the components differ."""
         own, found = self.mass.diagonal().reshape(-1, 3), csr_array(self.mass[::3, ::3])
         alike = self.mass.nnz == 3 * found.nnz and bool((own == own[:, :1]).all())
         return found if alike else None
 
     @cached_property
     def basis(self) -> Any:
-        """scikit-fem's basis of displacements, whose unknowns are ordered as those here."""
+        """scikit-fem's vector basis of displacements, with the order of unknowns of the body."""
         element = skfem.ElementVector(ELEMENTS[self.element].shapes())
         return skfem.Basis(self.nodes.mesh, element, self.nodes.mapping, intorder=MASS_ORDER)
 
@@ -170,10 +169,10 @@ def discretise(
 ) -> Body:
     """Assemble the body.
 
-    With `project`, which takes points [m] (n, 3) to the exact surface, quadratic elements are
-    curved along it. `loaded`: what `loaded_surface` gave of the same, if it is known. ValueError if
-    the tool or the support touches no surface, for a Poisson ratio that no solid has, and for a
-    tetrahedron without volume.
+    With `project`, which maps points [m] (n, 3) onto the exact surface, quadratic elements are
+    curved along it. `loaded`: result of `loaded_surface` for the same arguments, if known.
+    ValueError if the tool or the support touches no surface, for a Poisson ratio outside (-1, 0.5),
+    and for a tetrahedron without volume.
     """
     given = (mesh, tissue, foundation, tool, element, project)
     name, surface = loaded or loaded_surface(*given)
@@ -188,7 +187,7 @@ def discretise(
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)
     mass = decoupled(whole, fixed)
-    stiffness = _held(_elastic(integrals, nodes, name, tissue, made), support, fixed)
+    stiffness = _with_support(_elastic(integrals, nodes, name, tissue, made), support, fixed)
     load = without_fixed(patch_load(surface, tool), fixed)
     return Body(
         mesh,
@@ -206,12 +205,12 @@ def discretise(
 
 
 def without_fixed(force: Floats, fixed: Booleans | None) -> Floats:
-    """Nodal forces [N] (n,) but for those on what does not move."""
+    """Nodal forces [N] (n,) with zeros at constrained unknowns."""
     return force if fixed is None else np.where(fixed, 0.0, force)
 
 
 def _fixed(surface: Any, foundation: Support) -> Booleans | None:
-    """Unknowns (3 nodes,) of all facets whose middle does not move; None if all may move."""
+    """Unknowns (3 nodes,) on facets whose centre is fixed; None without any."""
     points = rows(surface.global_coordinates()).mean(axis=1)
     held = foundation.fixed(points, rows(surface.normals).mean(axis=1))
     if not held.any():
@@ -225,7 +224,7 @@ def _fixed(surface: Any, foundation: Support) -> Booleans | None:
 
 
 def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
-    """Without the entries that couple fixed unknowns to any other."""
+    """The matrix without entries that couple constrained unknowns to others."""
     if fixed is None:
         return matrix
     found = matrix.tocoo()
@@ -235,7 +234,7 @@ def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
 
 
 def composed(nodes: Any, tissue: Tissue) -> Composition | None:
-    """What the cells of a basis are made of, curved ones as they are; None for one tissue."""
+    """Tissue of the cells of a basis, straight or curved; None for a homogeneous body."""
 
     def points(cells: slice) -> Floats:
         inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
@@ -246,14 +245,14 @@ def composed(nodes: Any, tissue: Tissue) -> Composition | None:
 
 
 def _mass(nodes: Any, where: Pattern, tissue: Tissue, made: Composition | None) -> csr_array:
-    """Of one component [kg]."""
+    """Mass matrix [kg] of one component."""
     if made is None:
         return tissue.density * products(nodes, where)
     return products(nodes, where, made.density(tissue.density))
 
 
 def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
-    """Lame's constants [Pa] to go with values (cells, q): of one tissue, or of each cell."""
+    """Lame constants [Pa], of one tissue or per cell (cells, 1)."""
     if made is None:
         return Moduli(*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
     found = made.moduli(tissue)
@@ -261,10 +260,10 @@ def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
 
 
 def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
-    """The same body with the elastic constants of another tissue, on its nodes and their integrals.
+    """The same body with the elastic constants of another tissue, reusing its integrals.
 
-    Mass, support and load stay. ValueError for a Poisson ratio that no solid has, and for an
-    element with other nodes.
+    Mass, support and load are unchanged. ValueError for a Poisson ratio outside (-1, 0.5), and for
+    an element with other nodes.
     """
     name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
@@ -272,19 +271,19 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
         raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
     pressure = body.stiffness.pressure
     own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
-    return replace(body, element=name, stiffness=_held(own, body.support, body.fixed))
+    return replace(body, element=name, stiffness=_with_support(own, body.support, body.fixed))
 
 
 def bare(body: Body) -> Body:
-    """The body without the matrix of its stiffness, of which `of_tissue` makes another."""
+    """The body without its stiffness matrix, for `of_tissue` to make another."""
     size = body.stiffness.size
     return replace(body, stiffness=replace(body.stiffness, matrix=csr_array((size, size))))
 
 
-def _held(own: Stiffness, support: csc_array, fixed: Booleans | None) -> Stiffness:
-    """With the support in it, whose nodes are of cells too, and fixed unknowns coupled to nothing.
+def _with_support(own: Stiffness, support: csc_array, fixed: Booleans | None) -> Stiffness:
+    """The stiffness plus the support, whose pattern it contains, with fixed unknowns decoupled.
 
-    The matrix is changed, not copied.
+    The matrix is changed in place.
     """
     matrix, nodal = own.matrix, coo_array(support[::3, ::3])
     rows = np.repeat(np.arange(nodal.shape[0]), np.diff(matrix.indptr))
@@ -316,9 +315,9 @@ def loaded_surface(
     element: str = AUTO,
     project: Projection | None = None,
 ) -> Loaded:
-    """What a body is loaded on.
+    """The element and the boundary facets of a body.
 
-    All that `discretise` refuses is refused here, where little is computed.
+    It raises every ValueError of `discretise`, before anything expensive.
     """
     name = chosen_element(element, tissue.highest_poisson_ratio)
     _check_poisson_ratio(tissue.poisson_ratio)
@@ -332,7 +331,7 @@ def loaded_surface(
 
 
 def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:
-    """ValueError if no integration point of the facets is held, or pushed."""
+    """ValueError if no integration point of the facets is supported, or none is loaded."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     coarse = f"on a mesh of {surface.mesh.nelements} tetrahedra"
     if not (
@@ -368,18 +367,18 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
 
 
 def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
-    """Stiffness without support; with Taylor-Hood the volume's part goes by the pressure."""
+    """Stiffness without support; Taylor-Hood elements have the volumetric part by the pressure."""
     nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), mapping(grid), intorder=_order(grid, name))
     return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue, composed(nodes, tissue))
 
 
 def _order(grid: Any, name: ElementName) -> int:
-    """Degree that the quadrature of the stiffness integrates."""
+    """Degree of the quadrature of the stiffness."""
     return CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else ELEMENTS[name].gradient_order
 
 
 def _by_order(nodes: Any, order: int) -> Any:
-    """The same basis with the quadrature of an order, where it is another than the mass's."""
+    """The basis with quadrature of another order, itself where that is the order of the mass."""
     if order == MASS_ORDER:
         return nodes
     return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=order)
@@ -393,11 +392,11 @@ def _elastic(
     made: Composition | None = None,
     pressure: Pressure | None = None,
 ) -> Stiffness:
-    """Stiffness without support from its integrals, and from those of a pressure if there are."""
+    """Stiffness without support from its integrals, and from those of a known pressure if given."""
     if made is not None:
         return _varied(nodes, name, tissue, made)
     lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u says nothing where lambda is 0
+    mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u needs lambda > 0
     matrix = _isotropic(integrals, 0.0 if mixed else lame, mu)
     if not mixed:
         return Stiffness(matrix)
@@ -406,10 +405,10 @@ def _elastic(
 
 
 def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
-    """The same of cells with moduli of their own, by which the integrals are weighed.
+    """Stiffness without support of cells with moduli of their own, which weight the integrals.
 
-    A continuous pressure does not follow one that jumps where tissue changes, and is smeared over
-    the elements there. ValueError beside a pressure for tissue that it says nothing of.
+    The continuous pressure smears the jump of the exact one at an interface over the elements
+    there. ValueError for mixed elements with a Poisson ratio of 0.
     """
     where, by_gradient = pattern(nodes), _by_order(nodes, _order(nodes.mesh, name))
     lame, mu = made.moduli(tissue)
@@ -430,9 +429,9 @@ def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) ->
 def _pressure(
     nodes: Any, name: ElementName, density: Floats | None = None
 ) -> tuple[csc_array, csc_array]:
-    """One rule for both: the product of a divergence and a pressure, and of two pressures.
+    """Integrals of divergence times pressure, and of pressure times pressure, by one quadrature.
 
-    The second times a density (cells,), where one is given.
+    The second have the factor `density` (cells,), if given.
     """
     grid, order = nodes.mesh, _order(nodes.mesh, name)
     pressure = skfem.Basis(grid, skfem.ElementTetP1(), nodes.mapping, intorder=order)
@@ -447,14 +446,16 @@ def _pressure(
 def _isotropic(
     integrals: Gradients, lame: float, mu: float, by_lame: Gradients | None = None
 ) -> bsr_array:
-    """Block (i, j) is lambda D_ij + mu D_ji of the integrals, on the diagonal mu tr D as well.
+    """Blocks lambda D_ij + mu D_ji of the integrals, plus mu tr D for i = j.
 
-    `by_lame`: other integrals to go with lambda.
+    `by_lame`: other integrals for lambda.
     """
     D = integrals.values
-    blocks = np.multiply(mu, D.mT, order="C")  # any other order is copied by every product
+    blocks = np.multiply(mu, D.mT, order="C")  # products copy any other memory order
     with_lame = (integrals if by_lame is None else by_lame).values
-    for start in range(0, len(blocks), ENTRIES):  # a whole product would be as large as the matrix
+    for start in range(
+        0, len(blocks), ENTRIES
+    ):  # in batches, as a product has the size of the matrix
         part = slice(start, start + ENTRIES)
         blocks[part] += lame * with_lame[part]
     diagonal = np.einsum("nii->ni", blocks)
@@ -466,12 +467,12 @@ def _isotropic(
 
 
 def by_component(matrix: csc_array) -> csc_array:
-    """A matrix of one component for all three."""
+    """The matrix of all three components from that of one."""
     return csc_array(kron(matrix, eye_array(3), format="csc"))
 
 
 def _finite(matrix: Any, name: str) -> csc_array:
-    """scikit-fem assembles broken meshes without complaint; the matrix tells."""
+    """ValueError for a matrix that is not finite: scikit-fem does not check the mesh."""
     if not np.isfinite(matrix.data).all():
         raise ValueError(f"{name} matrix is not finite: the mesh has a flat tetrahedron")
     return csc_array(matrix)
@@ -482,7 +483,7 @@ def _foundation_form(foundation: Support) -> Any:
 
 
 def patch_load(surface: Any, tool: ToolPatch) -> Floats:
-    """Nodal forces [N] of the tool's traction, scaled so that they add up to its force."""
+    """Nodal forces [N] of the tool's traction, scaled so that they sum to its force."""
     form = skfem.LinearForm(lambda v, w: tool.profile(rows(w.x), rows(w.n)) * v)
     nodal = np.asarray(form.assemble(surface))
     total = float(nodal.sum())
@@ -490,5 +491,5 @@ def patch_load(surface: Any, tool: ToolPatch) -> Floats:
 
 
 def rows(values: Any) -> Floats:
-    """scikit-fem's (3, ...) as (..., 3)."""
+    """Array (3, ...) of scikit-fem as (..., 3)."""
     return np.moveaxis(np.asarray(values), 0, -1)

@@ -35,10 +35,10 @@ class _OwnTypes(FunctionCache):  # type: ignore[misc] # numba publishes no types
 
 def _is_ours(sig: Any) -> bool:
     tuples = [kind.instance_class for kind in sig if hasattr(kind, "instance_class")]
-    return all(map(_belongs_here, tuples))
+    return all(map(_stands_here, tuples))
 
 
-def _belongs_here(thing: Any) -> bool:
+def _stands_here(thing: Any) -> bool:
     return bool(thing.__module__.partition(".")[0] == OURS)
 
 
@@ -63,7 +63,7 @@ def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F
 def _compiled(**options: Any) -> Callable[[F], F]:
     def compiled(function: F) -> F:
         made = numba.njit(error_model="numpy", **options)(function)
-        if _belongs_here(function):
+        if _stands_here(function):
             made._cache = _OwnTypes(function)  # what cache=True sets
         return made  # type: ignore[no-any-return] # numba publishes no types
 

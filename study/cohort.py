@@ -15,7 +15,7 @@ from pathlib import Path
 
 from fuzzy.liver.bases import KNOWLEDGE
 from fuzzy.liver.cohort import NOMINAL, CohortRow, CohortStudy, Comparison, cohort_study
-from fuzzy.liver.monotony import falls
+from fuzzy.liver.monotonicity import falls
 from fuzzy.liver.settings import LiverSettings
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.sets import Array

@@ -1,8 +1,8 @@
-"""The cells of CSV files as spreadsheets write them, in any locale.
+"""CSV files as written by spreadsheets, in any locale.
 
-Columns are parted by commas, semicolons or tabs, whichever parts the header into most, or as a
-first line `sep=;` says. Lines without any cell filled and columns at the end without a name are
-what is left of a larger sheet, and dropped.
+The delimiter is the one of comma, semicolon and tab that divides the header into most columns, or
+that of a first line `sep=;`. Empty lines and unnamed columns at the end, as spreadsheets leave
+them, are dropped.
 """
 
 import csv
@@ -34,7 +34,7 @@ class Table(NamedTuple):
     delimiter: str = ","
 
     def fault(self, line: int, what: str) -> TableError:
-        """The TableError that blames a line of the file."""
+        """A TableError that names a line of the file."""
         return TableError(f"{self.file}:{line}: {what}")
 
 
@@ -68,7 +68,7 @@ def _text(path: Path) -> str:
 
 
 def _header_width(text: str, delimiter: str) -> int:
-    """Into how many cells a delimiter parts the first line that holds any."""
+    """Number of cells of the first line with content, by a delimiter."""
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
         return next((len(cells) for cells in reader if any(cells)), 0)
@@ -79,7 +79,7 @@ def _header_width(text: str, delimiter: str) -> int:
 def _filled(path: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
     """The rows up to the last with a cell that is not blank, and the lines on which they begin.
 
-    A row of blanks between others is that of somebody; an empty line is nobody's.
+    A row of blank cells between others counts as a row; an empty line does not.
     """
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     after, blank = 0, list[tuple[int, list[str]]]()
@@ -139,7 +139,7 @@ def number(cell: str, table: Table, line: int, name: str, *, commas: bool) -> fl
 def write_table(
     path: Path, header: Sequence[str], rows: Iterable[Sequence[str]], delimiter: str
 ) -> None:
-    """Write the file aside and move it into place. TableError if there is no place for it."""
+    """Write the file atomically. TableError if it cannot be written."""
     text = io.StringIO()
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
     writer.writerow(header)

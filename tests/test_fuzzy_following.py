@@ -6,11 +6,11 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from fuzzy.liver import derivation, monotony
+from fuzzy.liver import derivation, monotonicity
 from fuzzy.liver.assumptions import assumptions
 from fuzzy.liver.bases import KNOWLEDGE, STAGES_ONLY
 from fuzzy.liver.knowledge import rows
-from fuzzy.liver.monotony import largest_fall
+from fuzzy.liver.monotonicity import largest_fall
 from fuzzy.liver.partition import Combination, following_system, placement, reading_noise
 from fuzzy.liver.readings import READINGS, disease_sets
 from fuzzy.liver.settings import LiverSettings
@@ -137,7 +137,7 @@ def test_without_its_own_cells_and_cores_the_estimate_falls_several_times_as_far
     planted = following_system(
         placement("freed")._replace(sets=dict(kept), combinations=bare), FREED, present
     )
-    monkeypatch.setattr(monotony, "liver_system", lambda *_: planted)
+    monkeypatch.setattr(monotonicity, "liver_system", lambda *_: planted)
     assert largest_fall(system, FREED, present).anywhere > 5 * MOST_FALLEN[len(present)]
 
 
@@ -147,7 +147,7 @@ def test_falls_are_those_of_the_estimates(monkeypatch):
     sets = dict(placed.sets)
     sets["hcv"] = (*sets["hcv"][:2], sets["hcv"][2]._replace(consequent=3.0), *sets["hcv"][3:])
     planted = following_system(placed._replace(sets=sets), FREED, ("hcv",))
-    monkeypatch.setattr(monotony, "liver_system", lambda *_: planted)
+    monkeypatch.setattr(monotonicity, "liver_system", lambda *_: planted)
     X = np.full((400, 5), 4.1)
     X[:, 0] = np.geomspace(2.0, 75.0, 400)
     found = compiled(planted, "sugeno", FREED.options, pruned=False).evaluate(X).value
@@ -371,7 +371,7 @@ def test_combinations_are_those_of_their_script(knowledge):
 
 @pytest.mark.parametrize("name", ["hcv", "hbv"])
 def test_the_search_for_paper_count_finds_nothing_better_close_by(name):
-    judged = derivation.population_judged(name)
+    judged = derivation.aetiology_training_data(name)
     kept = placement("paper-count").sets[name]
     best = derivation.loss(name, kept, judged)
     for k in range(len(kept)):

@@ -1,1 +1,1 @@
-"""Rigid tools that are moved against a linear elastic body, and may leave it again."""
+"""Unilateral contact of an elastic body with rigid tools of prescribed motion."""

@@ -1,10 +1,10 @@
-"""Motion of a body under rigid tools that are moved.
+"""Motion of a linear elastic body in contact with rigid tools of prescribed motion.
 
-Modes that are too fast for the samples to show follow their forces at once: with them, a body that
-is held against a tool would be stiff at every step, and its force would never settle. The rest is
-stepped by the stiffly accurate diagonally implicit Runge-Kutta method of two stages and second
-order: Alexander (1977), SIAM J. Numer. Anal. 14:1006. Each stage ends with forces that keep the
-body out of the tools, and damps what the step cannot follow.
+Modes too fast for the sampling respond statically; their vibration would make the contact forces
+oscillate at every step. The others are integrated by the stiffly accurate, singly diagonally
+implicit Runge-Kutta method of two stages and order 2: Alexander (1977), SIAM J. Numer. Anal.
+14:1006. Each stage ends with contact forces that satisfy the contact conditions, and damps
+frequencies that the step does not resolve.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ Floats = NDArray[np.float64]
 GAMMA = 1.0 - np.sqrt(0.5)
 ORDER = 2
 OWN_STEPS = 200
-"""Fewest steps of a motion: forces are not as smooth as displacements."""
+"""Least number of steps of a motion: contact forces are less smooth than displacements."""
 GENERATIONS, MOST_GENERATIONS = 5, 15
 WAY = 9
-"""Places on the way to the peak at which a rest is found."""
+"""Positions on the path to the peak at which the static contact problem is solved."""
 LESS = 0.75
 TINY = 1e-300
 
@@ -48,8 +48,9 @@ TINY = 1e-300
 class Moving:
     """State at a time [s].
 
-    `q`, `v` (m,): in the subspace; `r`, `s` (c + k,): forces under tools, and factors of the loads,
-    as the dents follow them, and their rates [N/s, 1/s]; `grip`: the forces under the tools.
+    `q`, `v` (m,): modal displacement and velocity; `r`, `s` (c + k,): contact forces [N] and load
+    factors as delayed by damping in the static residuals, and their rates [N/s, 1/s]; `grip`:
+    contact forces.
     """
 
     time: float
@@ -61,9 +62,9 @@ class Moving:
 
 
 class Stages:
-    """Implicit stages of a reduced body, all of the same length [s].
+    """Implicit stages of a reduced body, all of the same `length` [s].
 
-    `base` [m] (n,): where the body is without motion and tools.
+    `base` [m] (n,): static displacement without tools.
     """
 
     def __init__(
@@ -96,7 +97,7 @@ class Stages:
         return np.atleast_1d(self.factors(np.array([time]))[0])
 
     def reached(self, time: float, q: Floats, v: Floats, r: Floats, grip: Grip) -> Moving:
-        """The state at a time [s], from what the stage starts from, and the forces before."""
+        """State at the end of a stage at a time [s], from its start values and the last forces."""
         body, length, count = self.body, self.length, self.under_tools
         loaded = self.loaded(time)
         free = (v + length * (body.loads @ loaded - body.squares * q)) * self.damped
@@ -112,7 +113,7 @@ class Stages:
 
 
 def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
-    """States from a start at rest on, a step [s] apart."""
+    """States from a start at rest, one `step` [s] apart."""
     now = start
     yield now
     for n in range(1, 2**62):
@@ -132,13 +133,13 @@ def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """States at samples, as many as were reached, and why there are no more."""
+    """States at the samples, and the time [s] at which contact did not converge, if any."""
 
     states: tuple[Moving, ...]
     unsettled: float | None
 
     def curves(self, body: Reduced, recorder: Recorder) -> ProbeCurves:
-        """The motion of the control points."""
+        """Displacement and velocity of the control points."""
         matrix = recorder.at_probes
         modes, dents = (_seen(matrix, one) for one in (body.shapes, body.residual))
         pairs = [((one.q, one.r), (one.v, one.s)) for one in self.states]
@@ -149,12 +150,12 @@ class Sampled:
         return ProbeCurves(*curves)
 
     def forces(self, given: Answered) -> Floats:
-        """On the tools [N] (samples, tools, 3)."""
+        """Forces [N] (samples, tools, 3) on the tools."""
         return np.array([given.touch.on_tools(one.grip.force) for one in self.states])
 
 
 def _seen(matrix: csr_array, vectors: Floats) -> Floats:
-    """Of vectors (n, m) at probes (p, 3, m)."""
+    """Vectors (n, m) at the control points, (p, 3, m)."""
     count = vectors.shape[1]
     nodal = vectors.reshape(-1, 3 * count)
     return np.asarray(matrix @ nodal).reshape(-1, 3, count)
@@ -162,7 +163,7 @@ def _seen(matrix: csr_array, vectors: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """A body under tools and what moves it."""
+    """A motion in contact: body, damping, load factors, static displacement, samples and steps."""
 
     given: Answered
     damping: RayleighDamping
@@ -173,28 +174,28 @@ class Pressed:
 
     @property
     def step(self) -> float:
-        """Length of a step [s]."""
+        """Time step [s]."""
         return float(self.times[1] - self.times[0]) / self.per_sample
 
     @property
     def highest(self) -> float:
-        """Angular frequency [1/s] above which samples show no vibration."""
+        """Nyquist angular frequency [1/s] of the samples."""
         return float(np.pi / (self.times[1] - self.times[0]))
 
     def start(self, body: Reduced) -> Moving:
-        """At rest under what acts at all times, with the tools where they start."""
+        """Equilibrium under the dead load with the tools at their start."""
         grip = self.given.at_rest(self.base, self.given.free, np.zeros(1))
         q = (body.pushed.T @ grip.force) / body.squares
         dented = np.append(grip.force, np.zeros(self.given.body.loads.shape[1]))
         return Moving(0.0, q, np.zeros_like(q), dented, np.zeros_like(dented), grip)
 
     def stages(self, body: Reduced) -> Stages:
-        """Of this motion."""
+        """The implicit stages of this motion."""
         length = GAMMA * self.step
         return Stages(self.given, body, self.damping, self.factors, self.base, length)
 
     def sampled(self, body: Reduced, advance: Advance) -> Sampled:
-        """The motion in a subspace."""
+        """States of the motion in a reduced basis at the samples."""
         states: list[Moving] = []
         count = len(self.times)
         steps = march(self.stages(body), self.start(body), self.step)
@@ -217,9 +218,9 @@ def run(
     method: Method,
     advance: Advance = lambda _: None,
 ) -> Solution:
-    """Motion from rest under loads and tools, whose forces are a result.
+    """Motion from rest under loads and tools of prescribed motion, with the tool forces.
 
-    ValueError for a tool that meets nothing.
+    ValueError for a tool that touches nothing.
     """
     started = clock.perf_counter()
     start, times = start_of(body), observation.times
@@ -248,7 +249,7 @@ def run(
 
 
 def steps_per_sample(method: Method, times: Floats) -> int:
-    """As asked for, or as many as follow the forces."""
+    """Steps per sample as given by the method, by default for at least OWN_STEPS steps."""
     if method.steps_per_sample is not None:
         return method.steps_per_sample * method.times
     return -(-OWN_STEPS // (len(times) - 1)) * method.times
@@ -257,7 +258,7 @@ def steps_per_sample(method: Method, times: Floats) -> int:
 def _enough(
     pressed: Pressed, recorder: Recorder, advance: Advance
 ) -> tuple[Reduced, Sampled, tuple[CurveChange, Floats]]:
-    """The motion in a subspace whose last quarter changes little, and by how much it does."""
+    """The motion in a converged subspace, and its change by the last quarter of the vectors."""
     generations = GENERATIONS
     while True:
         space = krylov(pressed.given, generations)
@@ -273,7 +274,7 @@ def _enough(
 def _change(
     pressed: Pressed, space: Subspace, whole: Reduced, found: Sampled, recorder: Recorder
 ) -> tuple[CurveChange, Floats]:
-    """Of curves and of the tools' forces by the last quarter of vectors and of frequencies."""
+    """Relative change of curves and tool forces by the last quarter of vectors and frequencies."""
     less = reduced(pressed.given, space.leading(fewer(space.load.size)), LESS * pressed.highest)
     other = pressed.sampled(less, lambda _: None)
     count = min(len(found.states), len(other.states))
@@ -293,7 +294,7 @@ def _state(pressed: Pressed, body: Reduced, state: Moving) -> tuple[Floats, Floa
 
 
 def _record(recorder: Recorder, pressed: Pressed, body: Reduced, found: Sampled) -> None:
-    """Keep what is observed; strain also where a control point is farthest out."""
+    """Record the motion; strain also where a control point is farthest out."""
     curves = found.curves(body, recorder)
     for sample, (u, v) in enumerate(zip(*curves, strict=True)):
         recorder.motion(sample, u, v)
@@ -332,10 +333,10 @@ def _outcome(
 
 @dataclass(frozen=True, eq=False)
 class AtPeak:
-    """Rest with the tools where they are at the peak, and all loads in full.
+    """Static equilibrium with the tools at the peak and all loads in full.
 
-    `displacement` [m] (n,); `pushes` [N] (tools, n): nodal forces; `forces` [N] (tools, 3): on the
-    tools; `solve`: of the body.
+    `displacement` [m] (n,); `pushes` [N] (tools, n): nodal forces; `forces` [N] (tools, 3) on the
+    tools; `solve`: solver of the body.
     """
 
     displacement: Floats
@@ -345,7 +346,7 @@ class AtPeak:
 
 
 def at_peak(body: Body, tools: tuple[RigidTool, ...], observation: Observation) -> AtPeak:
-    """The rest of a body. ValueError for a tool that meets nothing."""
+    """Static equilibrium of a body at the peak. ValueError for a tool that touches nothing."""
     base = Recorder(body, observation, start_of(body)).start
     peak = float(observation.times[observation.frames[0]])
     return _at_rest(answered(body, tools, observation.times, base, peak), base, peak)
@@ -365,7 +366,7 @@ def _at_rest(given: Answered, base: Floats, peak: float) -> AtPeak:
 
 
 def _rest(pressed: Pressed, body: Reduced, found: Sampled, peak: float) -> AtPeak:
-    """Rest at the peak, or where no forces are found for it, the state there or the last before."""
+    """Equilibrium at the peak; without convergence, the state of the motion there or the last."""
     given, touch = pressed.given, pressed.given.touch
     try:
         return _at_rest(given, pressed.base, peak)
@@ -377,6 +378,6 @@ def _rest(pressed: Pressed, body: Reduced, found: Sampled, peak: float) -> AtPea
 
 
 def _under_loads(given: Answered) -> Floats:
-    """Displacement [m] (n,) at rest under all loads in full, without tools and what is dead."""
+    """Static displacement [m] (n,) under all loads in full, without tools and dead load."""
     whole = given.body.full_load
     return given.solve(whole) if whole.any() else np.zeros_like(whole)

@@ -1,4 +1,4 @@
-"""What is known of a motion under tools beside its trajectory."""
+"""Results of a motion with contact beside its trajectory."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ContactOutcome:
-    """Of a body and `vertices` under tools; reduced to a subspace of `vectors`, or None of all.
+    """Contact of a body at `vertices` vertices, in a subspace of `vectors`, None for all unknowns.
 
-    `truncation`: of the curves by the last quarter of the `vectors`, and `force_truncation` of the
-    tools' forces (tools,) alike; `penetration` [m]: how deep any point was inside a tool at a
-    sample; `at_rest` [m] (n,): displacement where the tools are at the peak, without motion, and
-    `pushes` [N] (tools, n): the nodal forces there; `unsettled` [s]: when forces were not found.
+    `truncation`: relative change of the curves by the last quarter of the `vectors`;
+    `force_truncation` (tools,): that of the tool forces. `penetration` [m]: largest penetration at
+    a sample. `at_rest` [m] (n,): static displacement with the tools at the peak, and `pushes` [N]
+    (tools, n): their nodal forces there. `unsettled` [s]: time at which the contact iteration did
+    not converge, None if it always did.
     """
 
     vertices: int

@@ -1,8 +1,9 @@
-"""The part of a body's surface that a rigid tool may touch, and the pressure there.
+"""Discretisation of the surface that a rigid tool may touch, and of the contact pressure.
 
-The pressure is linear on the facets of quadratic elements, and the body may not enter the tool in
-the mean over the shape function of each vertex. Such a pair of spaces is stable, and as accurate as
-the elements are: Hueeber and Wohlmuth (2005), Comput. Methods Appl. Mech. Eng. 194:3147.
+The pressure is piecewise linear on the facets of quadratic elements. Non-penetration holds in the
+mean, weighted by the linear shape function of each vertex. This pair of spaces is inf-sup stable
+and as accurate as the elements: Hueeber and Wohlmuth (2005), Comput. Methods Appl. Mech. Eng.
+194:3147.
 """
 
 from __future__ import annotations
@@ -23,18 +24,18 @@ Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 PARTS = 4
-"""Of each edge of a facet, for the edge of a punch may run anywhere across it."""
+"""Parts per facet edge in the quadrature, since the edge of a punch may cross a facet anywhere."""
 LEAST_SHARE = 0.02
-"""Of a vertex's shape function, that lies under the tool; one with less bears no pressure."""
+"""Share of a vertex's shape function under the tool below which the vertex has no pressure."""
 ROUNDING, TINY = 1e-12, 1e-300
-# Strang and Fix, three points inside a triangle, exact for squares of linear functions.
+# Three interior points of a triangle (Strang and Fix), exact for quadratic functions.
 _INSIDE = np.array([[1.0, 1.0, 4.0], [1.0, 4.0, 1.0], [4.0, 1.0, 1.0]]) / 6.0
 
 
 class Gaps(NamedTuple):
-    """Mean distance [m] (v,) from the tool at vertices, and the directions (v, 3) away from it.
+    """Weighted mean gap [m] (v,) at the vertices, and the tool normals (v, 3).
 
-    Infinite where a vertex has nothing of the tool opposite.
+    The gap is infinite where no part of the tool is opposite.
     """
 
     distance: Floats
@@ -43,12 +44,11 @@ class Gaps(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Integration points [m] (q, 3) under a tool, and the vertices that bear its pressure.
+    """Integration points [m] (q, 3) under a tool, and the vertices with contact pressure.
 
-    `shapes` (q, nodes): shape functions of the body; `shares` (v, q): of the points in the mean at
-    a vertex, each row of which adds up to one. `along` [1/m] (q, nodes): derivatives of the shape
-    functions along two directions in the surface, `tangents` (2, q, 3), whose vector product points
-    out of the body.
+    `shapes` (q, nodes): shape functions of the body; `shares` (v, q): weights of the points in the
+    mean at each vertex, which sum to one. `along` [1/m] (q, nodes) each: derivatives of the shape
+    functions along the two surface `tangents` (2, q, 3), whose cross product is the outward normal.
     """
 
     tool: RigidTool
@@ -65,16 +65,16 @@ class Patch:
 
     @property
     def spread(self) -> csr_array:
-        """Nodal forces (nodes, v) of a unit force at each vertex, or means of displacements."""
+        """Nodal forces (nodes, v) of a unit force at each vertex; transposed, weighted means."""
         return csr_array((self.shares @ self.shapes).T)
 
     def seeing(self, nodes: Ints) -> Patch:
-        """With shape functions of these nodes alone, beside which none reaches the surface."""
+        """The patch restricted to these nodes, which include all with support on the surface."""
         first, second = (csr_array(one[:, nodes]) for one in self.along)
         return replace(self, shapes=csr_array(self.shapes[:, nodes]), along=(first, second))
 
     def gaps(self, displacement: Floats, time: float) -> Gaps:
-        """Where the nodes have moved by a displacement [m] (nodes, 3), at a time [s]."""
+        """Gaps at a nodal displacement [m] (nodes, 3) and a time [s]."""
         distance, normal = self.tool.gap(self._moved(displacement), time)
         opposite = np.isfinite(distance)
         seen = self.shares @ opposite.astype(np.float64)
@@ -85,9 +85,10 @@ class Patch:
         return Gaps(np.where(seen > LEAST_SHARE, mean, np.inf), direction)
 
     def _moved(self, displacement: Floats) -> Floats:
-        """Points (q, 3) where they are; of a flat tool, whose edge they would cross, along it only.
+        """Current positions [m] (q, 3); under a flat tool, displaced along its axis only.
 
-        By how far they move across it is small beside its radius where strains are small.
+        Otherwise points would cross its edge. At small strain the lateral displacement is small
+        relative to the radius.
         """
         moved = self.shapes @ displacement
         if self.tool.shape != SPHERE:
@@ -95,7 +96,7 @@ class Patch:
         return np.asarray(self.points + moved)
 
     def outward(self, displacement: Floats) -> Floats:
-        """Normals (q, 3) out of the body at the points, where the nodes (nodes, 3) have moved."""
+        """Outward normals (q, 3) of the deformed surface at a displacement [m] (nodes, 3)."""
         first, second = (
             tangent + slope @ displacement
             for tangent, slope in zip(self.tangents, self.along, strict=True)
@@ -104,15 +105,15 @@ class Patch:
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), TINY)[:, None])
 
     def penetration(self, displacement: Floats, time: float) -> float:
-        """How deep [m] the deepest integration point is inside the tool."""
+        """Largest penetration [m] of an integration point."""
         distance, _ = self.tool.gap(self._moved(displacement), time)
         return float(max(0.0, -distance.min()))
 
 
 def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
-    """What a tool may touch of a body at times [s], with a `margin` [m] round it.
+    """Surface of a body within a `margin` [m] of a tool at any of the times [s].
 
-    ValueError if there is nothing.
+    ValueError if there is none.
     """
     surface = _surface(body, np.asarray(body.nodes.mesh.boundary_facets()))
     facing = _under(surface, tool, times, margin)
@@ -141,7 +142,7 @@ def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
 
 
 def _tangents(normals: Floats) -> Floats:
-    """Two unit vectors (2, q, 3) square to each of the normals (q, 3), of which they are right."""
+    """Two tangent unit vectors (2, q, 3) whose cross product is the normal (q, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1)[:, None]
@@ -149,7 +150,7 @@ def _tangents(normals: Floats) -> Floats:
 
 
 def _slopes(basis: Any, chosen: Bools, direction: Floats) -> csr_array:
-    """Derivatives [1/m] (q, dofs) of shape functions at the chosen points along directions."""
+    """Directional derivatives [1/m] (q, dofs) of the shape functions at the chosen points."""
     whole = np.zeros((len(chosen), 3))
     whole[chosen] = direction
     size = basis.dx.shape
@@ -160,7 +161,7 @@ def _slopes(basis: Any, chosen: Bools, direction: Floats) -> csr_array:
         ]
     )
     longest = np.abs(values).max(initial=0.0)
-    values[np.abs(values) < ROUNDING * longest] = 0.0  # likewise
+    values[np.abs(values) < ROUNDING * longest] = 0.0  # of nodes off the facet
     return _sparse(basis, values)[chosen]
 
 
@@ -172,7 +173,7 @@ def _surface(body: Body, facets: NDArray[np.int64]) -> Any:
 
 
 def _rule() -> tuple[Floats, Floats]:
-    """Points (2, q) and weights (q,) over a reference triangle that is cut into parts."""
+    """Composite quadrature of the reference triangle: points (2, q) and weights (q,)."""
     corners, n = [], PARTS
     for i in range(n):
         for j in range(n - i):
@@ -187,7 +188,7 @@ def _rule() -> tuple[Floats, Floats]:
 def _values(basis: Any) -> csr_array:
     """Shape functions of a basis at its integration points (q, dofs)."""
     values = np.stack([np.asarray(one[0]) for one in basis.basis])
-    values[np.abs(values) < ROUNDING] = 0.0  # of nodes that are not on the facet
+    values[np.abs(values) < ROUNDING] = 0.0  # of nodes off the facet
     return _sparse(basis, values)
 
 
@@ -202,7 +203,7 @@ def _sparse(basis: Any, values: Floats) -> csr_array:
 
 
 def _under(surface: Any, tool: RigidTool, times: Floats, margin: float) -> Bools:
-    """Which integration points (facets, q) a tool may touch, or holds from the start."""
+    """Integration points (facets, q) that a tool may touch, or is bonded to."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     facing = (normals @ tool.axis) < 0.0
     flat = points.reshape(-1, 3)
@@ -215,7 +216,7 @@ def _under(surface: Any, tool: RigidTool, times: Floats, margin: float) -> Bools
 
 
 def directions(tool: RigidTool) -> Floats:
-    """Directions (d, 3) in which a tool may push: its axis alone where that cannot change."""
+    """Directions (d, 3) of contact force: the axis alone for a frictionless flat tool."""
     if tool.shape == SPHERE or tool.bonded or tool.friction > 0.0:
         return np.eye(3)
     return tool.axis[None]

@@ -1,10 +1,10 @@
-"""A body reduced to what tools and loads make of it: few vectors, and the rest at once.
+"""Model reduction of a body in contact: a Krylov subspace with static residual modes.
 
-The subspace is a block Krylov space of the loads and of the forces under the tools that move most
-of the mass. What is left of the answers to forces under tools is their local dent, whose inertia is
-left out: its displacement follows the forces at once, or with the delay of stiffness-proportional
-damping. So no mass sits where the body touches, and impacts set nothing into oscillation there:
-Khenous, Laborde and Renard (2008), Eur. J. Mech. A 27:918; static residuals as in Craig and Chang
+The subspace is a block Krylov space of the loads and of those contact force patterns that move most
+of the mass. The part of the static response outside the subspace, the local indentation, is treated
+without inertia: it follows the forces at once, or with the delay of stiffness-proportional damping.
+No mass is then at the contact surface, which prevents spurious oscillations after impacts: Khenous,
+Laborde and Renard (2008), Eur. J. Mech. A 27:918. The static residuals are those of Craig and Chang
 (1977), AIAA 77-405.
 """
 
@@ -31,27 +31,28 @@ from study.problem.rigid import PLATE, PUNCH, RigidTool
 Floats = NDArray[np.float64]
 
 MARGIN = {PUNCH: 1.0, PLATE: 0.2}
-"""Round what a tool would meet of the surface at rest, over its radius, of a plate its travel."""
+"""Margin of the patch around a tool, relative to its radius, for a plate to its travel."""
 ROUND_SPHERE = 0.15
 WIDENED = 4
-"""How often a margin is doubled that turns out too small."""
+"""How often a margin that is too small may be doubled."""
 OVERLOOKED = 0.02
-"""Share of the travel that a surface beside a patch may enter a tool."""
+"""Admissible penetration of the surface outside a patch, relative to the tool's travel."""
 LOOKS = 33
-"""Places of a tool on its way at which the surface is looked at."""
+"""Positions of a tool on its path at which the patch is determined."""
 MOST_VERTICES = 900
 DIRECT = 12
-"""Solutions that repay factors."""
+"""Number of solutions above which a direct solver is faster."""
 PRECISE = 1e-9
 PATTERNS, LEAST_PATTERN = 6, 3e-3
-"""Of forces under each tool: at most, and the smallest share of the mass's motion."""
+"""Largest number of force patterns per tool, and smallest relative mass norm of their response."""
 INSIDE = 1e-6
-"""Share of a vector outside of the subspace, in the mass, below which it adds nothing."""
+"""Mass norm of the part of a vector outside the subspace, relative to the vector, below which it
+is dependent."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answered:
-    """A body's answers [m/N] (n, c) to unit forces under tools, and what solves for more."""
+    """Static response [m/N] (n, c) of a body to unit contact forces, and its solver."""
 
     body: Body
     touch: Touch
@@ -60,25 +61,25 @@ class Answered:
 
     @cached_property
     def lever(self) -> Floats:
-        """The answers of the surface nodes (3 s, c)."""
+        """Response [m/N] (3 s, c) of the surface nodes."""
         return self.answers[self.touch.unknowns]
 
     @cached_property
     def compliance(self) -> Floats:
-        """Answers in the means (c, c)."""
+        """Response [m/N] (c, c) in the weighted means at the vertices."""
         found = np.asarray(self.touch.means @ self.lever)
         return np.asarray(0.5 * (found + found.T))
 
     @cached_property
     def of_loads(self) -> Floats:
-        """Answers [m] (n, k) to the loads in full, nought where one is."""
+        """Static displacements [m] (n, k) under each load in full."""
         loads = self.body.loads.T
         return np.column_stack([self.solve(one) if one.any() else one for one in loads])
 
     def at_rest(self, displacement: Floats, start: Grip, times: Floats) -> Grip:
-        """Forces at the last of times [s] on the way of the tools, without motion.
+        """Static contact forces at the last of times [s] along the path of the tools.
 
-        `displacement` [m] (n,): without tools, under all other loads.
+        `displacement` [m] (n,): static displacement without tools, under all other loads.
         """
         answer = Answer(displacement[self.touch.unknowns], self.lever, self.compliance)
         grip = start
@@ -87,12 +88,12 @@ class Answered:
         return grip
 
     def moved(self, displacement: Floats, grip: Grip) -> Floats:
-        """Displacement [m] (n,) under forces."""
+        """Displacement [m] (n,) with contact forces added."""
         return np.asarray(displacement + self.answers @ grip.force)
 
     @property
     def free(self) -> Grip:
-        """No forces, at the start."""
+        """Zero contact forces at time zero."""
         count = self.answers.shape[1]
         return Grip(np.zeros(count), np.zeros(count), 0.0)
 
@@ -100,11 +101,11 @@ class Answered:
 def answered(
     body: Body, tools: tuple[RigidTool, ...], times: Floats, displacement: Floats, peak: float
 ) -> Answered:
-    """A body where tools may touch it on their way at times [s].
+    """The static response of a body to contact with tools on their paths at times [s].
 
-    `displacement` [m] (n,): without tools; `peak` [s]: when the surface beside the patches is
-    looked at, which are widened where it is inside a tool. ValueError for a tool that meets
-    nothing, or takes too many vertices.
+    `displacement` [m] (n,): displacement without tools; `peak` [s]: time at which the surface
+    outside the patches is checked. Patches are widened where it penetrates a tool. ValueError for a
+    tool that touches nothing, or too many vertices.
     """
     solve: Solve | None = None
     looked = times[:: max(1, len(times) // LOOKS)]
@@ -120,7 +121,7 @@ def answered(
         try:
             grip = found.at_rest(displacement, found.free, way if peak > 0.0 else way[:1])
         except UnsettledError:
-            break  # what comes of it shows where the motion ends
+            break  # the motion will end where this happens
         deep = _beside(body, touch, found.moved(displacement, grip), peak)
         if deep <= OVERLOOKED * max(map(_travelled, tools, [times] * len(tools))):
             break
@@ -142,7 +143,7 @@ def _margin(tool: RigidTool, times: Floats) -> float:
 
 
 def _travelled(tool: RigidTool, times: Floats) -> float:
-    """How far [m] a tool goes from its start."""
+    """Largest distance [m] of a tool from its start."""
     return float(np.linalg.norm(tool.travel(times), axis=1).max())
 
 
@@ -159,7 +160,7 @@ def _solved(solve: Solve, loads: csr_array) -> Floats:
 
 
 def _beside(body: Body, touch: Touch, displacement: Floats, time: float) -> float:
-    """How deep [m] surface nodes that no patch sees are inside a sliding tool."""
+    """Largest penetration [m] of surface nodes outside all patches into a tool not bonded."""
     boundary = np.unique(
         body.nodes.get_dofs(body.nodes.mesh.boundary_facets()).flatten()  # scikit-fem's
     )
@@ -177,11 +178,11 @@ def _beside(body: Body, touch: Touch, displacement: Floats, time: float) -> floa
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """A body in a subspace, with what is left of the answers beside it.
+    """A body in the modes of a subspace, with the static residuals outside it.
 
-    `squares` [1/s^2] (m,) and `shapes` (n, m) of its modes, `pushed` (c, m): displacement means of
-    these, `loads` (m, k); `residual` [m/N] (n, c + k): of the answers to forces under tools, then
-    of those to the loads.
+    `squares` [1/s^2] (m,) and `shapes` (n, m) of the modes; `pushed` (c, m): their weighted mean
+    displacements at the vertices; `loads` (m, k): modal loads; `residual` (n, c + k): static
+    response outside the subspace to contact forces [m/N], then to the loads [m].
     """
 
     squares: Floats
@@ -197,7 +198,7 @@ class Reduced:
 
 
 def krylov(given: Answered, generations: int) -> Subspace:
-    """Block Krylov space of loads and of forces under tools, of so many generations."""
+    """Block Krylov space of loads and contact force patterns, with so many blocks."""
     body = given.body
     block = np.column_stack([*_of_loads(given), _patterns(given)])
     found = empty(body.stiffness.size)
@@ -217,7 +218,7 @@ def _of_loads(given: Answered) -> list[Floats]:
 
 
 def _patterns(given: Answered) -> Floats:
-    """Answers (n, r) to the forces under each tool that move most of the mass."""
+    """Static responses (n, r) to the force patterns of each tool that move most of the mass."""
     found = []
     for part in given.touch.slices:
         own = given.answers[:, part]
@@ -228,17 +229,17 @@ def _patterns(given: Answered) -> Floats:
 
 
 def _with(body: Body, found: Subspace, vector: Floats) -> Subspace:
-    """One vector more, unless the subspace has it."""
+    """The subspace with one more vector, unless that is dependent."""
     outside = vector - found.vectors @ (found.vectors.T @ (body.mass @ vector))
     norms = [float(one @ (body.mass @ one)) for one in (outside, vector)]
     return found if norms[0] <= INSIDE**2 * norms[1] else extended(body, found, vector)
 
 
 def reduced(given: Answered, subspace: Subspace, highest: float) -> Reduced:
-    """The body in the modes of a subspace below the `highest` angular frequency [1/s].
+    """The body in the modes of a subspace up to the `highest` angular frequency [1/s].
 
-    Those above follow their forces, of loads as of tools, at once, as what is outside of the
-    subspace does. At least one is kept.
+    Modes above it respond statically, like the part outside the subspace. At least one mode is
+    kept.
     """
     squares, modes = eigh(subspace.stiffness)
     kept = max(1, int(np.searchsorted(squares, highest**2)))

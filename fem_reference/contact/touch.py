@@ -1,8 +1,9 @@
-"""A body at the places that tools may touch: what forces there do, and which there are.
+"""Contact forces between a linear elastic body and rigid tools.
 
-The body is linear, so that all it does is known from its answers to a unit force at each vertex
-under a tool. The tool is not: where a sphere touches, and in which direction it pushes, follow from
-the displacement, and are found by repeating the solution of a problem that is linear in between.
+The response of the body follows from its solutions for a unit force at each vertex under a tool.
+The geometry of contact is nonlinear: the gaps and normals of a sphere depend on the displacement. A
+sequence of linear complementarity problems, linearised about the last displacement, converges to
+the contact forces.
 """
 
 from __future__ import annotations
@@ -25,25 +26,26 @@ Bools = NDArray[np.bool_]
 
 ITERATIONS = 60
 HALVED_AFTER = 12
-"""After so many iterations they are taken half-way, after as many again a quarter, and so on."""
+"""Iterations after which the step is halved, and halved again after as many more."""
 ROUNDING = 1e-14
 """[m]"""
 SETTLED = 1e-6
-"""Change of the forces relative to the largest."""
+"""Change of the forces relative to the largest, at convergence."""
 NEARLY = 1e-3
-"""The same, of forces that are taken although they go on changing."""
+"""The same at the last iteration, up to which the forces are accepted."""
 
 
 class UnsettledError(ValueError):
-    """Forces between a body and a tool that are not found."""
+    """The iteration for the contact forces did not converge."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What the body does under forces: where its surface nodes are without any, and with a unit.
+    """Linear response of the surface nodes to contact forces.
 
-    `base` [m] (3 s,): displacement of the surface nodes; `lever` [m/N] (3 s, c): that by a unit of
-    each force; `compliance` [m/N] (c, c): in the means at the vertices.
+    `base` [m] (3 s,): displacement of the surface nodes without contact; `lever` [m/N] (3 s, c):
+    displacement per unit of each force; `compliance` [m/N] (c, c): the same in the weighted means
+    at the vertices.
     """
 
     base: Floats
@@ -53,7 +55,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """Forces [N] (c,), and the means [m] (c,) of the displacement at a time [s] under them."""
+    """Contact forces [N] (c,) and the weighted mean displacements [m] (c,) at a time [s]."""
 
     force: Floats
     mean: Floats
@@ -62,9 +64,9 @@ class Grip:
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Patches of a body under tools; the forces are numbered patch by patch, vertex by vertex.
+    """Contact patches of a body; forces are numbered by patch, vertex and direction.
 
-    `nodes` (s,): those of the surface that the patches see.
+    `nodes` (s,): surface nodes with a shape function on some patch.
     """
 
     patches: tuple[Patch, ...]
@@ -72,13 +74,13 @@ class Touch:
 
     @classmethod
     def of(cls, patches: Sequence[Patch]) -> Touch:
-        """Of patches, with all nodes that they see."""
+        """The contact of some patches, with all nodes that have a shape function on them."""
         seen = [np.flatnonzero(np.diff(one.shapes.tocsc().indptr)) for one in patches]
         return cls(tuple(patches), np.unique(np.concatenate(seen)))
 
     @cached_property
     def rubs(self) -> bool:
-        """Whether any tool drags what it touches."""
+        """Whether any tool has friction."""
         return any(one.tool.friction > 0.0 for one in self.patches)
 
     def directions(self, tool: RigidTool) -> Floats:
@@ -87,34 +89,34 @@ class Touch:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Of the forces of each patch."""
+        """Range of the forces of each patch."""
         sizes = [one.count * len(self.directions(one.tool)) for one in self.patches]
         ends = np.cumsum([0, *sizes])
         return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
     @cached_property
     def pushes(self) -> csr_array:
-        """Nodal forces (3 nodes, c) of a unit of each force; transposed, means of displacements."""
+        """Nodal forces (3 nodes, c) per unit of each force; transposed, the weighted means."""
         parts = [kron(one.spread, csr_array(self.directions(one.tool).T)) for one in self.patches]
         return csr_array(hstack(parts, format="csr"))
 
     @cached_property
     def means(self) -> csr_array:
-        """From displacements of the surface nodes (3 s,) to the means (c,)."""
+        """Weighted means (c, 3 s) of the displacements of the surface nodes."""
         return csr_array(self.pushes.T)[:, self.unknowns]
 
     @cached_property
     def unknowns(self) -> NDArray[np.int64]:
-        """Of the body, of the surface nodes (3 s,)."""
+        """Unknowns of the body (3 s,) at the surface nodes."""
         return np.asarray((3 * self.nodes[:, None] + np.arange(3)).ravel())
 
     @cached_property
     def _seeing(self) -> tuple[Patch, ...]:
-        """The patches with shape functions of the surface nodes alone."""
+        """The patches restricted to the surface nodes."""
         return tuple(one.seeing(self.nodes) for one in self.patches)
 
     def on_tools(self, force: Floats) -> Floats:
-        """What the body does to each tool [N] (tools, 3) under forces (c,)."""
+        """Force [N] (tools, 3) of the body on each tool for contact forces (c,)."""
         found = [
             -(force[part].reshape(one.count, -1).sum(axis=0) @ self.directions(one.tool))
             for one, part in zip(self.patches, self.slices, strict=True)
@@ -122,7 +124,7 @@ class Touch:
         return np.array(found)
 
     def penetration(self, surface: Floats, time: float) -> float:
-        """How deep [m] any point that a sliding tool may touch is inside it."""
+        """Largest penetration [m] of a point into a tool that is not bonded."""
         moved = surface.reshape(-1, 3)
         return max(
             (one.penetration(moved, time) for one in self._seeing if not one.tool.bonded),
@@ -130,12 +132,12 @@ class Touch:
         )
 
     def settled(self, answer: Answer, start: Grip, time: float) -> Grip:
-        """Forces that keep the body out of the tools at a time [s], from those before it.
+        """Contact forces at a time [s], from those at the time before.
 
-        `UnsettledError` if the iterations do not end.
+        UnsettledError if the iteration does not converge.
         """
         force, change = start.force, np.inf
-        # Below, forces move nothing by more than rounding does.
+        # Smaller forces cause displacements below rounding.
         least = ROUNDING / max(float(answer.compliance.diagonal().max()), 1e-300)
         for k in range(ITERATIONS):
             step = self._sought(answer, force, start, time) - force
@@ -152,7 +154,7 @@ class Touch:
         return Grip(force, self.means @ (answer.base + answer.lever @ force), time)
 
     def _sought(self, answer: Answer, force: Floats, start: Grip, time: float) -> Floats:
-        """Forces of the problem that is linear about the displacement under given ones."""
+        """Forces of the complementarity problem linearised about the displacement under `force`."""
         surface = answer.base + answer.lever @ force
         gaps = [one.gaps(surface.reshape(-1, 3), time) for one in self._seeing]
         moved = answer.compliance @ force
@@ -170,13 +172,13 @@ class Touch:
 
     @cached_property
     def _held(self) -> Bools:
-        """Which unknown forces are those of bonded tools."""
+        """Which unknowns are forces of bonded tools."""
         counts = [one.count * (3 if one.tool.bonded else 1) for one in self.patches]
         return np.repeat([one.tool.bonded for one in self.patches], counts)
 
     @cached_property
     def _firsts(self) -> NDArray[np.int64]:
-        """First of the forces that make up each unknown one: along its normal, or one by one."""
+        """First of the force components of each unknown, a normal force or a single component."""
         parts = [
             np.arange(part.start, part.stop, self._together(one))
             for one, part in zip(self.patches, self.slices, strict=True)
@@ -184,17 +186,17 @@ class Touch:
         return np.concatenate(parts)
 
     def _together(self, one: Patch) -> int:
-        """How many forces make up an unknown one."""
+        """Number of force components per unknown."""
         return 1 if one.tool.bonded else len(self.directions(one.tool))
 
     def _frame(self, one: Patch, gaps: Gaps) -> Floats:
-        """What each force of a patch is of its unknown one."""
+        """Ratio of each force component of a patch to its unknown."""
         if self._together(one) == 1:
             return np.ones(one.count * len(self.directions(one.tool)))
         return gaps.normal.ravel()
 
     def _offsets(self, gaps: list[Gaps], mean: Floats, time: float) -> Floats:
-        """Gaps, or of bonded tools relative displacements without forces."""
+        """Gaps [m], or displacements [m] relative to a bonded tool, without contact forces."""
         found = []
         for one, part, gap in zip(self.patches, self.slices, gaps, strict=True):
             if one.tool.bonded:
@@ -213,7 +215,7 @@ class Touch:
         start: Grip,
         time: float,
     ) -> Floats:
-        """With friction: the frame of each vertex has its normal first."""
+        """Forces with friction, solved in a frame of the normal and two tangents per vertex."""
         normals, offsets, friction = [], [], []
         moved = answer.compliance @ force
         for one, part, gap in zip(self.patches, self.slices, gaps, strict=True):
@@ -245,7 +247,7 @@ class Touch:
 
 
 def _axes(normals: Floats) -> Floats:
-    """Normal and two tangents (v, 3, 3) as columns."""
+    """Normal and two tangents as columns, (v, 3, 3)."""
     smallest = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, smallest)
     first /= np.linalg.norm(first, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""The readings adopted where the paper is silent, one sentence each, for reports."""
+"""Assumptions adopted where the paper is silent, one sentence each, for reports."""
 
 from collections.abc import Iterable
 from math import prod
@@ -52,7 +52,7 @@ OUT_OF_RANGE = {
 
 
 def assumptions(settings: LiverSettings | None = None) -> tuple[str, ...]:
-    """Every reading and modelling choice in force, one sentence each."""
+    """Every assumption and modelling choice in effect, one sentence each."""
     settings = settings or LiverSettings()
     if settings.base.follows:
         return (*_following_rules(settings), *_following_data(settings), *_inference(settings))

@@ -1,18 +1,18 @@
-"""The knowledge bases that a fuzzy estimate can be made by, by name."""
+"""The knowledge bases of a fuzzy estimate, by name."""
 
 from typing import NamedTuple
 
 
 class KnowledgeBase(NamedTuple):
-    """One knowledge base: how it treats a missing reading unless told, what it is, in words.
+    """One knowledge base: its default treatment of a missing reading, and its description.
 
-    `completed`: combinations of diseases that Table I has no cell for are cells too, as else a
-    patient with just these readings is answered by several cells that know a part of them each, and
-    which of them fires more changes with every reading: one raised may then lower the estimate.
-    `follows`: its sets partition the scale of readings and stand in `partition.csv` under its name,
-    so that the estimate follows the reading, on the cells of the `reading` of Table I. Otherwise
-    sets are those of stages of fibrosis, and `reading`, `consequent` and `placement` of the
-    settings say how they make rules.
+    `completed`: combinations of diseases without a cell in Table I get cells too. Otherwise several
+    cells, each with some of the diseases, determine the estimate of a patient with these readings;
+    their relative strengths vary with each reading, and a higher reading may lower the estimate.
+    `follows`: the sets partition the scale of readings and are in `partition.csv` under its name,
+    on the cells of the `reading` of Table I, so that the estimate follows the reading. Otherwise
+    the sets are those of stages of fibrosis, and `reading`, `consequent` and `placement` of the
+    settings determine the rules.
     """
 
     follows: bool
@@ -47,4 +47,4 @@ KNOWLEDGE: dict[str, KnowledgeBase] = {
 }
 
 STAGES_ONLY = ("reading", "consequent", "placement")
-"""Settings that shape a knowledge base of stages; the others have sets and cells of their own."""
+"""Settings of knowledge bases of stages only; the others have sets and cells of their own."""

@@ -1,9 +1,9 @@
-"""How well each knowledge base and system estimates the livers of virtual patients.
+"""Accuracy of each knowledge base and kind of system on virtual patients.
 
-Every contender is judged on the same patients of `fuzzy.liver.population`: fuzzy systems of every
-knowledge base, learnt consequents, and baselines that need no fuzzy logic. What is learnt from
-patients is judged on others: they are split into FOLDS, and each fold is answered by what the rest
-has taught.
+All contenders are evaluated on the same patients of `fuzzy.liver.population`: fuzzy systems of
+every knowledge base, learned consequents, and baselines without fuzzy logic. Learned contenders are
+cross-validated: patients are split into FOLDS, and each fold is estimated after training on the
+others.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,18 +29,18 @@ from fuzzy.systems.system import FuzzySystem, firing_strengths
 FOLDS = 5
 NORMAL_95 = 1.959964
 NOMINAL = 0.9
-"""Share of patients meant to lie in the type-2 interval of a base that follows the reading."""
+"""Nominal coverage of the type-2 interval of a base that follows the reading."""
 FOLLOWED = np.geomspace(4.0, 40.0, 200) * PA_PER_KPA
-"""Readings [Pa] over which a contender should rise, one aetiology at a time."""
+"""Readings [Pa] over which an estimate should increase, one aetiology at a time."""
 RIDGE = 3.0
-"""Weight, in patients, of the consequent that a learnt one departs from."""
+"""Weight, in patients, of the prior consequent in ridge regression."""
 
 Displacement = Callable[[Array], Array]
-"""Displacement [m] of the tool, or anything that it is proportional to, by stiffness [Pa]."""
+"""Displacement [m] of the tool, up to a factor, as a function of stiffness [Pa]."""
 
 
 class Answers(NamedTuple):
-    """Stiffness [Pa] (N,) by one contender, and the type-2 interval [Pa] (N, 2) or None."""
+    """Estimates [Pa] (N,) of one contender, and the type-2 interval [Pa] (N, 2) or None."""
 
     value: Array
     interval: Array | None = None
@@ -49,13 +49,13 @@ class Answers(NamedTuple):
 class CohortRow(NamedTuple):
     """Errors of one contender over one group of patients; stiffness in Pa.
 
-    `aetiology`, `stage` and `readings` (1, 2 or more) name the group, `all` where nothing is
-    selected. Relative errors are over the true stiffness; `relative_rms_low` and `_high` are the
-    95 % interval of `relative_rms` over the drawing of patients. `displacement_rms`: of the
-    relative error of the displacement, NaN if it was not asked for. `coverage`: share of patients
-    in the type-2 interval, `width` its mean over the true stiffness, NaN for others.
-    `largest_fall`: largest relative fall of the estimate where the reading of the aetiology alone
-    rises from 4 to 40 kPa in steps of 1.2 %, NaN for groups that it does not belong to.
+    `aetiology`, `stage` and `readings` (1, 2 or more) define the group, `all` for no selection.
+    Relative errors are over the true stiffness; `relative_rms_low` and `_high` are the 95 %
+    confidence interval of `relative_rms` by the sampling of patients. `displacement_rms`: relative
+    rms error of the displacement, NaN if not requested. `coverage`: share of patients in the type-2
+    interval; `width`: mean width over the true stiffness; NaN for other systems. `largest_fall`:
+    largest relative decrease of the estimate as the reading of the aetiology alone increases from 4
+    to 40 kPa in steps of 1.2 %, NaN for other groups.
     """
 
     contender: str
@@ -76,9 +76,9 @@ class CohortRow(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Relative rms error of the best fuzzy system less that of a baseline, with its 95 % interval.
+    """Relative rms error of the best fuzzy system minus that of a baseline, with 95 % interval.
 
-    The errors are paired by patient. Below 0 the fuzzy system is better.
+    The errors are paired by patient. Negative values favour the fuzzy system.
     """
 
     readings: str
@@ -90,7 +90,7 @@ class Comparison(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Which one wins, in a word."""
+        """The better of the two, in a word."""
         if self.high < 0:
             return "better"
         return "worse" if self.low > 0 else "undecided"
@@ -102,11 +102,11 @@ PLAIN = {
     "1": ("baseline: reading",),
     "2 or more": ("baseline: reading", "baseline: mean of readings"),
 }
-"""Baselines that nothing teaches, by the number of readings."""
+"""Baselines without training, by number of readings."""
 
 
 def contenders() -> dict[str, Contender]:
-    """All of them by name, the fuzzy ones first."""
+    """All contenders by name, the fuzzy ones first."""
     return {**fuzzy_contenders(), **LEARNT, **BASELINES}
 
 
@@ -120,7 +120,7 @@ def fuzzy_contenders() -> dict[str, Contender]:
 
 
 def by_system(kind: str, settings: LiverSettings, patients: Cohort) -> Answers:
-    """Answers of one kind of system; those with readings of the same aetiologies go together."""
+    """Estimates of one kind of system, in groups with readings of the same aetiologies."""
     value = np.empty(patients.stiffness.size)
     interval = np.empty((value.size, 2)) if kind == "interval-type-2" else None
     for present, chosen in patterns(patients.readings):
@@ -135,7 +135,7 @@ def by_system(kind: str, settings: LiverSettings, patients: Cohort) -> Answers:
 
 
 def patterns(readings: Array) -> Iterator[tuple[tuple[str, ...], NDArray[np.intp]]]:
-    """Aetiologies that have a reading, and the rows of the patients with just these."""
+    """Sets of aetiologies with readings, and the rows of patients with exactly these."""
     codes = np.isfinite(readings) @ (1 << np.arange(len(AETIOLOGIES)))
     for code in np.unique(codes):
         present = tuple(name for i, name in enumerate(AETIOLOGIES) if int(code) >> i & 1)
@@ -143,7 +143,7 @@ def patterns(readings: Array) -> Iterator[tuple[tuple[str, ...], NDArray[np.intp
 
 
 def filled(readings: Array) -> Array:
-    """The readings [Pa] with a normal liver's where there is none."""
+    """The readings [Pa], with that of a normal liver for missing ones."""
     return np.where(np.isfinite(readings), readings, NORMAL_LIVER)
 
 
@@ -151,9 +151,9 @@ def filled(readings: Array) -> Array:
 
 
 def learnt(teach: Callable[[Array, Array, Array], Array], patients: Cohort) -> Answers:
-    """Sugeno's answers of the freed base with consequents that other patients have taught.
+    """Cross-validated Sugeno estimates of the freed base with learned consequents.
 
-    `teach` makes consequents (R,) of normalised strengths (N, R), true stiffness (N,) and the
+    `teach` computes consequents (R,) of normalised strengths (N, R), true stiffness (N,) and the
     consequents of the base, all in kPa.
     """
     settings = LiverSettings(knowledge="freed")
@@ -172,7 +172,7 @@ def learnt(teach: Callable[[Array, Array, Array], Array], patients: Cohort) -> A
 
 
 def _folds(patients: Cohort) -> NDArray[np.intp]:
-    """Number of every patient's fold; each holds all main aetiologies, which take turns."""
+    """Fold of every patient, stratified by main aetiology."""
     return np.arange(patients.main.size) // len(AETIOLOGIES) % FOLDS
 
 
@@ -189,9 +189,10 @@ def _consequents(system: FuzzySystem, settings: LiverSettings) -> Array:
 
 
 def wang_mendel(shares: Array, truth: Array, base: Array) -> Array:
-    """Wang and Mendel: a rule concludes the mean of the patients whose strongest rule it is.
+    """Wang and Mendel's method: the mean of the patients whose strongest rule it is.
 
-    Each weighs by its strength; a rule that is nobody's strongest keeps its consequent.
+    Patients are weighted by strength. A rule that is the strongest for no patient keeps its
+    consequent.
     """
     strongest = shares.argmax(axis=1)
     weights = shares[np.arange(len(shares)), strongest]
@@ -201,7 +202,7 @@ def wang_mendel(shares: Array, truth: Array, base: Array) -> Array:
 
 
 def least_squares(shares: Array, truth: Array, base: Array) -> Array:
-    """Consequents of least relative squared error, drawn to the base's by RIDGE patients each."""
+    """Ridge regression of the consequents by relative squared error, towards those of the base."""
     scaled = shares * base / truth[:, None]  # acts on consequents over the base's
     missed = 1.0 - scaled.sum(axis=1)
     if len(scaled) < base.size:  # the same by fewer unknowns: one a patient
@@ -221,7 +222,7 @@ LEARNT: dict[str, Contender] = {
 
 
 def main_reading(patients: Cohort) -> Answers:
-    """The reading of the main aetiology as it is."""
+    """The reading of the main aetiology."""
     return Answers(patients.readings[np.arange(patients.main.size), patients.main])
 
 
@@ -231,7 +232,7 @@ def mean_reading(patients: Cohort) -> Answers:
 
 
 def stage_mean(patients: Cohort) -> Answers:
-    """Mean of the training patients of the main aetiology between the same cut-offs."""
+    """Mean stiffness of training patients of the same main aetiology and stage by cut-offs."""
     reading = main_reading(patients).value
     groups = np.array([_between_cut_offs(name, reading) for name in AETIOLOGIES])
     group = groups[patients.main, np.arange(reading.size)] + 4 * patients.main
@@ -254,7 +255,7 @@ def _group_means(group: NDArray[np.intp], stiffness: Array) -> Array:
 
 
 def linear_regression(patients: Cohort) -> Answers:
-    """Straight line on the mean of the readings, of least relative squared error."""
+    """Linear regression on the mean of the readings, by relative squared error."""
     x = mean_reading(patients).value
 
     def fitted(taught: NDArray[np.intp], asked: NDArray[np.intp]) -> Array:
@@ -267,7 +268,7 @@ def linear_regression(patients: Cohort) -> Answers:
 
 
 def isotonic_regression(patients: Cohort) -> Answers:
-    """The rising step function of the mean of the readings of least relative squared error."""
+    """Isotonic regression on the mean of the readings, by relative squared error."""
     from scipy.optimize import isotonic_regression as fit
 
     x = mean_reading(patients).value
@@ -309,7 +310,7 @@ def judge(
     answers: Mapping[str, Answers],
     displacement: Displacement | None = None,
 ) -> tuple[CohortRow, ...]:
-    """A row per contender and group: all, by number of readings, by aetiology, by its stages."""
+    """A row per contender and group: all, by number of readings, by aetiology, by stage."""
     return tuple(
         _row(name, group, patients, found, displacement)
         for name, found in answers.items()
@@ -368,7 +369,7 @@ def _row(
 
 
 def _rms(errors: Array) -> tuple[float, float]:
-    """Root mean square, and half its 95 % interval."""
+    """Root mean square, and half the width of its 95 % interval."""
     squares = errors**2
     rms = float(np.sqrt(squares.mean()))
     return rms, float(NORMAL_95 * squares.std() / np.sqrt(squares.size) / max(2.0 * rms, 1e-300))
@@ -391,7 +392,7 @@ def _interval(interval: Array | None, truth: Array, rows: NDArray[np.intp]) -> d
 
 
 def _largest_fall(contender: str, aetiology: str) -> float:
-    """Of a fuzzy contender; NaN for the others, which are fitted or rise by themselves."""
+    """Largest relative decrease of a fuzzy estimate; NaN for other contenders."""
     evaluate = fuzzy_contenders().get(contender)
     if evaluate is None:
         return np.nan
@@ -404,7 +405,7 @@ def _largest_fall(contender: str, aetiology: str) -> float:
 
 
 def compare(patients: Cohort, answers: Mapping[str, Answers]) -> tuple[Comparison, ...]:
-    """The best fuzzy system beside the plain and the best baseline, by the number of readings."""
+    """The best fuzzy system against the plain and the best baseline, by number of readings."""
     return tuple(
         _compared(group, patients, answers, fuzzy, baseline)
         for group in list(_groups(patients))[1:3]
@@ -445,7 +446,7 @@ class CohortStudy(NamedTuple):
 
 
 def cohort_study(patients: int, seed: int, displacement: Displacement | None = None) -> CohortStudy:
-    """Judge every contender on so many virtual patients. ValueError for too few of them."""
+    """Evaluate every contender on virtual patients. ValueError for too few of them."""
     least = 100 * len(AETIOLOGIES)
     if patients < least:
         raise ValueError(

@@ -1,24 +1,25 @@
-"""Where the knowledge bases that follow the reading come from: run it, and it writes their tables.
+"""Derivation of the knowledge bases that follow the reading.
 
     python -m fuzzy.liver.derivation
 
-writes `partition.csv` and `combination.csv` into `fuzzy/liver/data`, the same on every run. Both
-bases are judged by the relative error of the estimate, alike over Mamdani, Sugeno and type-2.
+writes `partition.csv` and `combination.csv` into `fuzzy/liver/data`, the same on every run. The
+objective of both bases is the relative squared error of the estimate, with equal weights for
+Mamdani, Sugeno and type-2.
 
-*freed*: as many sets as readings can tell apart. Their centres divide the instrument's scale
-evenly in ln kPa, neighbours LEAST_DISTANCE of the noise of reading apart or more, so that hardly a
-reading at one centre falls to the next set. Consequents are what the least squares of the errors
-choose over virtual patients of all aetiologies and livers even in ln kPa, half each, all with the
-noise of reading: the stiffness expected of a reading.
+*freed*: as many sets as readings can resolve. Their centres divide the instrument's scale evenly in
+ln kPa, at least LEAST_DISTANCE standard deviations of the reading noise apart, so that a reading at
+one centre rarely falls to the next set. Least squares determine the consequents over virtual
+patients of all aetiologies and livers uniform in ln kPa, half each, all with reading noise: the
+expected stiffness for a reading.
 
-*paper-count*: the sets of reading R1 of Table I, two an aetiology and three for HBV. Centres,
-crossings and consequents are what the least squares choose, started from several places, over
-readings of virtual patients of that aetiology and readings even in ln kPa, half each.
+*paper-count*: the sets of reading R1 of Table I, two per aetiology and three for HBV. Least squares
+from several start values determine centres, crossings and consequents over readings of virtual
+patients of that aetiology and readings uniform in ln kPa, half each.
 
-Both: with the sets in place, shift and power of the combinations of several diseases are fitted, on
-readings that agree. With four readings and more, sets of *freed* have a core: of 0, 0.1, 0.2 and
-0.3 of the way to the crossing, 0.2 leaves the estimate the least to fall where one of the readings
-rises, and it does not err more for it.
+Both: for the sets found, shift and power of the combinations of several diseases are fitted to
+equal readings. With four or more readings, the sets of *freed* have a core. Of cores of 0, 0.1, 0.2
+and 0.3 of the distance to the crossing, 0.2 minimises the decrease of the estimate as one reading
+increases, without a larger error.
 """
 
 import csv
@@ -49,7 +50,7 @@ from fuzzy.systems.sets import Array
 
 SEED = 12
 LEAST_DISTANCE = 5.0
-"""Of neighbouring centres of *freed*, in standard deviations of one reading."""
+"""Least distance of neighbouring centres of *freed*, in standard deviations of one reading."""
 OUTERMOST = (2.6, 70.0)
 """Centres [kPa] of the lowest and the highest set of *freed*, a little inside the scale."""
 NAMES = {
@@ -60,28 +61,30 @@ NAMES = {
 PARTITION = ("knowledge", "aetiology", "set", "centre_kpa", "crossing_kpa", "consequent_kpa")
 COMBINATION = ("knowledge", "diseases", "shift", "power", "core")
 JUDGED = np.geomspace(4.0, 40.0, 60)
-"""Readings [kPa] over which a base is to follow, and two sets can."""
+"""Readings [kPa] over which a base should follow the reading, and two sets can."""
 TAUGHT = 600
-"""Virtual patients, and as many livers even in ln kPa, that *freed* is fitted to."""
+"""Number of virtual patients, and of livers uniform in ln kPa, to which *freed* is fitted."""
 STARTS = 6
 POLISHED = 800
-"""Steps of the simplex that ends the search of *paper-count*."""
+"""Iterations of the final simplex search of *paper-count*."""
 UNCOMBINED = {size: Combination(0.0, 1.0) for size in (1, 2, 3, 4, 5)}
 CELLS = {size: AETIOLOGIES[:size] for size in (2, 3, 4, 5)}
-"""Cells on which combinations are fitted."""
+"""Number of cells to which combinations are fitted."""
 CORES = {"freed": {4: 0.2, 5: 0.2}}
-"""Cores by the number of readings; the others have none."""
+"""Cores by number of readings; none for other numbers."""
 
 
-class Judged(NamedTuple):
-    """Readings [kPa] (N,), and the stiffness [kPa] (N,) to be estimated from each."""
+class TrainingData(NamedTuple):
+    """Training data: readings [kPa] (N,), and the true stiffness [kPa] (N,) of each."""
 
     readings: Array
     expected: Array
 
 
-def residuals(placed: Placement, present: Sequence[str], judged: Judged, knowledge: str) -> Array:
-    """Relative error of every estimate, all systems one after another."""
+def residuals(
+    placed: Placement, present: Sequence[str], judged: TrainingData, knowledge: str
+) -> Array:
+    """Relative error of every estimate, for all systems in turn."""
     settings = LiverSettings(knowledge=knowledge)
     system = following_system(placed, settings, tuple(present))
     X = np.full((judged.readings.size, len(AETIOLOGIES)), parameters()["normal_liver"])
@@ -96,7 +99,7 @@ def freed_sets() -> Placement:
     gaps = int((high - low) / (LEAST_DISTANCE * reading_noise()))
     centres = np.geomspace(*OUTERMOST, gaps + 1)
     crossings = np.sqrt(centres[:-1] * centres[1:])
-    judged = everyone_judged()
+    judged = all_training_data()
 
     def placed(consequents: Array) -> Placement:
         found = _placed_sets(centres, crossings, np.exp(consequents))
@@ -112,12 +115,12 @@ def freed_sets() -> Placement:
     )
 
 
-def everyone_judged() -> Judged:
-    """Virtual patients of all aetiologies, and livers even in ln kPa, each with one exam."""
+def all_training_data() -> TrainingData:
+    """Virtual patients of all aetiologies, and livers uniform in ln kPa, with one exam each."""
     rng = np.random.default_rng(SEED)
     patients = cohort(TAUGHT, SEED).stiffness / PA_PER_KPA
     livers = np.concatenate([patients, np.geomspace(*OUTERMOST, TAUGHT)])
-    return Judged(noisy_readings(livers, 1, rng)[:, 0], livers)
+    return TrainingData(noisy_readings(livers, 1, rng)[:, 0], livers)
 
 
 def paper_count_sets() -> Placement:
@@ -129,25 +132,25 @@ def paper_count_sets() -> Placement:
     )
 
 
-def population_judged(name: str) -> Judged:
-    """Readings of virtual patients by their quantiles, and readings even in ln kPa, half each."""
+def aetiology_training_data(name: str) -> TrainingData:
+    """Quantiles of the readings of virtual patients, and readings uniform in ln kPa, half each."""
     drawn = cohort(20_000, SEED)
     chosen = drawn.main == AETIOLOGIES.index(name)
     levels = np.quantile(drawn.readings[chosen, AETIOLOGIES.index(name)], QUANTILES) / PA_PER_KPA
     readings = np.concatenate([levels, JUDGED])
-    return Judged(readings, readings)
+    return TrainingData(readings, readings)
 
 
 QUANTILES = (np.arange(JUDGED.size) + 0.5) / JUDGED.size
 
 
 def _optimised(name: str, count: int) -> tuple[PlacedSet, ...]:
-    judged = population_judged(name)
+    judged = aetiology_training_data(name)
     rng = np.random.default_rng(SEED)
     found = [_searched(name, judged, start) for start in _starts(count, rng)]
 
     def loss_at(x: Array) -> float:
-        return loss(name, unfolded(x, count), judged)
+        return loss(name, sets_from_unknowns(x, count), judged)
 
     best = min(found, key=loss_at)
     # Consequents are rounded, and a simplex steps over the stairs that this makes.
@@ -158,29 +161,29 @@ def _optimised(name: str, count: int) -> tuple[PlacedSet, ...]:
         bounds=np.transpose(_bounds(count)),
         options={"maxfev": POLISHED},
     )
-    return unfolded(np.asarray(polished.x), count)
+    return sets_from_unknowns(np.asarray(polished.x), count)
 
 
-def loss(name: str, sets: tuple[PlacedSet, ...], judged: Judged) -> float:
+def loss(name: str, sets: tuple[PlacedSet, ...], judged: TrainingData) -> float:
     """Mean square of the residuals of one aetiology's sets."""
     placed = Placement(dict.fromkeys(AETIOLOGIES, sets), UNCOMBINED)
     return float(np.mean(residuals(placed, (name,), judged, "paper-count") ** 2))
 
 
 def _starts(count: int, rng: np.random.Generator) -> Iterable[Array]:
-    """Unknowns to start from: ln of the first centre, of the gaps, ln consequents."""
+    """Start values: ln of the first centre, of the gaps, and of the consequents."""
     for _ in range(STARTS):
         centres = np.sort(rng.uniform(np.log(3.0), np.log(50.0), count))
         gaps = np.maximum(np.diff(centres), 0.3)
         yield np.concatenate([centres[:1], np.log(gaps), np.zeros(count - 1), centres])
 
 
-def _searched(name: str, judged: Judged, start: Array) -> Array:
-    """Unknowns of least squares near a start."""
+def _searched(name: str, judged: TrainingData, start: Array) -> Array:
+    """Least-squares solution from a start value."""
     count = (start.size + 1) // 3
 
     def misfit(x: Array) -> Array:
-        placed = Placement(dict.fromkeys(AETIOLOGIES, unfolded(x, count)), UNCOMBINED)
+        placed = Placement(dict.fromkeys(AETIOLOGIES, sets_from_unknowns(x, count)), UNCOMBINED)
         return residuals(placed, (name,), judged, "paper-count")
 
     low, high = _bounds(count)
@@ -188,7 +191,7 @@ def _searched(name: str, judged: Judged, start: Array) -> Array:
 
 
 def _bounds(count: int) -> tuple[Array, Array]:
-    """Of the unknowns: first centre, gaps, logits of crossings, consequents."""
+    """Bounds of the unknowns: first centre, gaps, logits of crossings, consequents."""
     p = parameters()
     ends = np.log([[p["input_low"], 20.0], [p["concluded_low"], p["concluded_high"]]])
     parts = [ends[:1], *[[(-2.0, 1.2)]] * (count - 1), *[[(-2.5, 2.5)]] * (count - 1)]
@@ -196,8 +199,8 @@ def _bounds(count: int) -> tuple[Array, Array]:
     return low, high
 
 
-def unfolded(x: Array, count: int) -> tuple[PlacedSet, ...]:
-    """The sets that unknowns stand for; a crossing divides its gap by a logistic share."""
+def sets_from_unknowns(x: Array, count: int) -> tuple[PlacedSet, ...]:
+    """The sets for given unknowns; a crossing divides its gap by a logistic fraction."""
     gaps = np.exp(x[1:count])
     centres = x[0] + np.concatenate([[0.0], np.cumsum(gaps)])
     shares = 1.0 / (1.0 + np.exp(-x[count : 2 * count - 1]))
@@ -219,11 +222,11 @@ def _placed_sets(centres: Array, crossings: Array, consequents: Array) -> tuple[
 def with_combinations(
     placed: Placement, knowledge: str, sizes: Sequence[int] | None = None
 ) -> Placement:
-    """The sets with shift and power of their combinations of so many diseases fitted.
+    """The sets with fitted shift and power of combinations of the given numbers of diseases.
 
-    Of all that the knowledge base has cells for, if no sizes are given.
+    By default, all numbers for which the knowledge base has cells.
     """
-    judged = Judged(JUDGED[::2], JUDGED[::2])
+    judged = TrainingData(JUDGED[::2], JUDGED[::2])
     cores = CORES.get(knowledge, {})
     wanted = sizes or [size for size in CELLS if size < 5 or KNOWLEDGE[knowledge].completed]
 
@@ -256,7 +259,7 @@ def _fitted(misfit: Callable[[Array], Array], start: Array, bounds: tuple[Array,
 
 
 def derived() -> dict[str, Placement]:
-    """Both bases by name, from the published figures alone."""
+    """Both bases by name, derived from published data only."""
     sets = {"paper-count": paper_count_sets(), "freed": freed_sets()}
     return {name: with_combinations(placed, name) for name, placed in sets.items()}
 

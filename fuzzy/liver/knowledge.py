@@ -1,4 +1,4 @@
-"""The elastography knowledge behind the fuzzy sets, from `fuzzy/liver/data`; all in kPa."""
+"""Elastography data of the fuzzy sets, from `fuzzy/liver/data`; all in kPa."""
 
 import csv
 from dataclasses import dataclass
@@ -10,21 +10,21 @@ Severity = Literal["mild", "moderate", "severe"]
 
 OUTPUT = "stiffness"
 SEVERITIES: tuple[Severity, ...] = ("mild", "moderate", "severe")
-"""Names of the output sets, in rising order."""
+"""Names of the output sets, in ascending order."""
 
 PLACEMENTS: dict[str, str] = {
     "stage-mean": " for want of means; the others are means of patients at the stage (sporea2010)",
     "cut-off": "",
 }
-"""Placements of the data's centres; and what is to be said of cut-offs where one is chosen."""
+"""Placements of the centres, with a note on cut-offs where one is chosen."""
 
 STAGES = {2: ("F2", "F4"), 3: ("F2", "F3", "F4"), 4: ("F1", "F2", "F3", "F4")}
-"""METAVIR stages that an input's sets stand for, by their number."""
+"""METAVIR stages of the sets of an input, by number of sets."""
 
 
 @dataclass(frozen=True)
 class SetRecord:
-    """What is known of one fuzzy set, in kPa or relative to the centre, each with its source.
+    """Data of one fuzzy set, in kPa or relative to the centre, each with its source.
 
     `centre`: mean stiffness of patients at the stage, or the cut-off that diagnoses it, as
     `placement` says. `within_stage_sd`: spread between patients of one stage; its kind is
@@ -33,7 +33,7 @@ class SetRecord:
     studies and relative half-difference between two operators, `published` for this disease or
     `transferred` from the one that has it.
 
-    `sourced` judges centre and within-stage spread. `yes`: both published for this disease and
+    `sourced` rates centre and within-stage spread. `yes`: both published for this disease and
     stage, or pooled from such; `partly`: the centre is, the spread is a ratio; `weak`: the centre
     is published for another purpose than this stage; `no`: nothing was found, the centre lies
     between its neighbours.

@@ -1,13 +1,13 @@
 """Sets that partition the scale of stiffness, and systems of them that follow the reading.
 
-Neighbouring sets cross at one half and the centres lie evenly on a logarithmic scale, where
-readings spread alike at every stiffness. A set is a Gaussian with a width for either flank; the
-outermost ones stay at 1. A rule concludes the stiffness expected of a liver whose readings stand at
-the centres of its sets: exp(shift + power * mean of ln consequent), over the sets of its
-antecedent. Shift and power, by the number of diseases, take back what the centroid of several
-clipped sets adds. With many readings a set stays at 1 over a core about its centre: AND by min lets
-every rule of neighbouring sets fire as strongly as the least of its degrees, there are hundreds of
-them, and without a core they outvote the rule at whose centres the readings stand. All in kPa.
+Neighbouring sets cross at one half, and the centres are evenly spaced on a logarithmic scale, on
+which the spread of readings does not depend on the stiffness. A set is a Gaussian with a width for
+each flank; the outermost ones stay at 1. The consequent of a rule is the expected stiffness of a
+liver with readings at the centres of its sets: exp(shift + power * mean of ln consequent), over the
+sets of its antecedent. Shift and power, by number of diseases, compensate the bias of the centroid
+of several clipped sets. With many readings a set has a core of membership 1 about its centre. With
+AND by min, each of the hundreds of rules of neighbouring sets fires with the least of its degrees;
+without a core they outweigh the rule whose centres match the readings. All in kPa.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ HALF_WIDTH = sqrt(2.0 * log(2.0))
 
 
 class PlacedSet(NamedTuple):
-    """One set of an input [kPa]: centre, where it crosses the next one, what it alone concludes."""
+    """One set of an input [kPa]: centre, crossing with the next set, and its own consequent."""
 
     name: str
     centre: float
@@ -45,10 +45,10 @@ class PlacedSet(NamedTuple):
 
 
 class Combination(NamedTuple):
-    """How the consequents of the sets of so many diseases make that of their rule.
+    """Combination of the consequents of the sets of several diseases into that of their rule.
 
-    `core`: share of the way to the next crossing over which a set of a patient with so many
-    readings stays at 1.
+    `core`: fraction of the distance to the next crossing over which a set has membership 1, for a
+    patient with so many readings.
     """
 
     shift: float
@@ -56,7 +56,7 @@ class Combination(NamedTuple):
     core: float = 0.0
 
     def consequent(self, members: Sequence[float]) -> float:
-        """Stiffness [kPa] concluded, within what the output's universe can show undisturbed."""
+        """Consequent [kPa], within the range that the output's universe represents without bias."""
         p = parameters()
         return self.within(tuple(map(log, members)), p["concluded_low"], p["concluded_high"])
 
@@ -67,7 +67,7 @@ class Combination(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """A whole knowledge base: sets by aetiology, combinations by their number of diseases."""
+    """A whole knowledge base: sets by aetiology, combinations by number of diseases."""
 
     sets: Mapping[str, tuple[PlacedSet, ...]]
     combinations: Mapping[int, Combination]
@@ -75,7 +75,7 @@ class Placement(NamedTuple):
 
 @cache
 def placement(knowledge: str) -> Placement:
-    """The knowledge base of that name as `fuzzy.liver.derivation` has written it."""
+    """The knowledge base of a given name, as written by `fuzzy.liver.derivation`."""
     placed = [row for row in rows("partition.csv") if row["knowledge"] == knowledge]
     return Placement(
         {
@@ -106,9 +106,9 @@ def reading_noise() -> float:
 
 
 def footprint_half_width(settings: LiverSettings, readings: int) -> float:
-    """Relative half-width of every input set's footprint for a patient with so many readings.
+    """Relative half-width of the footprint of every input set, by number of readings.
 
-    Readings of one liver err independently, so that together they leave less uncertain.
+    Errors of several readings of one liver are independent, so the uncertainty decreases.
     """
     return settings.footprint_factor * parameters()["band"] * reading_noise() / sqrt(readings)
 
@@ -118,8 +118,8 @@ def following_system(
 ) -> FuzzySystem:
     """The system of a placement, in kPa, for a patient with readings of the aetiologies `present`.
 
-    Rules on the most diseases outweigh those on fewer of them, which speak for patients with no
-    more readings. ValueError if no cell of Table I has only diseases that are present.
+    Rules on the most diseases outweigh those on fewer, which are for patients with fewer
+    readings. ValueError if no cell of Table I has only diseases that are present.
     """
     reading = settings.base.reading
     own = placed is placement(settings.knowledge)
@@ -144,21 +144,21 @@ def following_system(
 
 @lru_cache(maxsize=64)
 def _kept(knowledge: str, present: tuple[str, ...]) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
-    """Rules of a knowledge base, tens of thousands for all five, which no other setting changes."""
+    """Cached rules of a knowledge base, tens of thousands for all five aetiologies."""
     base = KNOWLEDGE[knowledge]
     cells = antecedents(present, base.reading, completed=base.completed)
     return _concluded(placement(knowledge), cells)
 
 
 def _most(rules: Sequence[Rule]) -> int:
-    """Diseases of the rules that outweigh the others."""
+    """Diseases of the rules with the largest weight."""
     return max(len(rule.antecedents) for rule in rules)
 
 
 def _concluded(
     placed: Placement, cells: Sequence[Cell]
 ) -> tuple[tuple[Rule, ...], tuple[int, ...]]:
-    """Rules of a placement on some cells, and the levels of the output sets that they conclude."""
+    """Rules of a placement on some cells, and the levels of their output sets."""
     concluded = list(_rules(placed, cells, max(map(len, cells))))
     levels = sorted({level for _, level, _ in concluded})
     index = {level: k for k, level in enumerate(levels)}
@@ -202,18 +202,18 @@ def _rules(
 
 
 def _members(name: str, sets: Sequence[PlacedSet]) -> tuple[tuple[Term, float], ...]:
-    """Each set of an aetiology as a term, and the logarithm of what it alone concludes."""
+    """Each set of an aetiology as a term, and the logarithm of its own consequent."""
     i = AETIOLOGIES.index(name)
     return tuple((Term(i, k), log(one.consequent)) for k, one in enumerate(sets))
 
 
 def level_of(stiffness: float) -> int:
-    """Number of the output set nearest to a stiffness [kPa]; they are a fixed ratio apart."""
+    """Number of the output set nearest to a stiffness [kPa]; the sets have a fixed ratio."""
     return round(log(stiffness) / log(parameters()["output_ratio"]))
 
 
 def _output_set(level: int) -> FuzzySet:
-    """A narrow Gaussian: alike for all levels, so that none pulls the centroid by its area."""
+    """A narrow Gaussian of the same width for all levels, so that their areas are equal."""
     centre = parameters()["output_ratio"] ** level
     return FuzzySet(f"about-{centre:.3g}", "gaussmf", (parameters()["output_sd"], centre))
 
@@ -251,7 +251,7 @@ def _set(
 
 
 def flanks(one: PlacedSet, below: float | None, above: float | None) -> tuple[float, float]:
-    """Standard deviations [kPa] of both flanks; a flat side has that of the other, for show."""
+    """Standard deviations [kPa] of both flanks; a flat side repeats that of the other."""
     widths = [
         None if crossing is None else abs(crossing - one.centre) / HALF_WIDTH
         for crossing in (below, above)

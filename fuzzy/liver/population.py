@@ -1,11 +1,11 @@
-"""Virtual patients drawn from published distributions of liver stiffness, each with its readings.
+"""Virtual patients sampled from published distributions of liver stiffness, with readings.
 
 A patient has one liver of one stiffness and a main aetiology. In hepatitis B and C a stage is drawn
 by the numbers of patients published for it (F0 by those of carriers of hepatitis B without liver
 disease, for both), and then a stiffness, log-normal with the mean and SD published for the stage.
 In the others, for which no mean of a stage was found, the stiffness follows the percentiles of the
 whole published group, linear in ln kPa over normal scores, and the stage is read off the cut-offs.
-Published spreads contain the noise of reading, which is taken out.
+Published spreads include the reading noise, which is subtracted.
 
 Co-morbidities are added independently, with the share of adults in a population survey who have
 them; the main aetiology alone decides the stiffness. There is a reading for every aetiology: the
@@ -46,7 +46,7 @@ class Cohort(NamedTuple):
 
 
 def cohort(patients: int, seed: int) -> Cohort:
-    """So many virtual patients, as many of each main aetiology. ValueError for fewer than 5."""
+    """Virtual patients, equally many of each main aetiology. ValueError for fewer than 5."""
     if patients < len(AETIOLOGIES):
         raise ValueError(f"patients = {patients}: give at least {len(AETIOLOGIES)}")
     rng = np.random.default_rng(seed)
@@ -80,7 +80,7 @@ def exam_noise(stiffness: Array) -> Array:
 
 
 def _livers(name: str, number: int, rng: np.random.Generator) -> tuple[Array, NDArray[np.str_]]:
-    """Stiffness [kPa] and stage of so many patients of a main aetiology."""
+    """Stiffness [kPa] and stage of `count` patients of a main aetiology."""
     staged = [row for row in rows("stages.csv") if row["aetiology"] == name]
     return _by_stage(staged, number, rng) if staged else _by_percentile(name, number, rng)
 
@@ -97,7 +97,7 @@ def _by_stage(
 
 
 def _log_moments(row: dict[str, str]) -> tuple[float, float]:
-    """Mean and SD of ln kPa of a stage, without the noise of reading."""
+    """Mean and SD of ln kPa of a stage, without reading noise."""
     mean, sd = float(row["mean_kpa"]), float(row["sd_kpa"])
     variance = log(1.0 + (sd / mean) ** 2)
     return log(mean) - 0.5 * variance, sqrt(max(variance - _noise_at(mean) ** 2, 0.0))
@@ -121,7 +121,7 @@ def _by_percentile(
 
 
 def _percentiles(name: str) -> tuple[Array, Array]:
-    """Normal scores and ln kPa of a group's percentiles, drawn in by the noise of reading."""
+    """Normal scores and ln kPa of a group's percentiles, corrected for reading noise."""
     (row,) = (row for row in rows("groups.csv") if row["aetiology"] == name)
     known = {key: float(row[key]) for key in row if key.startswith("p") and row[key]}
     shares = [float(key[1:].replace("_", ".")) / 100.0 for key in known]

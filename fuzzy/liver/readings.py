@@ -1,8 +1,8 @@
 """Readings of Table I that reach the paper's 247 rules.
 
-The paper prints neither its rules nor how many fuzzy sets an input has. Every cell of Table I is
-taken to expand to the full grid of the sets of its diseases; which cells count, and how, is open.
-Several readings reach 247, so the count alone does not say which one the authors had in mind.
+The paper states neither its rules nor the number of fuzzy sets of an input. Here every cell of
+Table I expands to the full grid of the sets of its diseases; which cells count, and how, is open.
+Several readings give 247 rules, so the count does not determine the authors' choice.
 """
 
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ READINGS: dict[str, TableReading] = {
     "R5-hcv4": TableReading((4, 3, 2, 2, 2), SINGLES_TO_TRIPLES, odd_cell="drop"),
     "R5-pair": TableReading((4, 2, 3, 2, 2), SINGLES_TO_TRIPLES, odd_cell="pair"),
 }
-"""Readings that the data can carry; all give 247 rules but R1-no-duplicates, which gives 235."""
+"""Readings supported by the data; all give 247 rules except R1-no-duplicates with 235."""
 
 UNSUPPORTED = {
     "R6": "singles, pairs and quadruples, one term on the diagonal, need four sets of ALD, CLD "
@@ -64,11 +64,11 @@ UNSUPPORTED = {
     "R7": "pairs alone need six sets of some aetiology",
     "R8": "singles and pairs need at least five sets of some aetiology",
 }
-"""Readings that reach 247 with sets that no data of ours describe, and what they need."""
+"""Readings that give 247 rules with sets for which there are no data, and what they need."""
 
 
 def reading_named(name: str) -> TableReading:
-    """The reading of that name. ValueError if there is none or the data cannot carry it."""
+    """The reading of a name. ValueError for an unknown name or one not supported by the data."""
     if name in READINGS:
         return READINGS[name]
     lacking = next((f"{x}: {need}" for x, need in UNSUPPORTED.items() if name.startswith(x)), None)
@@ -77,7 +77,7 @@ def reading_named(name: str) -> TableReading:
 
 
 def disease_sets(reading: TableReading) -> list[Cell]:
-    """The antecedents' diseases, one entry per cell that counts, in the order of Table I."""
+    """Diseases of the antecedents, one entry per cell that counts, in the order of Table I."""
     printed = list(dict.fromkeys(cells())) if reading.duplicates == "drop" else list(cells())
     odd = [_odd(cell, reading.odd_cell) if is_odd(cell) else cell for cell in printed]
     counted = [cell for cell in odd if len(cell) in reading.sizes]

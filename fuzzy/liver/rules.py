@@ -1,6 +1,6 @@
 """Rules of the liver: the full grid of fuzzy sets for every cell of Table I that counts.
 
-The paper prints no consequents; that the severest antecedent governs is a choice of this study.
+The paper states no consequents; that the most severe antecedent governs is a choice of this study.
 """
 
 import math
@@ -13,7 +13,7 @@ from fuzzy.systems.system import Rule, Term
 
 
 class Consequent(NamedTuple):
-    """What a combination concludes: the severity that governs its members', and that in words."""
+    """Consequent of a combination: the governing severity of its members, and its description."""
 
     governing: Callable[[Sequence[int]], int]
     words: str
@@ -34,8 +34,7 @@ def rule_base(
 ) -> tuple[Rule, ...]:
     """One AND rule for every combination of the fuzzy sets of every cell's diseases.
 
-    `severities` holds, for each aetiology, the severity of each of its sets: the index of the
-    output set it stands for.
+    `severities`: severity of each set of each aetiology, as the index of its output set.
     """
     return tuple(
         _rule(terms, severities, consequent)

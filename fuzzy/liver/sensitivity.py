@@ -1,7 +1,7 @@
-"""How far each open choice moves the estimate, beside how far the choice of system moves it.
+"""Sensitivity of the estimate to each open choice, compared with that to the kind of system.
 
-One choice at a time is changed from the base settings. The change is taken at the readings given
-and over a spread of readings, all in Pa.
+One choice at a time is varied from the base settings. The change is evaluated at given readings and
+over a sample of readings, all in Pa.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -24,10 +24,10 @@ from fuzzy.systems.sets import Array
 from fuzzy.systems.spread import spread
 
 EXACT_ROWS = 24
-"""Exact sampling takes some 10 ms a reading; so many tell its change from that of samples."""
+"""Rows for exact sampling, which takes some 10 ms per reading."""
 
 STAND_IN: dict[str, Any] = {"sampling": "octave", "samples": 1001}
-"""For exact sampling where another choice is changed: within 0.2 Pa of it, and far faster."""
+"""Substitute for exact sampling where another choice is varied: within 0.2 Pa, far faster."""
 
 LARGEST_READING = 40.0 * PA_PER_KPA
 """Two within-stage SDs above the highest centre in use, cirrhosis in ALD at 22.6 +- 8.9 kPa."""
@@ -38,7 +38,7 @@ SUGENO: tuple[str, ...] = ("sugeno",)
 
 
 class Axis(NamedTuple):
-    """A field of LiverSettings or of its options, the values it takes, the systems it moves."""
+    """A field of LiverSettings or of its options, its values, and the systems that it affects."""
 
     key: str
     values: tuple[Any, ...]
@@ -64,7 +64,7 @@ AXES = (
 class Sensitivity:
     """Change [Pa] of one system's estimate when one choice goes from `base` to `alternative`.
 
-    `at_readings`: at the readings given; `rms` and `largest` (in size): over so many `rows` of
+    `at_readings`: at the given readings; `rms` and `largest` magnitude: over a number of `rows` of
     readings. `widths`: mean width [Pa] of the type-2 interval before and after, None for the
     others. The choice `system` compares the system `base` with `alternative`.
     """
@@ -82,14 +82,14 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Screening:
-    """Rows by choice, the choice of system last; and the alternatives left out, each with why."""
+    """Rows by choice, the kind of system last; and the alternatives left out, with reasons."""
 
     rows: tuple[Sensitivity, ...]
     left_out: tuple[str, ...]
 
 
 class _Case(NamedTuple):
-    """Readings X (N, 5) [Pa] answered by a system with these settings."""
+    """Readings X (N, 5) [Pa], a kind of system and its settings."""
 
     X: Array
     system: str
@@ -127,7 +127,7 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
 
 
 def _remembered() -> _Answers:
-    """Evaluates each case once, for the base is compared with every alternative."""
+    """Cache of evaluated cases, since the base is compared with every alternative."""
     found: dict[tuple[object, ...], tuple[Array, Array | None]] = {}
 
     def answers(case: _Case) -> tuple[Array, Array | None]:
@@ -146,7 +146,7 @@ def _value(settings: LiverSettings, key: str) -> Any:
 
 
 def _is_idle(key: str, base: LiverSettings) -> bool:
-    """Whether a choice has no part in the answer.
+    """Whether a choice has no effect on the estimate.
 
     Exact sampling takes no samples, and a base that follows the reading has cells of its own.
     """

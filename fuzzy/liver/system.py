@@ -34,7 +34,7 @@ def liver_system(settings: LiverSettings, present: tuple[str, ...] = AETIOLOGIES
 
 @lru_cache(maxsize=128)
 def _built(settings: LiverSettings, present: tuple[str, ...]) -> FuzzySystem:
-    """Kept, for tens of thousands of rules take a while; how they are evaluated plays no part."""
+    """Cached systems, since tens of thousands of rules take time to build."""
     if settings.base.follows:
         return following_system(placement(settings.knowledge), settings, present)
     records = _input_records(settings)
@@ -90,10 +90,10 @@ def _antecedents(settings: LiverSettings, present: tuple[str, ...]) -> list[tupl
 
 
 def _input(name: str, records: tuple[SetRecord, ...], settings: LiverSettings) -> Variable:
-    """An aetiology whose outer sets stay at 1 beyond their centres.
+    """An input whose outer sets have membership 1 beyond their centres.
 
-    A reading beyond the last centre is then fully in that set, and the system cannot forget its
-    answer near the ends of the scale as it would with plain Gaussians.
+    A reading beyond the last centre is then fully in that set. With plain Gaussians no rule would
+    fire near the ends of the scale.
     """
     first, *inner, last = records
     # The flat sides end so far out that no footprint moves their ends into the universe.
@@ -130,7 +130,7 @@ def footprint(record: SetRecord, settings: LiverSettings) -> Footprint:
     """Footprint of the set that a record describes, as the settings choose.
 
     That the width of the flanks, or the height, is as uncertain as the centre is a choice of this
-    study: the sources only tell how far centres lie apart.
+    study: the sources give the spread of centres only.
     """
     relative = relative_half_width(record, settings)
     return FOOTPRINTS[settings.footprint].footprint(relative, record.centre)

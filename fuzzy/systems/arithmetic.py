@@ -1,9 +1,9 @@
-"""Numbers as people write them into MATLAB's files: pi/4, -2*pi, 1/3, (1 + 2)*1e-3.
+"""Numeric expressions in MATLAB's files: pi/4, -2*pi, 1/3, (1 + 2)*1e-3.
 
-The grammar is + - * / ^, signs, parentheses, the names pi and eps, and sqrt and exp; nothing else
-is evaluated. As in MATLAB, a power binds before a sign before it, and operators of one rank go from
-left to right. Between the brackets of a vector a sign with a blank before it alone starts a new
-number: [1 -2] are two, [1 - 2] and [1-2] are one.
+The grammar has + - * / ^, signs, parentheses, the constants pi and eps, and the functions sqrt and
+exp; nothing else is evaluated. As in MATLAB, a power binds tighter than a preceding sign, and
+operators of equal precedence associate to the left. In a vector, a sign with a blank before but not
+after it starts a new number: [1 -2] has two, [1 - 2] and [1-2] have one.
 """
 
 import math
@@ -13,15 +13,15 @@ from collections.abc import Callable
 NAMES = {"pi": math.pi, "eps": math.ulp(1.0)}
 FUNCTIONS: dict[str, Callable[[float], float]] = {"sqrt": math.sqrt, "exp": math.exp}
 LONGEST = 200
-"""Characters of one expression."""
+"""Largest number of characters of an expression."""
 
 _TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[a-z]+|[-+*/^()]", re.ASCII)
 
 
 def parts(text: str) -> list[str]:
-    """The expressions between the brackets of a vector, parted by blanks or commas, as MATLAB does.
+    """The expressions of a vector, separated by blanks or commas as in MATLAB.
 
-    ValueError for parentheses without their other half.
+    ValueError for unbalanced parentheses.
     """
     text = re.sub(r"\s*([*/^])\s*", r"\1", text.strip())
     text = re.sub(r"(?<=[^\s,(+-])\s+([+-])\s+", r"\1", text)
@@ -41,7 +41,7 @@ def parts(text: str) -> list[str]:
 
 
 def number(text: str) -> float:
-    """The value of an expression. ValueError if it is none, or no finite number."""
+    """The value of an expression. ValueError for a syntax error or a value that is not finite."""
     try:
         value = _Reader(text).whole()
     except (ArithmeticError, ValueError):
@@ -52,7 +52,7 @@ def number(text: str) -> float:
 
 
 class _Reader:
-    """Tokens of one expression, and how far they have been read."""
+    """Tokens of an expression, and the position of the parser."""
 
     def __init__(self, text: str) -> None:
         self._tokens = _TOKEN.findall(text)
@@ -99,7 +99,7 @@ class _Reader:
         return value
 
     def _exponent(self) -> float:
-        """What stands after ^: signs bind to it, further powers do not."""
+        """The exponent after ^, to which signs belong but further powers do not."""
         if self._peek() in ("+", "-"):
             return self._exponent() if self._take() == "+" else -self._exponent()
         return self._atom()

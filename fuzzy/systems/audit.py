@@ -1,8 +1,9 @@
-"""What is wrong, or idle, in a rule base: repeated, contradictory and idle rules, and gaps.
+"""Audit of a rule base: repeated, contradictory and ineffective rules, and gaps in coverage.
 
-Idle rules are of three kinds. A rule of weight 0 and one whose terms no reading meets together
-never fire. A dominated rule fires and is counted by Sugeno's sum over rules, but changes no answer
-where rules are merged by max: Mamdani, type-2, and Sugeno by output sets.
+There are three kinds of ineffective rules. Rules of weight 0, and rules whose terms no reading
+satisfies together, never fire. A dominated rule fires and counts in Sugeno's sum over rules, but
+does not change the output where rules are merged by max: Mamdani, type-2, and Sugeno by output
+sets.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,15 +16,15 @@ from fuzzy.systems.rule_text import rule_text
 from fuzzy.systems.system import FuzzySystem
 
 THRESHOLD = 0.05
-"""Strength up to which a reading counts as uncovered; a Gaussian falls to it at 2.4 SD."""
+"""Firing strength up to which a reading counts as uncovered; that of a Gaussian at 2.4 SD."""
 
 
 @dataclass(frozen=True)
 class Audit:
     """Findings on a system: rules by index, sets by (variable, set).
 
-    `coverage` judges `samples` readings of all inputs together by `threshold`, `gaps` each input
-    by itself.
+    `coverage` tests `samples` readings of all inputs together against `threshold`; `gaps` are those
+    of each input alone.
     """
 
     duplicates: tuple[Pair, ...]
@@ -39,7 +40,7 @@ class Audit:
 
 
 def audit(system: FuzzySystem, *, samples: int = 4096, threshold: float = THRESHOLD) -> Audit:
-    """Findings on the system. ValueError for no samples or a threshold outside 0 to 1."""
+    """Audit a system. ValueError for no samples or a threshold outside 0 to 1."""
     if samples < 1:
         raise ValueError(f"samples = {samples}: give at least 1")
     if not 0 < threshold < 1:

@@ -1,7 +1,7 @@
 """Systems packed into plain arrays, evaluated by the compiled `fuzzy.systems.kernel`.
 
-The answers are those of the numpy modules to rounding, some hundred times sooner. Every call runs
-on one thread and lets go of the interpreter's lock.
+Results equal those of the numpy modules up to rounding, some hundred times faster. Every call runs
+on one thread and releases the interpreter's lock.
 """
 
 import math
@@ -49,7 +49,7 @@ KERNEL_FORMS: dict[str, tuple[int, Callable[[Parameters], tuple[float, ...]]]] =
     "dsigmf": (kernel.SIGMOID_DIFFERENCE, lambda p: p),
     "psigmf": (kernel.SIGMOID_PRODUCT, lambda p: p),
 }
-"""Every kind as one of the kernel's, with the four parameters it takes there."""
+"""Every kind of set as one of the kernel's, with its four parameters there."""
 
 
 ONE_ROW: dict[str, Callable[..., kernel.Single]] = {
@@ -60,12 +60,12 @@ ONE_ROW: dict[str, Callable[..., kernel.Single]] = {
 
 
 class CompiledAnswer(NamedTuple):
-    """A compiled system's answer to one row of readings, in the output's unit.
+    """Output of a compiled system for one row of readings, in the output's unit.
 
     `lower` and `upper` are the ends of the type-2 interval; for the other systems both are `value`.
-    `clamped`: a reading was outside its universe and the nearest end was taken. `silent`: no rule
-    fires by LEAST_STRENGTH, so that the answer is the middle of the universe or, if rules fire by
-    less, what can be computed from them.
+    `clamped`: a reading was outside its universe and was clamped. `silent`: no rule fires with
+    LEAST_STRENGTH or more; the answer is the middle of the universe or, where rules fire weakly,
+    the result of those.
     """
 
     value: float
@@ -77,7 +77,7 @@ class CompiledAnswer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A system as the arrays of the kernel; `compiled` makes it."""
+    """A system as the arrays of the kernel, made by `compiled`."""
 
     system: FuzzySystem
     kind: str
@@ -86,10 +86,10 @@ class Compiled:
     arguments: tuple[Any, ...]
 
     def evaluate(self, X: Array) -> Output:
-        """Answers to the readings X (N, inputs) as they are, also outside their universes.
+        """Outputs for the readings X (N, inputs), without clamping to their universes.
 
-        NaN where nothing fires or what fires has no mass on the samples; `infer` refuses both.
-        ValueError for a wrong width and for a reading that is not finite.
+        NaN where no rule fires, or the fired sets have no mass on the samples; `infer` refuses
+        both. ValueError for a wrong width and for a reading that is not finite.
         """
         X = np.ascontiguousarray(require_readings(self.system, X))
         if self.kind == "interval-type-2":
@@ -101,15 +101,15 @@ class Compiled:
 
     @cached_property
     def _one(self) -> tuple[Callable[..., kernel.Single], kernel.Integers, Array]:
-        """The kernel of one row, and the arguments as it takes them."""
+        """The kernel of one row, and its arguments."""
         clamps = OUT_OF_RANGE[self.options.out_of_range].clamps
         return ONE_ROW[self.kind], *kernel.pack(self.universes, clamps, *self.arguments)
 
     def one(self, x: Sequence[float] | Array) -> CompiledAnswer:
-        """The answer to one reading per input, in range as `options.out_of_range` says.
+        """Output for one reading per input, with the policy `options.out_of_range`.
 
-        ValueError as from `infer`: a wrong number of readings, one that is not finite or is
-        refused, no rule that fires, no finite answer.
+        ValueError as in `infer`: a wrong number of readings, one that is not finite or is refused,
+        no rule that fires, no finite output.
         """
         readings = np.array(x, dtype=np.float64)
         if readings.shape != (len(self.universes),):
@@ -125,7 +125,7 @@ class Compiled:
         return self._exceptional(x)
 
     def _exceptional(self, x: Sequence[float] | Array) -> CompiledAnswer:
-        """What `infer` makes of readings refused or without an answer: an error, or the middle."""
+        """Result of `infer` for refused readings or no output: an error, or the middle."""
         found, _ = answered(self.system, np.array([x]), self._by_definition, self.options)
         ends = found.value if found.interval is None else found.interval[0]
         return CompiledAnswer(found.value.item(), ends[0].item(), ends[-1].item(), False, True)
@@ -137,10 +137,10 @@ class Compiled:
 def compiled(
     system: FuzzySystem, kind: str, options: InferenceOptions, *, pruned: bool = True
 ) -> Compiled:
-    """The system ready for many answers of one `kind`; the last few are kept.
+    """The compiled system for inference of one `kind`; the last few are cached.
 
-    `pruned` leaves out dominated rules wherever rules merge by max, which changes no answer.
-    ValueError for a kind the system cannot be, and for exact sampling.
+    `pruned` drops dominated rules where rules merge by max, which does not change the output.
+    ValueError for a kind that the system does not support, and for exact sampling.
     """
     check_kind(system, kind)
     if is_exact(options.sampling):

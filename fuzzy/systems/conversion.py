@@ -1,4 +1,4 @@
-"""A system as another kind: Sugeno from Mamdani, type-1 from type-2."""
+"""Conversion of systems: Sugeno from Mamdani, type-1 from type-2."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fuzzy.systems.system import FuzzySystem, Variable
 def sugeno_of(system: FuzzySystem, sampling: str = "matlab", samples: int = 101) -> FuzzySystem:
     """The system with every output set replaced by the constant at its centroid.
 
-    Evaluated as sugeno it answers as the system it was made from; a Sugeno one is left as it is.
+    Its Sugeno inference equals that of the original system; a Sugeno system is returned unchanged.
     """
     if system.is_sugeno:
         return system
@@ -24,7 +24,7 @@ def sugeno_of(system: FuzzySystem, sampling: str = "matlab", samples: int = 101)
 
 
 def type_1_of(system: FuzzySystem) -> FuzzySystem:
-    """The system without footprints, which Mamdani and Sugeno inference do not look at."""
+    """The system without footprints, which Mamdani and Sugeno inference do not use."""
     inputs = tuple(_principal(variable) for variable in system.inputs)
     return replace(system, inputs=inputs, output=_principal(system.output))
 

@@ -1,4 +1,4 @@
-"""Which rules some reading fires, and which readings no rule covers."""
+"""Reachability of rules, and coverage of the readings by rules."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,7 +14,7 @@ from fuzzy.systems.system import FuzzySystem, Rule, Variable, firing_strengths, 
 
 POINTS = 1001
 TOGETHER = 64
-"""Rules whose strengths are found at once, of which each but one is at a reading of no interest."""
+"""Rules evaluated per batch; of a batch of m readings, each rule needs only one."""
 MOST_INPUTS_WITH_CORNERS = 12
 
 
@@ -35,10 +35,10 @@ class Coverage(NamedTuple):
 
 
 def unreachable(system: FuzzySystem) -> tuple[int, ...]:
-    """Rules that no reading in the universe fires, whatever their weight.
+    """Rules that no reading in the universe fires, regardless of their weight.
 
-    Each input is searched for the reading that suits the rule's terms on it best; inputs vary
-    freely, so these together are the rule's best reading.
+    For each input, the reading with the largest degree of the rule's terms is found. Inputs are
+    independent, so together they are the reading with the largest strength of the rule.
     """
     best, rules = _best_readings(system), [replace(rule, weight=1.0) for rule in system.rules]
     strongest = np.zeros(len(rules))
@@ -74,14 +74,14 @@ def _strengths(system: FuzzySystem, X: Array) -> Array:
 
 
 def _points(variable: Variable) -> Array:
-    """Many points of the universe, with the kinks of the sets among them."""
+    """Dense points of the universe, including the kinks of the sets."""
     kinks = np.array([x for one in variable.sets for x in corners(one)])
     inside = kinks[(variable.low <= kinks) & (kinks <= variable.high)]
     return np.sort(np.concatenate([np.linspace(variable.low, variable.high, POINTS), inside]))
 
 
 def gaps(system: FuzzySystem, threshold: float) -> tuple[Gap, ...]:
-    """Gaps of each input by itself; their ends are right to a thousandth of the universe."""
+    """Gaps of each input alone, with ends accurate to a thousandth of the universe."""
     judged = (one for one in system.inputs if one.sets and one.low < one.high)
     return tuple(gap for variable in judged for gap in _gaps_of(variable, threshold))
 
@@ -96,7 +96,7 @@ def _gaps_of(variable: Variable, threshold: float) -> Iterator[Gap]:
 
 
 def coverage(system: FuzzySystem, samples: int, threshold: float) -> Coverage:
-    """Coverage of evenly spread readings; the corners of the universe can be the least covered."""
+    """Coverage of quasi-random readings, and of corners of the universe."""
     X = np.concatenate([spread_readings(system, samples), _corner_readings(system)])
     strongest = firing_strengths(system, X, membership).max(axis=0)
     least = int(strongest.argmin())
@@ -108,13 +108,13 @@ def coverage(system: FuzzySystem, samples: int, threshold: float) -> Coverage:
 
 
 def spread_readings(system: FuzzySystem, samples: int) -> Array:
-    """Evenly spread readings of the universe, shape (samples, inputs)."""
+    """Quasi-random readings of the universe, shape (samples, inputs)."""
     low, high = _ends(system)
     return np.asarray(low + (high - low) * spread(samples, len(system.inputs)))
 
 
 def _corner_readings(system: FuzzySystem) -> Array:
-    """All combinations of the universe's ends; only the two extreme ones if inputs are many."""
+    """All combinations of the ends of the universes; for many inputs the two extreme ones only."""
     low, high = _ends(system)
     if len(system.inputs) > MOST_INPUTS_WITH_CORNERS:
         return np.array([low, high])

@@ -1,9 +1,10 @@
-"""Centroids of the continuous output curve, without the error of samples.
+"""Centroids of the continuous output curve by adaptive quadrature, without sampling error.
 
-The curve is a maximum of clipped sets: smooth between its kinks. Clenshaw-Curtis quadrature runs
-over panels that end at the corners of the sets. A panel whose part in the error of the answer is
-too large is cut into smaller ones, until the sum of all parts is below TOLERANCE of the universe.
-A part is the difference to half as many points, and what a kink between two points may hide.
+The curve is a maximum of clipped sets and smooth between its kinks. Clenshaw-Curtis quadrature is
+applied to panels bounded by the corners of the sets. Panels with a large contribution to the error
+of the centroid are subdivided until the sum of all contributions is below TOLERANCE times the width
+of the universe. A contribution is the difference to the rule with half as many points, plus a bound
+for kinks between the points.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,7 +25,7 @@ from fuzzy.systems.sets import (
 from fuzzy.systems.system import FuzzySystem, Membership, Variable, memberships
 
 TOLERANCE = 1e-10
-"""Largest estimated error of an answer, over the width of the universe."""
+"""Largest estimated error of a centroid, relative to the width of the universe."""
 
 PANELS = 64
 CUTS = 8
@@ -53,7 +54,7 @@ def _clenshaw_curtis(intervals: int) -> tuple[Array, Array]:
 
 NODES, WEIGHTS = _clenshaw_curtis(16)
 EXCESS = WEIGHTS.copy()
-"""Weights of the difference to the rule of every second point."""
+"""Weights of the difference to the rule with every second point."""
 EXCESS[::2] -= _clenshaw_curtis(8)[1]
 
 
@@ -71,8 +72,8 @@ class Union(NamedTuple):
     def with_distances(self, y: Array) -> tuple[Array, Array]:
         """The curve at points y, and D distances to kinks, shape (D, *y.shape).
 
-        They change between positive and not where the largest set changes, where it is clipped
-        (but for a product) and where the curve rises from 0, in this order.
+        They change sign where the largest set changes, where it is clipped (not for a product) and
+        where the curve rises from 0, in this order.
         """
         mu = self._memberships(y)
         implied = self._implied(mu)
@@ -100,7 +101,7 @@ class Union(NamedTuple):
 class Panels(NamedTuple):
     """Panels (P,) in rising order over the universe, and integrals (C, P) of the curves on them.
 
-    Moments are about the low end of the universe, their doubts about the middle of the panel.
+    Moments are about the low end of the universe, their error bounds about the panel's middle.
     """
 
     left: Array
@@ -111,7 +112,7 @@ class Panels(NamedTuple):
     moment_doubt: Array
 
     def doubt(self, curve: int, c: float) -> Array:
-        """What the error of each panel may add to the moment of a curve about c."""
+        """Bound of the error of each panel in the moment of a curve about c."""
         distance = np.abs(0.5 * (self.left + self.right) - self.left[0] - c)
         return np.asarray(self.area_doubt[curve] * distance + self.moment_doubt[curve])
 
@@ -181,7 +182,7 @@ def _fills(area: Array) -> bool:
 def _resolved(curves: list[Union], parts: Callable[[Panels], Array]) -> Panels | None:
     """Panels on which the answer is within TOLERANCE; None where the last curve is empty.
 
-    `parts` gives the part of each panel (P,) in the error of the answer.
+    `parts` gives the contribution (P,) of each panel to the error of the answer.
     """
     output = curves[0].system.output
     least = 4 * CUTS * _hair(output)
@@ -236,7 +237,7 @@ def _joined(blocks: Sequence[Panels]) -> Panels:
 
 
 def _measured(curves: list[Union], left: Array, right: Array) -> Panels:
-    """Integrals over panels, in blocks that fit into memory."""
+    """Integrals over panels, in batches that fit into memory."""
     size = max(1, MEMBERSHIPS_AT_ONCE // (NODES.size * curves[0].heights.size))
     starts = range(0, left.size, size)
     return _joined([_block(curves, left[i : i + size], right[i : i + size]) for i in starts])
@@ -260,12 +261,12 @@ def _block(curves: list[Union], left: Array, right: Array) -> Panels:
 
 
 def _points(left: float | Array, right: float | Array, hair: float) -> Array:
-    """The nodes between left and right, the outer ones a hair inside."""
+    """The nodes between left and right, with the outer ones just inside."""
     return np.asarray(np.clip(left + (right - left) * NODES, left + hair, right - hair))
 
 
 def _hidden(distances: Array, y: Array) -> Array:
-    """Area (P,) that kinks between the points (P, M) may hide, from distances (D, P, M) to them.
+    """Bound (P,) of the area error from kinks between points (P, M), at distances (D, P, M).
 
     The last distance is the value of the curve, which is near 0 without any kink in its tails.
     """
@@ -285,7 +286,7 @@ def _parts_of_centroid(panels: Panels) -> Array:
 
 
 def _parts_of_interval(panels: Panels) -> Array:
-    """The largest part of each panel in any of the two ends and Nie and Tan's centroid."""
+    """Largest contribution of each panel to the error of either end or Nie and Tan's centroid."""
     area = panels.area.sum()
     middle = panels.moment.sum() / area
     parts = [(panels.doubt(LOWER, middle) + panels.doubt(UPPER, middle)) / area]
@@ -309,7 +310,7 @@ def _switches(panels: Panels) -> tuple[SwitchPanel, SwitchPanel]:
 
 
 def _switch(panels: Panels, first: int, second: int) -> SwitchPanel:
-    """The panel on which the moment about the switch changes its sign, for it falls throughout."""
+    """The panel in which the moment about the switch point, which is monotonic, changes sign."""
     areas = _before(panels.area[first]), _after(panels.area[second])
     moments = _before(panels.moment[first]), _after(panels.moment[second])
     ends = np.append(panels.left, panels.right[-1]) - panels.left[0]
@@ -334,9 +335,9 @@ def _after(integrals: Array) -> Array:
 
 
 def _end(curves: list[Union], panels: Panels, switch: SwitchPanel) -> float:
-    """The centroid at which the switch lies: Newton's method, kept on the panel by bisection.
+    """The centroid that equals its switch point, by Newton's method safeguarded by bisection.
 
-    The slope of the moment about the switch is the area, so a step leads to the centroid.
+    The derivative of the moment by the switch point is the area, so a step leads to the centroid.
     """
     origin, start, stop = panels.left[0], panels.left[switch.panel], panels.right[switch.panel]
     still = STILL * (panels.right[-1] - origin)
@@ -367,7 +368,7 @@ def _support(output: Variable, heights: Array) -> tuple[float, float]:
 
 
 def _span(one: FuzzySet) -> tuple[float, float]:
-    """Where the upper membership is not 0."""
+    """Interval where the upper membership is not 0."""
     p, shift, stretch = one.shape, one.footprint.mean, 1.0 + one.footprint.spread
     ends = core(one) if has_core(one) else (p[0], p[-1])  # which then have nothing to stretch
     left, right = -np.inf, np.inf

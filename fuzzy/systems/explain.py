@@ -1,6 +1,6 @@
-"""Why a system answers as it does: degrees, rules that fire, heights of the output sets, curve.
+"""Explanation of an output: degrees, fired rules, heights of the output sets, output curve.
 
-Every number is in the system's own units. A type-1 quantity has equal lower and upper values.
+All values are in the units of the system. A type-1 quantity has equal lower and upper values.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from fuzzy.systems.system import (
 
 
 class Degree(NamedTuple):
-    """Membership of an input's reading in one of its sets."""
+    """Membership of the reading of an input in one of its sets."""
 
     input: str
     set: str
@@ -37,11 +37,11 @@ class Degree(NamedTuple):
 
 
 class Firing(NamedTuple):
-    """A rule that fires and what it sets, `number` counted from 1.
+    """A fired rule and its effect; `number` counts from 1.
 
-    `share` is its part of a Sugeno system's total weight, None for the others, where a rule counts
-    only if it sets the lower or the upper height of its output set. Rules that are equally strong
-    set a height together, and share its weight.
+    `share` is its fraction of the total weight of a Sugeno system, None for other systems, where a
+    rule matters only if it determines the lower or upper height of its output set. Equally strong
+    rules determine a height together and share its weight.
     """
 
     number: int
@@ -56,8 +56,8 @@ class Firing(NamedTuple):
 class OutputSet(NamedTuple):
     """An output set and the height at which it is implied.
 
-    `lower_rules` and `upper_rules`: numbers of the rules that set it; empty where strengths or
-    curves are added. A Sugeno system gives each set a `constant` and its `share` of the total
+    `lower_rules` and `upper_rules`: numbers of the rules that determine it; empty where strengths
+    or curves are added. In a Sugeno system each set has a `constant` and its `share` of the total
     weight.
     """
 
@@ -79,10 +79,10 @@ class OutputCurve(NamedTuple):
 
 
 class SwitchPoint(NamedTuple):
-    """Where an end of the type-2 interval passes from one bound to the other.
+    """Switch point of an end of the type-2 interval between the bounds.
 
-    The first `samples` points lie on one side, up to `before`; the next is `after`. Both are the
-    end itself, and `samples` is None, where no samples are taken.
+    The first `samples` points, up to `before`, lie on one side; the next is `after`. Without
+    sampling both are the end itself, and `samples` is None.
     """
 
     samples: int | None
@@ -92,11 +92,11 @@ class SwitchPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Explanation:
-    """One answer of a system and all that led to it.
+    """One output of a system with all intermediate results.
 
-    `readings` (inputs,) as evaluated, after clamping; `rules` strongest first, of equals the one
-    with fewer terms; `curve` is None for Sugeno; `interval` and `switches` belong to type-2. With
-    exact sampling the curve is still given at `options.samples` points, for drawing.
+    `readings` (inputs,): as evaluated, after clamping; `rules`: strongest first, ties by fewer
+    terms; `curve`: None for Sugeno; `interval` and `switches`: for type-2 only. With exact sampling
+    the curve is given at `options.samples` points, for plotting.
     """
 
     system: FuzzySystem
@@ -114,7 +114,7 @@ class Explanation:
 
 
 class _Fired(NamedTuple):
-    """Strength of each rule (R,), whether it sets its output set's height, and the heights (K,)."""
+    """Strength of each rule (R,), whether it determines its set's height, and the heights (K,)."""
 
     consequents: NDArray[np.intp]
     lower: Array
@@ -132,9 +132,9 @@ def explain(
     options: InferenceOptions | None = None,
     unit: str = "",
 ) -> Explanation:
-    """The answer of `infer` to the readings x (inputs,), explained.
+    """Explain the output of `infer` for the readings x (inputs,).
 
-    `unit` is named in notes. Raises ValueError as `infer` does.
+    `unit` appears in the notes. ValueError as in `infer`.
     """
     options = options or InferenceOptions()
     X = np.asarray(x, dtype=np.float64)[np.newaxis]
@@ -187,13 +187,13 @@ def _fire(system: FuzzySystem, X: Array, kind: str, options: InferenceOptions) -
 
 
 def _constants(system: FuzzySystem, X: Array, options: InferenceOptions) -> Array:
-    """What each consequent of a Sugeno system answers on its own, shape (output sets,)."""
+    """Value of each consequent of a Sugeno system, shape (output sets,)."""
     table = sugeno.consequents(system, options.sampling, options.samples)
     return np.asarray(table[:, :-1] @ X[0] + table[:, -1])
 
 
 def _shares(fired: _Fired, options: InferenceOptions) -> Array:
-    """Part of a Sugeno system's total weight that each rule has, shape (rules,)."""
+    """Fraction of each rule in the total weight of a Sugeno system, shape (rules,)."""
     weights = fired.upper
     if not MERGES[options.sugeno_aggregation].adds:
         level = np.bincount(fired.consequents, fired.sets_upper)[fired.consequents]
@@ -203,7 +203,7 @@ def _shares(fired: _Fired, options: InferenceOptions) -> Array:
 
 
 def _order(system: FuzzySystem, fired: _Fired) -> NDArray[np.intp]:
-    """Rules that fire, strongest first; the one with fewer terms first among equals."""
+    """Fired rules, strongest first, ties by fewer terms."""
     lengths = np.array([len(rule.antecedents) for rule in system.rules])
     order = np.lexsort((lengths, -fired.lower, -fired.upper))
     return order[fired.upper[order] >= LEAST_STRENGTH]
@@ -267,7 +267,7 @@ def _pair(ends: Array) -> tuple[float, float]:
 def _switches(
     curve: OutputCurve | None, interval: tuple[float, float] | None, options: InferenceOptions
 ) -> tuple[SwitchPoint, SwitchPoint] | None:
-    """An end is the centroid of a set that switches between its bounds at that very end."""
+    """Switch points: each end is the centroid of a set that switches between the bounds there."""
     if curve is None or interval is None or not curve.upper.max() > 0:
         return None
     if is_exact(options.sampling):
@@ -285,10 +285,10 @@ def _switch(y: Array, samples: int) -> SwitchPoint:
 
 
 def shown_rules(explanation: Explanation, count: int) -> tuple[Firing, ...]:
-    """About `count` rules that tell most of an answer, strongest first.
+    """About `count` most informative rules, strongest first.
 
-    They are the first rule of each output set and of each height, then the strongest of those that
-    name a set which none before them names, then the strongest of the others.
+    They are the first rule of each output set and of each height, then the strongest rules with a
+    set that no earlier one has, then the strongest of the others.
     """
     by_number = {firing.number: firing for firing in explanation.rules}
     consequents = [firing.rule.consequent for firing in explanation.rules]

@@ -1,4 +1,4 @@
-"""An explanation as plain arrays, from which a view of the rules is drawn."""
+"""An explanation as plain arrays, for plots of the rules."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,7 +19,7 @@ VIEW_POINTS = 301
 def drawing_arrays(
     explanation: Explanation, unit: str = "", rules: int = VIEW_RULES
 ) -> dict[str, NDArray[Any]]:
-    """What a view of the rules draws, under names that begin with view.KIND.
+    """Arrays of a rule plot, with names that begin with view.KIND.
 
     R rules, T terms, D inputs, K output sets, P and M points:
     `inputs`, `readings` (D,), `x` (D, P), `y` (M,), `unit`;
@@ -29,7 +29,7 @@ def drawing_arrays(
     `outputs` (K,), `outputs.height_lower`, `.height_upper`, `.constant`, `.share` (K,),
     `outputs.lower`, `.upper` (K, M); `lower`, `upper` (M,) of the union;
     `answer` (), `interval` (2,) and `switches` (2, 2).
-    Empty where the kind of system has none.
+    Arrays that the kind of system does not have are empty.
     """
     shown = shown_rules(explanation, rules)
     parts: dict[str, Any] = {

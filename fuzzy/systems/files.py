@@ -1,4 +1,4 @@
-"""Rule bases in files: a whole fuzzy system as MATLAB's `.fis` or as our JSON, by suffix."""
+"""Fuzzy systems in files: MATLAB's `.fis` or JSON, by suffix."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def read_rule_base(path: Path) -> FuzzySystem:
 
 
 def write_rule_base(system: FuzzySystem, path: Path) -> None:
-    """Write the system as its suffix says; ValueError if a `.fis` file cannot hold it."""
+    """Write the system in the format of the suffix; ValueError if a `.fis` file cannot hold it."""
     if _is_fis(path):
         write_fis(system, path)
     else:

@@ -1,11 +1,11 @@
-"""MATLAB's `.fis` files of type-1 systems with one output, which Octave's toolkit shares.
+"""`.fis` files of type-1 systems with one output, as in MATLAB and Octave's fuzzy toolkit.
 
-Every number is written with the digits that give it back, so a system that is written and read is
-the same system; only the terms of a rule come back in the order of the inputs. What such a file
-cannot say is refused with the remedy: footprints, a rule with two terms of one input, quotes in
-names. Where MATLAB or Octave answer to a file, so does this package; the exceptions are refused by
-name, with the reason: functions of one's own, which are no part of the file, hedges, negated
-consequents, several outputs. Outputs that no rule names are left out.
+Numbers are written with all significant digits, so that a system is the same after writing and
+reading, except that the terms of a rule are in the order of the inputs. A system that the format
+cannot represent is refused with a remedy: footprints, a rule with two terms of one input, quotes in
+names. Files that MATLAB or Octave can evaluate are supported, with a few exceptions that are
+refused with the reason: user-defined functions, which are not part of the file, hedges, negated
+consequents, and several outputs. Outputs without rules are dropped.
 """
 
 import re
@@ -104,7 +104,7 @@ def _operators(values: Values, kind: str) -> Operators:
 
 
 def _method(field: str, name: str, kind: str) -> Any:
-    """The operator of a field, by name; that of an aggregation in vain is checked and dropped."""
+    """The operator of a field, by name; an aggregation without effect is checked and dropped."""
     if field == "defuzzification":
         known = DEFUZZIFICATIONS[kind]
         if name not in known:
@@ -153,7 +153,7 @@ def _fuzzy_set(line: Line, input_count: int) -> FuzzySet:
 
 
 def _unpadded(kind: str, parameters: tuple[float, ...], input_count: int) -> tuple[float, ...]:
-    """The parameters without the zeros by which older MATLAB files fill them up."""
+    """The parameters without the zero padding of older MATLAB files."""
     counts = {"constant": 1, "linear": input_count + 1}
     counts |= {one: len(form.parameters.split()) for one, form in FORMS.items()}
     count = counts.get(kind, len(parameters))
@@ -161,7 +161,7 @@ def _unpadded(kind: str, parameters: tuple[float, ...], input_count: int) -> tup
 
 
 class _Row(NamedTuple):
-    """The numbers of a rule: a set of each input and each output, weight and connective."""
+    """The numbers of a rule: set of each input and output, weight and connective."""
 
     line: Line
     antecedents: list[int]
@@ -191,7 +191,7 @@ def _row(line: Line, input_count: int, output_count: int) -> _Row:
 
 
 def _only_column(rows: list[_Row], outputs: list[Section]) -> int:
-    """The place of the one output that rules name; the first if none is named."""
+    """The index of the only output with rules; the first without any rules."""
     named = [k for k in range(len(outputs)) if any(row.consequents[k] for row in rows)]
     if len(named) > 1:
         raise outputs[named[1]].head.fault(

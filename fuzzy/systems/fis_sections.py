@@ -1,4 +1,4 @@
-"""The lines of a `.fis` file, its sections and their values, before anything is made of them."""
+"""Parser of the lines, sections and values of a `.fis` file."""
 
 import codecs
 import re
@@ -26,19 +26,19 @@ class FisError(ValueError):
 
 
 class Line(NamedTuple):
-    """A numbered line, or the value of the key that stands on it."""
+    """A numbered line, or the value of its key."""
 
     file: str
     number: int
     text: str
 
     def fault(self, what: str) -> FisError:
-        """The FisError that blames this line, by file and number."""
+        """A FisError that names this line by file and number."""
         return FisError(f"{self.file}:{self.number}: {what}")
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
-        """Put file and line before what a set, a rule or a system says of its own values."""
+        """Prefix errors of a set, rule or system with file and line."""
         try:
             yield
         except FisError:
@@ -55,7 +55,7 @@ class Line(NamedTuple):
         return self.text
 
     def numbers(self) -> tuple[float, ...]:
-        """The numbers between brackets, parted by blanks or commas; each may be an expression."""
+        """The numbers, or expressions, between brackets, separated by blanks or commas."""
         inside = re.fullmatch(r"\[([^][]*)\]", self.text)
         if not inside:
             raise self.fault(f"{self.text}: write the numbers between one pair of [ ]")
@@ -63,14 +63,14 @@ class Line(NamedTuple):
             return tuple(arithmetic.number(part) for part in arithmetic.parts(inside[1]))
 
     def parsed(self, word: str) -> float:
-        """A word of the line as a number; FisError if it is no finite one."""
+        """A word of the line as a number; FisError if it is not finite."""
         with self.blamed():
             return arithmetic.number(word)
 
 
 @dataclass(frozen=True)
 class Values:
-    """What follows the keys of a section, by key in lower case."""
+    """The values of a section, by key in lower case."""
 
     head: Line
     by_key: dict[str, Line]
@@ -84,7 +84,7 @@ class Values:
         return self.by_key[key.lower()]
 
     def sets(self) -> list[Line]:
-        """Definitions of the sets, which are numbered from 1 in the order they stand."""
+        """Definitions of the sets, numbered consecutively from 1."""
         lines = [(key, line) for key, line in self.by_key.items() if _SET_KEY.fullmatch(key)]
         for number, (key, line) in enumerate(lines, start=1):
             if key != f"mf{number}":
@@ -92,7 +92,7 @@ class Values:
         return [line for _, line in lines]
 
     def check_count(self, key: str, found: int, what: str) -> None:
-        """FisError if a Num... key, which may be missing, disagrees with what the file holds."""
+        """FisError if an optional Num... key disagrees with the contents."""
         if key in self and self[key].parsed(self[key].text) != found:
             raise self[key].fault(
                 f"{key} is {self[key].text}, but there are {found} {what}; correct one of both"
@@ -130,12 +130,12 @@ def _check_key(line: Line, key: str, keys: tuple[str, ...]) -> None:
 
 
 def unquoted(text: str) -> str:
-    """What stands between a pair of quotes, in which a quote written twice stands for one."""
+    """The text between a pair of quotes, in which a doubled quote means one."""
     return text[1:-1].replace(2 * text[0], text[0])
 
 
 def words(text: str) -> list[str]:
-    """Parts of a text between blanks or commas."""
+    """Words of a text, separated by blanks or commas."""
     return [word for word in re.split(r"[\s,]+", text) if word]
 
 
@@ -152,7 +152,7 @@ class Sections:
         return self.by_name[name]
 
     def numbered(self, kind: str) -> list[Section]:
-        """The sections of a kind by their numbers, which run from 1 without a gap."""
+        """The sections of a kind by their consecutive numbers from 1."""
         count = sum(name.startswith(kind) for name in self.by_name)
         return [self[f"{kind}{number}"] for number in range(1, max(count, 1) + 1)]
 

@@ -1,4 +1,4 @@
-"""Inference by any kind of system, under one policy for readings that no system can answer."""
+"""Inference by any kind of system, with one policy for readings without an output."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -20,9 +20,9 @@ ROWS_AT_ONCE = 2_000
 
 @dataclass(frozen=True)
 class Inferred:
-    """Answer `value` (N,), type-2 `interval` (N, 2) or None, in the output's unit.
+    """Output `value` (N,), type-2 `interval` (N, 2) or None, in the output's unit.
 
-    `notes` say what was done to the readings, `method` how the answer was computed.
+    `notes`: changes of the readings; `method`: description of the computation.
     """
 
     value: Array
@@ -38,10 +38,10 @@ def infer(
     options: InferenceOptions | None = None,
     unit: str = "",
 ) -> Inferred:
-    """Answers of the `kind` of system to the readings X (N, inputs), in the inputs' units.
+    """Outputs of a `kind` of inference for the readings X (N, inputs), in the inputs' units.
 
-    `unit` is named in notes. Raises ValueError, naming input and row, for a reading that is not
-    finite, as `options.out_of_range` says, and where rules fire without giving a finite answer.
+    `unit` appears in the notes. ValueError, with input and row, for a reading that is not finite,
+    by the policy `options.out_of_range`, and where rules fire without a finite output.
     """
     options = options or InferenceOptions()
     check_kind(system, kind)

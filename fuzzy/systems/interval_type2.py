@@ -1,7 +1,7 @@
 """Interval type-2 Mamdani inference.
 
-Between a lower and an upper membership lies a whole family of type-1 sets. Their centroids fill an
-interval; the answer is its middle, or Nie and Tan's centroid of the mean of both bounds.
+The lower and upper memberships enclose a family of type-1 sets, whose centroids form an interval.
+The output is its midpoint, or Nie and Tan's centroid of the mean of both bounds.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def bounds_of_firing(system: FuzzySystem, X: Array) -> tuple[Array, Array]:
 
 
 def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output:
-    """Answer (N,) and interval (N, 2) of the centroid for the readings X (N, inputs)."""
+    """Output (N,) and interval (N, 2) of the centroid for the readings X (N, inputs)."""
     low_fired, high_fired = bounds_of_firing(system, X)
     strength = high_fired.max(axis=0)
     reducer = REDUCERS[options.reducer]
@@ -54,7 +54,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how type-2 answers are computed."""
+    """One sentence that describes type-2 inference."""
     reducer = REDUCERS[options.reducer]
     reduced = reducer.exact_words if is_exact(options.sampling) else reducer.words
     return f"Interval type-2: {joins(system.operators)}, {reduced}, {options.points}"

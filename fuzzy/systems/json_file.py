@@ -1,4 +1,4 @@
-"""Fuzzy systems as JSON: everything a system holds, by name, read back as the equal system.
+"""Fuzzy systems as JSON, with every property by name; reading restores an equal system.
 
     {
       "format": "fuzzy-system",
@@ -24,8 +24,8 @@
 
 Kinds and parameters are those of `fuzzy.systems.sets`, which are MATLAB's; a Sugeno system has sets
 of kind `constant` or `linear` on its output. A footprint has `mean`, `spread`, `scale` and `lag`, a
-rule a `connective` and a `weight`; what is left out takes the default of `Footprint` and `Rule`,
-which is not written either. Operators: `conjunction` min or prod, `disjunction` max or probor,
+rule a `connective` and a `weight`; defaults are those of `Footprint` and `Rule` and are not
+written. Operators: `conjunction` min or prod, `disjunction` max or probor,
 `implication` min or prod, `aggregation` max, sum or probor, `defuzzification` centroid, bisector,
 mom, som or lom, for Sugeno wtsum. JSON knows no comments. Unknown keys are refused.
 """
@@ -49,24 +49,24 @@ WIDTH = 160
 
 
 class JsonError(ValueError):
-    """A JSON file that holds no system; the message names file, place and remedy."""
+    """A JSON file without a valid system; the message names file, path and remedy."""
 
 
 @dataclass(frozen=True)
 class Node:
-    """A value of the document and its place in it, such as `rules[3].then`."""
+    """A value of the document and its path, such as `rules[3].then`."""
 
     value: Any
     file: str
     place: str = ""
 
     def fault(self, what: str) -> JsonError:
-        """The JsonError that blames this place of the document."""
+        """A JsonError that names this path of the document."""
         return JsonError(": ".join(part for part in (self.file, self.place, what) if part))
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
-        """Put file and place before what a set, a rule or a system says of its own values."""
+        """Prefix errors of a set, rule or system with file and path."""
         try:
             yield
         except JsonError:
@@ -75,7 +75,7 @@ class Node:
             raise self.fault(str(error)) from error
 
     def keys(self, *required: str, optional: Collection[str] = ()) -> dict[str, "Node"]:
-        """The values of an object by key, once every key is known and none is missing."""
+        """The values of an object by key; JsonError for an unknown or missing key."""
         known = (*required, *optional)
         if not isinstance(self.value, dict):
             raise self.fault(f"give an object with the keys {_quoted(known)}")
@@ -251,7 +251,7 @@ def write_json(system: FuzzySystem, path: Path) -> None:
 
 
 def json_text(system: FuzzySystem) -> str:
-    """The document of a system: a line for each set and rule, as far as it fits."""
+    """The document of a system, with one line per set and rule where it fits."""
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -265,7 +265,7 @@ def json_text(system: FuzzySystem) -> str:
 
 
 def _operators_entry(operators: Operators) -> dict[str, str]:
-    """All operators but those added since version 1 was first written, if they do as it did."""
+    """All operators, without later additions to version 1 that have their default."""
     late = {"aggregation": "max", "defuzzification": "centroid"}
     return {key: one for key, one in asdict(operators).items() if late.get(key) != one}
 
@@ -304,7 +304,7 @@ def _changed(entries: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[st
 
 
 def _laid_out(value: Any, indent: str = "") -> str:
-    """JSON text of a value on one line, or, where that is too long, a line for each entry."""
+    """JSON text of a value on one line, or one line per entry if that is too long."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     if len(indent + text) < WIDTH or not isinstance(value, dict | list):
         return text

@@ -1,9 +1,9 @@
 """The compiled inner loops of the modules `mamdani`, `sugeno` and `interval_type2`.
 
-Rows are taken in blocks that stay in the cache, and the inner loops run over the rows of a block,
-so that the compiler turns them into vector instructions. Formulas and the order of their operations
-are those of the numpy modules, which define the answers; nothing is reassociated (no fastmath).
-Arrays are handed on whole with an index: a slice costs more than the loop over it.
+Rows are processed in blocks that fit into the cache, with the inner loops over the rows of a block,
+which the compiler vectorises. Formulas and their order of operations are those of the numpy
+modules, which define the results; sums are not reassociated (no fastmath). Arrays are passed whole
+with an index, since a slice costs more than the loop over it.
 """
 
 import math
@@ -20,7 +20,7 @@ Single = tuple[float, float, float, float, int]
 """Answer, ends of its interval, strength, and what `count_outside` found."""
 
 BLOCK = 256
-"""Rows taken together: few enough for the caches, enough to repay what a loop costs to start."""
+"""Rows per block: few enough for the caches, enough to amortise the start of a loop."""
 
 GAUSSIAN, TRAPEZOID, SPLINE, BELL, SIGMOID_DIFFERENCE, SIGMOID_PRODUCT = range(6)
 """Kinds of set; `fuzzy.systems.compiled` writes all others as one of them."""
@@ -39,9 +39,9 @@ MINIMUM, PRODUCT, MAXIMUM, PROBOR = range(4)
 
 
 class Sets(NamedTuple):
-    """The input sets as the kernels take them, one row each.
+    """The input sets in the form of the kernels, one row each.
 
-    `kind` (S,), `column` (S,) of its input in X, `negated` (S,) if a rule asks for NOT,
+    `kind` (S,), `column` (S,) of its input in X, `negated` (S,) if a rule negates it,
     `shape` (S, 6): four parameters and both ends of the core, `footprint` (S, 4): mean, spread,
     scale, lag.
     """
@@ -54,7 +54,7 @@ class Sets(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Rule r joins, by its operator, the degrees `members[first[r]:first[r + 1]]`, two or more.
+    """Rule r joins by its operator two or more degrees, `members[first[r]:first[r + 1]]`.
 
     Degree 2 s belongs to set s, degree 2 s + 1 to NOT s. `again` (R,) marks a rule that shares all
     members but the last with the rule before it, `consequent` (R,) is an output set. `summed` adds
@@ -189,7 +189,7 @@ def pack(
     nie_tan: bool = False,
     least_area: float = 0.0,
 ) -> tuple[Integers, Floats]:
-    """All of a system in two arrays, for numba takes longer to accept an array than to slice one.
+    """A whole system in two arrays, since numba takes longer to unbox an array than to slice one.
 
     `output` is a grid or the coefficients (K, D + 1); the last two are for type-2 only.
     """
@@ -211,7 +211,7 @@ def pack(
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def unpacked(integers: Integers, floats: Floats) -> tuple[Floats, Sets, Rules, Floats]:
-    """Universes (D, 2), sets, rules, and the numbers of the output, as views of what was packed."""
+    """Universes (D, 2), sets, rules and the output's numbers, as views of the packed arrays."""
     d, s, r = integers[0], integers[1], integers[2]
     i, j = HEAD + 3 * s, HEAD + 3 * (s + r)
     per_set, per_rule = integers[HEAD:i].reshape(3, s), integers[i:j].reshape(3, r)
@@ -263,7 +263,7 @@ def transpose(X: Floats, start: int, n: int, x: Floats) -> None:
 def fill_upper(x: Floats, n: int, sets: Sets, degrees: Floats) -> None:
     """Degrees of the sets and their negations, largest over the footprint.
 
-    That is the membership of the place within reach which is nearest to the core.
+    That is the membership at the point within the footprint nearest to the core.
     """
     kind, column, negated, shape, footprint = sets
     for s in range(kind.size):
@@ -306,9 +306,9 @@ def fill_least(
     s: int,
     low: Floats,
 ) -> None:
-    """Degrees of set s, smallest over the footprint: met at one end of the reach.
+    """Degrees of set s, smallest over the footprint, at one end of its range.
 
-    The row of NOT s, which is written later, serves for the other end.
+    The row of NOT s, which is written later, holds the other end.
     """
     row, other, start, end = 2 * s, 2 * s + 1, shape[s, 4], shape[s, 5]
     shift, factor = footprint[s, 0], 1.0 - footprint[s, 1]
@@ -338,7 +338,7 @@ def stretched(x: float, low: float, high: float, factor: float) -> float:
 def fill_form(kind: int, shape: Floats, s: int, n: int, x: Floats, row: int) -> None:
     """Replace positions by memberships in set s, or by their logarithms if it is Gaussian.
 
-    Logarithms can be compared as well as memberships can, and leave one exponential to take.
+    Logarithms compare like memberships, and only one exponential is evaluated.
     """
     p, q, r, t = shape[s, 0], shape[s, 1], shape[s, 2], shape[s, 3]
     if kind == GAUSSIAN:
@@ -352,7 +352,7 @@ def fill_form(kind: int, shape: Floats, s: int, n: int, x: Floats, row: int) -> 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def finish_form(kind: int, n: int, x: Floats, row: int) -> None:
-    """Make memberships of what `fill_form` left."""
+    """Turn the result of `fill_form` into memberships."""
     if kind == GAUSSIAN:
         exponentiate(x, row, n)
 

@@ -13,8 +13,8 @@ from fuzzy.systems.system import FuzzySystem, Membership
 class Inference(NamedTuple):
     """One kind of inference on a fuzzy system.
 
-    `evaluate` answers the readings X (N, inputs) as they are, `method` says how in a sentence, and
-    `bounds` are the lower and the upper membership function it looks at, the same for type-1.
+    `evaluate` computes the output for readings X (N, inputs) without clamping; `method` describes
+    it in a sentence; `bounds` are its lower and upper membership functions, equal for type-1.
     """
 
     evaluate: Callable[[FuzzySystem, Array, InferenceOptions], Output]
@@ -32,7 +32,7 @@ SYSTEMS: dict[str, Inference] = {
 
 
 def check_kind(system: FuzzySystem, kind: str) -> None:
-    """ValueError if the kind is unknown or cannot be had from the system."""
+    """ValueError if the kind is unknown or the system does not support it."""
     if kind not in SYSTEMS:
         raise ValueError(f"system {kind!r}: use one of {', '.join(SYSTEMS)}")
     if system.is_sugeno and kind != "sugeno":
@@ -45,7 +45,7 @@ def check_kind(system: FuzzySystem, kind: str) -> None:
 
 
 def is_compiled(system: FuzzySystem, kind: str) -> bool:
-    """Whether there are compiled loops for what the system does, if not for how it is sampled."""
+    """Whether compiled kernels support the operators of the system, regardless of the sampling."""
     if kind == "sugeno":
         return system.operators.defuzzification != "wtsum"
     return system.operators.is_centroid_of_union

@@ -1,4 +1,4 @@
-"""Mamdani inference: the rules clip the output sets, their union is reduced to its centroid."""
+"""Mamdani inference: rules clip the output sets, and their union is defuzzified."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def require_centroid_of_union(system: FuzzySystem, what: str) -> None:
-    """ValueError, naming what asks for it, for another aggregation or defuzzification."""
+    """ValueError, with the feature that needs it, for another aggregation or defuzzification."""
     operators = system.operators
     if not operators.is_centroid_of_union:
         raise ValueError(
@@ -43,6 +43,6 @@ def require_centroid_of_union(system: FuzzySystem, what: str) -> None:
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how Mamdani answers are computed."""
+    """One sentence that describes Mamdani inference."""
     how = system.operators.defuzzification
     return f"Mamdani: {joins(system.operators)}, {how} by {options.points}"

@@ -1,4 +1,4 @@
-"""Options of inference: how answers are computed, and what becomes of odd readings."""
+"""Options of inference: sampling, type reduction, and readings out of range."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from fuzzy.systems.type_reduction import REDUCERS
 
 
 class OutOfRange(NamedTuple):
-    """What is done with a reading outside its universe; `done` says it in a note.
+    """Policy for a reading outside its universe; `done` is its wording in a note.
 
-    `clamps` takes the nearest end, `refuses` is an error. `middle`: where no rule fires the answer
-    is the middle of the output's universe, otherwise an error.
+    `clamps`: the nearest end is used; `refuses`: it is an error; `middle`: where no rule fires, the
+    output is the middle of its universe instead of an error.
     """
 
     done: str
@@ -34,11 +34,11 @@ CHOICES: dict[str, Mapping[str, object]] = {
     "reducer": REDUCERS,
     "out_of_range": OUT_OF_RANGE,
 }
-"""Options that are chosen by name, with the tables that implement them."""
+"""Options with named choices, and the tables that implement them."""
 
 
 def require_choices(chosen: object, choices: Mapping[str, Mapping[str, object]]) -> None:
-    """ValueError, naming the attribute and its choices, if one of `chosen` is not in its table."""
+    """ValueError, with attribute and choices, if a chosen name is not in its table."""
     for key, allowed in choices.items():
         if getattr(chosen, key) not in allowed:
             raise ValueError(f"{key} = {getattr(chosen, key)!r}: use one of {', '.join(allowed)}")
@@ -46,13 +46,13 @@ def require_choices(chosen: object, choices: Mapping[str, Mapping[str, object]])
 
 @dataclass(frozen=True)
 class InferenceOptions:
-    """How a fuzzy system is evaluated, whatever its subject.
+    """Options of the evaluation of any fuzzy system.
 
-    `samples` points carry the output's universe (101 is MATLAB's default); `exact` sampling takes
-    none and finds the ends of type-2 intervals by itself, so that `eiasc` changes nothing there.
-    `out_of_range`: `clamp` takes the nearest end of the universe and says so, `raise` refuses,
-    `matlab` evaluates as it is, and where nothing fires answers with the middle of the universe,
-    and says so; the first two refuse readings for which no rule fires.
+    `samples`: number of sample points of the output's universe (101 is MATLAB's default); `exact`
+    sampling uses adaptive quadrature instead and has its own type reduction, so that `eiasc` has no
+    effect. `out_of_range`: `clamp` uses the nearest end of the universe, with a note; `raise`
+    refuses; `matlab` evaluates the reading as it is and, where no rule fires, returns the middle of
+    the universe with a note. The first two refuse readings for which no rule fires.
     """
 
     sampling: str = "matlab"
@@ -68,5 +68,5 @@ class InferenceOptions:
 
     @property
     def points(self) -> str:
-        """Words for how the output curve is integrated."""
+        """Description of the integration of the output curve."""
         return SAMPLINGS[self.sampling].words.format(samples=self.samples)

@@ -1,8 +1,8 @@
-"""What is done with readings that no system can answer, by all kinds of inference alike.
+"""Policy for readings without an output, common to all kinds of inference.
 
-Readings outside an input's universe, and readings for which no rule fires, are treated alike by all
-systems, and whatever was done to them is said in notes: no system answers silently with the middle
-of its universe.
+Readings outside an input's universe and readings for which no rule fires are treated the same by
+all systems. Every change is stated in a note: no system returns the middle of its universe
+silently.
 """
 
 from collections.abc import Callable
@@ -26,10 +26,10 @@ def answered(
     options: InferenceOptions,
     unit: str = "",
 ) -> tuple[Output, tuple[str, ...]]:
-    """What `evaluate` makes of the readings X (N, inputs) under the policy, and notes on it.
+    """Output of `evaluate` for the readings X (N, inputs) under the policy, with notes.
 
-    `unit` is named in notes. Raises ValueError, naming input and row, for a reading that is not
-    finite, as `options.out_of_range` says, and where rules fire without giving a finite answer.
+    `unit` appears in the notes. ValueError, with input and row, for a reading that is not finite,
+    by the policy `options.out_of_range`, and where rules fire without a finite output.
     """
     X, notes = in_range(system, require_readings(system, X), options.out_of_range, unit)
     with np.errstate(over="ignore", invalid="ignore"):  # an answer that is not finite is refused
@@ -56,7 +56,7 @@ def require_readings(system: FuzzySystem, X: Array) -> Array:
 def in_range(
     system: FuzzySystem, X: Array, policy: str, unit: str
 ) -> tuple[Array, tuple[str, ...]]:
-    """The readings as evaluated under a policy, and what was done to them.
+    """The readings as evaluated under a policy, and notes on their changes.
 
     ValueError if the policy is `raise` and one is outside its universe.
     """
@@ -87,7 +87,7 @@ def _outside(
 def _answered(
     system: FuzzySystem, X: Array, output: Output, options: InferenceOptions
 ) -> tuple[Output, tuple[str, ...]]:
-    """The output with an answer in every row: the middle of the universe where MATLAB has it."""
+    """The output with a value in every row: the middle of the universe where MATLAB returns it."""
     fires = output.strength >= LEAST_STRENGTH
     known = np.isfinite(output.value)
     if output.interval is not None:
@@ -107,7 +107,7 @@ def _answered(
 def _no_number(
     system: FuzzySystem, X: Array, rows: NDArray[np.bool_], options: InferenceOptions
 ) -> str:
-    """Why rows have no finite answer although rules fire, and what to do."""
+    """Message on rows without a finite output although rules fire, with the remedy."""
     output, readings = system.output, _readings(system, X, rows)
     universe = f"{output.low:g}-{output.high:g}"
     if system.is_sugeno:
@@ -123,7 +123,7 @@ def _no_number(
 
 
 def _readings(system: FuzzySystem, X: Array, rows: NDArray[np.bool_]) -> str:
-    """The readings of the first of these rows, its number, and how many more there are."""
+    """The readings and number of the first of these rows, and the number of further rows."""
     first, others = int(rows.argmax()), int(rows.sum()) - 1
     pairs = zip(system.inputs, X[first], strict=True)
     readings = ", ".join(f"{variable.name} = {value:g}" for variable, value in pairs)
@@ -132,7 +132,7 @@ def _readings(system: FuzzySystem, X: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def _with_middle(system: FuzzySystem, output: Output, known: NDArray[np.bool_]) -> Output:
-    """The output with the middle of the universe in all rows but the known ones."""
+    """The output with the middle of the universe in all rows without a value."""
     low, high = system.output.low, system.output.high
     value = np.where(known, output.value, 0.5 * (low + high))
     interval = output.interval
@@ -144,7 +144,7 @@ def _with_middle(system: FuzzySystem, output: Output, known: NDArray[np.bool_]) 
 def _on_silence(
     system: FuzzySystem, X: Array, known: NDArray[np.bool_], fires: NDArray[np.bool_]
 ) -> tuple[str, ...]:
-    """What was done in rows without a rule that fires by LEAST_STRENGTH."""
+    """Notes on rows in which no rule fires with LEAST_STRENGTH or more."""
     cases = (
         (~known, "no rule fires", "the answer is no more than the middle of the universe"),
         (

@@ -1,4 +1,4 @@
-"""Points and weights on the output's universe, by which areas and centroids are summed."""
+"""Quadrature points and weights on the output's universe, and defuzzification."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,11 +10,11 @@ from fuzzy.systems.system import Variable
 
 
 class Sampling(NamedTuple):
-    """How areas under the output curve are found.
+    """Integration rule of the output curve.
 
-    `weights` gives those of so many equidistant samples, shape (M,), and is None where the curve
-    itself is integrated. `words` name it; {samples} in them is the number of samples. `size`
-    says which place of several is the smallest: MATLAB takes the nearest to 0, Octave the first.
+    `weights` returns the weights (M,) of M equidistant samples, None for exact integration. `words`
+    describe it, with {samples} for their number. `size` orders points for smallest and largest of
+    maximum: MATLAB takes the point nearest to 0, Octave the first.
     """
 
     weights: Callable[[int], Array] | None
@@ -33,23 +33,23 @@ SAMPLINGS: dict[str, Sampling] = {
     "octave": Sampling(_trapezoidal, "the trapezoidal rule over {samples} points", np.positive),
     "exact": Sampling(None, "integration between the kinks of the curve"),
 }
-"""By name: MATLAB's `evalfis` weighs all samples alike, Octave's toolkit halves both ends."""
+"""By name: MATLAB's `evalfis` has equal weights, Octave's toolkit halves those of both ends."""
 
 
 def is_exact(sampling: str) -> bool:
-    """Whether a sampling, by name, takes no samples."""
+    """Whether a sampling, by name, is exact."""
     return SAMPLINGS[sampling].weights is None
 
 
 class Quadrature(NamedTuple):
-    """Rising points y (M,) and their weights (M,); only ratios of weights matter."""
+    """Ascending points y (M,) and weights (M,), of which only ratios matter."""
 
     y: Array
     weights: Array
 
 
 class Output(NamedTuple):
-    """What an inference system answers to N rows of readings.
+    """Output of an inference system for N rows of readings.
 
     `value` (N,) is NaN where nothing fires, `interval` (N, 2) the ends of the type-reduced set of
     type-2 and None for the others, `strength` (N,) the strength of the strongest output set.
@@ -77,9 +77,9 @@ def centroid(quadrature: Quadrature, mu: Array) -> Array:
 
 
 def bisector(quadrature: Quadrature, mu: Array) -> Array:
-    """The first point up to which there is half the area under mu (..., M), shape (...).
+    """The first point with half of the area under mu (..., M) up to it, shape (...).
 
-    Octave's toolkit gives the number of the sample instead of the place.
+    Octave's toolkit returns the number of the sample instead of the point.
     """
     area = np.cumsum(mu * quadrature.weights, axis=-1)
     return np.asarray(quadrature.y[(area >= 0.5 * area[..., -1:]).argmax(axis=-1)])
@@ -92,7 +92,7 @@ def mean_of_maximum(quadrature: Quadrature, mu: Array) -> Array:
 
 
 def smallest_of_maximum(y: Array, mu: Array, size: Callable[[Array], Array]) -> Array:
-    """Of the points y (M,) where mu (..., M) is largest, the one of the smallest size."""
+    """The point of smallest size among those y (M,) where mu (..., M) is largest."""
     largest = mu == mu.max(axis=-1, keepdims=True)
     return np.asarray(y[np.where(largest, size(y), np.inf).argmin(axis=-1)])
 
@@ -106,10 +106,10 @@ DEFUZZIFICATIONS: dict[str, Callable[[Quadrature, Array, Sampling], Array]] = {
         quadrature.y, mu, lambda y: -how.size(y)
     ),
 }
-"""By MATLAB's names: a number for a curve."""
+"""Defuzzification methods by MATLAB's names."""
 
 
 def defuzzified(quadrature: Quadrature, mu: Array, defuzzification: str, sampling: str) -> Array:
-    """The number that stands for each curve mu (..., M), shape (...); NaN where it is 0."""
+    """Defuzzified value of each curve mu (..., M), shape (...); NaN where it is 0."""
     found = DEFUZZIFICATIONS[defuzzification](quadrature, mu, SAMPLINGS[sampling])
     return np.where((mu > 0).any(axis=-1), found, np.nan)

@@ -1,8 +1,8 @@
-"""Membership functions recognised in their samples.
+"""Identification of membership functions from their samples.
 
-A flank of most kinds is a straight line once its memberships are transformed, so that two samples
-on it tell its parameters; one of a bell takes three. A kind counts as recognised if it gives all
-samples back.
+A flank of most kinds becomes a straight line by a transformation of its memberships, so that two
+samples determine its parameters; a bell takes three. A kind is accepted if it reproduces all
+samples.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,10 +13,10 @@ import numpy as np
 from fuzzy.systems.sets import FORMS, Array, FuzzySet, Kind, Parameters, membership, root
 
 TOLERANCE = 1e-8
-"""Largest distance between a sample and the function that is recognised in it."""
+"""Largest difference between a sample and the identified function."""
 
 EDGE = 1e-9
-"""Memberships nearer to 0 or 1 lie on no flank."""
+"""Distance of a membership from 0 and 1 below which it is not on a flank."""
 
 
 class _Line(NamedTuple):
@@ -26,7 +26,7 @@ class _Line(NamedTuple):
     offset: float
 
     def at(self, level: float) -> float:
-        """Where it reaches a level."""
+        """The position at which the line reaches a level."""
         return (level - self.offset) / self.slope
 
 
@@ -45,10 +45,10 @@ class _Samples(NamedTuple):
 
 
 def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
-    """The set with memberships mu (M,) at the rising places x (M,).
+    """The set with memberships mu (M,) at the ascending positions x (M,).
 
-    Kinds tried: triangle, trapezoid, Gaussian, two-sided Gaussian, Z, S and pi spline, sigmoid,
-    bell; flanks that leave the universe may end anywhere beyond. ValueError if it is none of them.
+    Kinds: triangle, trapezoid, Gaussian, two-sided Gaussian, Z, S and pi spline, sigmoid, bell. The
+    end of a flank outside the universe is arbitrary. ValueError if no kind fits.
     """
     if not np.isfinite(mu).all():
         raise ValueError(f"set {name!r}: has samples that are not finite; correct them")
@@ -68,7 +68,7 @@ def recognised(name: str, x: Array, mu: Array) -> FuzzySet:
 
 
 def _ordinary(kind: Kind, parameters: Parameters) -> bool:
-    """Whether these are the parameters that one would write: a core, nothing to be straightened."""
+    """Whether the parameters are in canonical form, with a core."""
     form = FORMS[kind]
     return (
         form.valid(parameters) and form.plain(parameters) == parameters and form.peaks(parameters)

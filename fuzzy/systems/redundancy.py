@@ -1,8 +1,8 @@
-"""Rules that repeat, contradict or outdo one another, by their terms alone.
+"""Rules that repeat, contradict or dominate one another, by their terms alone.
 
 A rule is dominated if another one with the same consequent is at least as strong at every reading,
-as `if food is good` is beside `if food is good and service is poor`. Where rules are merged by max
-it then changes no answer.
+as by `if food is good` in the case of `if food is good and service is poor`. Where rules are merged
+by max, a dominated rule does not change the output.
 """
 
 from collections import Counter
@@ -14,17 +14,17 @@ from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term
 
 
 class Pair(NamedTuple):
-    """A rule and the one it repeats, contradicts or gives way to, by index."""
+    """A rule and the one that it repeats, contradicts or is dominated by, by index."""
 
     rule: int
     other: int
 
 
 class AntecedentForm(NamedTuple):
-    """An antecedent without what does not matter: order, and repetition under min and max.
+    """Canonical form of an antecedent, without order and without repetition under min and max.
 
-    A term that counts n times is there as (term, 1) to (term, n), so that an antecedent is part of
-    another exactly if its set is.
+    A term that counts n times is stored as (term, 1) to (term, n), so that an antecedent is part of
+    another if and only if its set is a subset.
     """
 
     any_of: bool
@@ -62,10 +62,10 @@ def _met_before(system: FuzzySystem, *, same_consequent: bool) -> Iterator[Pair]
 
 
 def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
-    """Every dominated rule, with the shortest rule that it gives way to.
+    """Every dominated rule, with the shortest rule that dominates it.
 
-    Rules of weight 0 are left out. Of rules that are equal, the first one stays. Where aggregation
-    adds every rule counts, and none is dominated.
+    Rules of weight 0 are ignored. Of equal rules, the first one is kept. With additive aggregation
+    every rule counts, and none is dominated.
     """
     if system.operators.aggregation != "max":
         return ()
@@ -93,7 +93,7 @@ def dominated(system: FuzzySystem) -> tuple[Pair, ...]:
 
 
 class _Index:
-    """Antecedents by their terms, so that those that one gives way to are found among thousands."""
+    """Index of antecedents by their terms, for fast search of dominating ones."""
 
     def __init__(self, forms: Sequence[AntecedentForm]) -> None:
         self.conjunctions: dict[frozenset[tuple[Term, int]], list[int]] = {}
@@ -106,14 +106,14 @@ class _Index:
                 self.conjunctions.setdefault(found.terms, []).append(i)
 
     def never_weaker(self, one: AntecedentForm) -> set[int]:
-        """Those that are exceeded by `one` at no reading: see `_never_stronger`."""
+        """Antecedents that `one` exceeds at no reading; see `_never_stronger`."""
         by_term = [self.alternatives.get(term, set()) for term in one.terms]
         if one.any_of:
             return set.intersection(*by_term)
         return set().union(*by_term, *(self.conjunctions[part] for part in self._parts(one.terms)))
 
     def _parts(self, terms: frozenset[tuple[Term, int]]) -> Iterable[frozenset[tuple[Term, int]]]:
-        """Subsets that are antecedents; counted up, or looked for among all, as is less work."""
+        """Subsets that are antecedents, by enumeration or by search, whichever is less work."""
         if 2 ** len(terms) > len(self.conjunctions):
             return [part for part in self.conjunctions if part <= terms]
         sizes = range(len(terms) + 1)

@@ -1,7 +1,7 @@
-"""Mamdani systems to and from scikit-fuzzy's `control`, for those who work there.
+"""Conversion of Mamdani systems to and from scikit-fuzzy's `control`.
 
-scikit-fuzzy holds every set as samples on its universe and interpolates between them, so answers of
-both agree within sampling. What one of them does not have is refused, never approximated.
+scikit-fuzzy stores every set as samples on its universe and interpolates between them, so outputs
+agree within the sampling error. Features that one side lacks are refused, never approximated.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,10 +29,10 @@ from fuzzy.systems.system import (
 
 
 class ListedRules(control.ControlSystem):  # type: ignore[misc]  # scikit-fuzzy has no types
-    """A control system whose rules keep the order in which they are given, all at once.
+    """A control system with its rules in the given order.
 
-    scikit-fuzzy sorts all rules anew for every rule it is given and at every evaluation. Here all
-    rules read inputs and write the output, so that any order will do.
+    scikit-fuzzy sorts all rules again whenever one is added, and at every evaluation. Here all
+    rules read inputs and write the output, so that any order is valid.
     """
 
     def __init__(self, variables: Sequence[Any], rules: Sequence[Any]) -> None:
@@ -56,9 +56,9 @@ def to_skfuzzy(system: FuzzySystem, points: int = 1001) -> control.ControlSystem
     """The system's rules on principal membership functions, as a scikit-fuzzy ControlSystem.
 
     Give it to `skfuzzy.control.ControlSystemSimulation`, set `simulation.input[name]`, call
-    `compute()`, read `simulation.output[name]`. Every set is held as `points` samples of its
-    universe. A simulation moves readings into their universes and leaves the output out where no
-    rule fires. ValueError for what scikit-fuzzy does not have: Sugeno consequents, implication by
+    `compute()`, read `simulation.output[name]`. Every set is stored as `points` samples of its
+    universe. A simulation clamps readings to their universes and omits the output where no rule
+    fires. ValueError for features that scikit-fuzzy lacks: Sugeno consequents, implication by
     product, an output with the name of an input.
     """
     _check(system)
@@ -143,7 +143,7 @@ DISJUNCTIONS: dict[Callable[..., Any], str] = {
     _probor: "probor",
 }
 DUAL = {"min": "max", "max": "min", "prod": "probor", "probor": "prod"}
-"""What a NOT makes of an AND or OR of its terms: 1 - min(a, b) = max(1 - a, 1 - b), and so on."""
+"""De Morgan's duals: 1 - min(a, b) = max(1 - a, 1 - b), and so on."""
 
 
 class _Clause(NamedTuple):
@@ -258,7 +258,7 @@ def _function(kind: str, rule: Any) -> str:
 
 
 def _operators(clauses: Sequence[_Clause]) -> Operators:
-    """The operators that all rules share."""
+    """The operators common to all rules."""
     chosen: Any = {}
     for key, found in (
         ("conjunction", frozenset().union(*(clause.conjunctions for clause in clauses))),

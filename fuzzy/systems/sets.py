@@ -5,9 +5,9 @@ scikit-fuzzy share: a Gaussian is (sd, centre). So is what becomes of odd parame
 width does not count, equal corners are a step or a spike, an S or a Z in falling order is a step
 half-way. A Gaussian without width is a spike, where Octave has no number at the centre.
 
-A footprint says how far the function may lie from where it is drawn. The upper and the lower
-membership are the largest and the smallest value met on the way; every function with a footprint
-rises to its core, where it is 1, and falls after it, so both have closed forms for all kinds alike.
+A footprint bounds the displacement of the function from its principal form. The upper and lower
+memberships are the largest and smallest values over the footprint. Every function with a footprint
+increases to a core, where it is 1, and decreases after it, so both have closed forms for all kinds.
 """
 
 from collections.abc import Callable
@@ -39,14 +39,14 @@ Kind = Literal[
     "linear",
 ]
 NO_WIDTH = float(np.finfo(np.float64).tiny)
-"""Width of a spike: nothing but its centre is near enough to be a member."""
+"""Width of a spike, with membership at its centre only."""
 FUNCTION_KINDS: tuple[Kind, ...] = ("constant", "linear")
 """Consequents of Sugeno systems: numbers, not sets."""
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """How far a membership function may lie from its principal form; zero is a type-1 set.
+    """Footprint of uncertainty about the principal membership function; zero for a type-1 set.
 
     `mean`: half-width of the uncertain position, in the variable's unit. `spread`: half-width of
     the uncertain width of its flanks over that width, below 1. `scale` and `lag` lower the lower
@@ -98,7 +98,7 @@ class FuzzySet:
 
     @property
     def shape(self) -> Parameters:
-        """The parameters as the function takes them, without the signs that do not matter."""
+        """The parameters as arguments of the function, without irrelevant signs."""
         return FORMS[self.kind].plain(self.parameters)
 
 
@@ -147,7 +147,7 @@ def gaussian(x: Array, sd: float, centre: float) -> Array:
 
 
 def _ramp(x: Array, foot: float, top: float) -> Array:
-    """0 before foot and 1 after top, either way round; a step that is 1 at foot = top."""
+    """0 before foot and 1 after top, ascending or descending; a step with value 1 at foot = top."""
     if foot == top:
         return np.ones_like(x)
     return np.clip((x - foot) / (top - foot), 0.0, 1.0)
@@ -168,7 +168,7 @@ def _sigmoid(x: Array, slope: float, centre: float) -> Array:
 
 
 def _spline(x: Array, foot: float, top: float) -> Array:
-    """Two parabolas from 0 at foot to 1 at top, either way round."""
+    """Two parabolas from 0 at foot to 1 at top, ascending or descending."""
     t = _ramp(x, foot, top)
     return np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
 
@@ -200,7 +200,7 @@ def _as_given(p: Parameters) -> Parameters:
 
 
 def _width(width: float) -> float:
-    """The width without its sign, which is squared away; of 0 one that leaves the centre alone."""
+    """The absolute width; NO_WIDTH for 0."""
     return abs(width) or NO_WIDTH
 
 
@@ -328,11 +328,11 @@ REMEDIES: dict[str, str] = {
     "trapmf": "give both feet outside their tops",
     "gbellmf": "give a half-width other than 0, as MATLAB and Octave ask; trimf [c c c] is a spike",
 }
-"""What to do about parameters that are not valid, for the kinds that have such."""
+"""Remedies for invalid parameters, by kind."""
 
 
 def has_core(one: FuzzySet) -> bool:
-    """Whether the membership rises to 1 and then falls, either of which may take it for ever."""
+    """Whether the membership increases to 1 and then decreases, either possibly asymptotically."""
     form = FORMS[one.kind]
     return form.core is not None and form.peaks(one.shape)
 
@@ -433,7 +433,7 @@ def _log_slope(z: float) -> float:
 
 
 def root(function: Callable[[float], float], left: float, right: float) -> float:
-    """Where a function rises through 0, by bisection."""
+    """Zero of an increasing function, by bisection."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (left + right)
         left, right = (left, middle) if function(middle) > 0 else (middle, right)

@@ -1,4 +1,4 @@
-"""Evenly spread points in the unit cube, the same on every run."""
+"""Quasi-random points in the unit cube, the same on every run."""
 
 import numpy as np
 

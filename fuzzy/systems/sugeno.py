@@ -1,7 +1,7 @@
-"""Sugeno inference: a weighted average of numbers instead of an area.
+"""Sugeno inference: a weighted average of the consequents.
 
-A Mamdani system is converted as MATLAB does: every output set becomes the constant at the centroid
-of the whole set on the output's universe, and rules and operators stay.
+A Mamdani system is converted as in MATLAB: every output set becomes the constant at the centroid of
+the whole set on the output's universe; rules and operators are unchanged.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def consequents(system: FuzzySystem, sampling: str, samples: int) -> Array:
 
 
 def constants(system: FuzzySystem, sampling: str, samples: int) -> Array:
-    """The number that stands for each whole output set, its centroid or as the system has it.
+    """The constant of each output set: its centroid, or that of the system.
 
     Shape (sets,); NaN for a set without mass on the universe.
     """
@@ -45,8 +45,9 @@ def constants(system: FuzzySystem, sampling: str, samples: int) -> Array:
 def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output:
     """Weighted average (N,) of the consequents for the readings X (N, inputs).
 
-    Aggregation by "sum" weighs every rule, as MATLAB does, so that a repeated rule counts twice; by
-    "max" every output set once, by its strongest rule, as Mamdani's aggregation and Octave do.
+    Aggregation by "sum" weights every rule, as in MATLAB, so that a repeated rule counts twice; by
+    "max" every output set counts once, with its strongest rule, as in Mamdani's aggregation and
+    Octave.
     """
     strengths = firing_strengths(system, X, membership)
     weights = merged(system, strengths, options.sugeno_aggregation)
@@ -62,7 +63,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
 
 
 def method(system: FuzzySystem, options: InferenceOptions) -> str:
-    """One sentence on how Sugeno answers are computed."""
+    """One sentence that describes Sugeno inference."""
     how = "sum" if system.operators.defuzzification == "wtsum" else "average"
     average = f"weighted {how} over every {MERGES[options.sugeno_aggregation].weighed}"
     if system.is_sugeno:

@@ -1,8 +1,8 @@
-"""A fuzzy system: variables with their sets, rules from inputs to one output, and the operators.
+"""A fuzzy system: variables with their sets, rules from inputs to one output, and operators.
 
-One `FuzzySystem` serves the three kinds of inference; they share the firing of the rules. Rules
-with the same consequent meet only through their strengths, since max_r min(w_r, mu(y)) =
-min(max_r w_r, mu(y)), so they are merged to one height per output set before the output is sampled.
+The three kinds of inference share one `FuzzySystem` and the firing of its rules. Rules with the
+same consequent are merged to one height per output set before the output is sampled, since
+max_r min(w_r, mu(y)) = min(max_r w_r, mu(y)).
 """
 
 from collections import defaultdict
@@ -25,14 +25,14 @@ CONNECTIVES = get_args(Connective)
 
 
 class Merge(NamedTuple):
-    """How rules with one consequent join their strengths; `weighed` says what an average counts."""
+    """Merging of the strengths of rules with one consequent; `weighed`: what an average counts."""
 
     join: np.ufunc
     weighed: str
 
     @property
     def adds(self) -> bool:
-        """Whether every rule counts, not the strongest alone."""
+        """Whether every rule counts, and not only the strongest."""
         return self.join is np.add
 
 
@@ -49,7 +49,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "aggregation": ("max", "sum", "probor"),
     "defuzzification": ("centroid", "bisector", "mom", "som", "lom", "wtsum"),
 }
-"""What the operators of a system may be; wtsum, the weighted sum, is for Sugeno alone."""
+"""Choices of each operator; wtsum, the weighted sum, is for Sugeno systems only."""
 
 
 class Term(NamedTuple):
@@ -64,8 +64,8 @@ class Term(NamedTuple):
 class Variable:
     """An input or the output on the universe [low, high], with its sets.
 
-    A universe without width, low = high, is one that nobody gave: `reach` is then the whole line.
-    An input without sets takes part in linear consequents only.
+    A universe without width, low = high, is unspecified: `reach` is then the whole line. An input
+    without sets appears in linear consequents only.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Variable:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Where a reading is expected: the universe, and anywhere if that has no width."""
+        """Range of expected readings: the universe, or the whole line if it has no width."""
         return (self.low, self.high) if self.low < self.high else (-np.inf, np.inf)
 
 
@@ -107,8 +107,8 @@ class Rule:
             raise ValueError(f"rule connective {self.connective!r}: use and, or")
 
 
-class RulesAlike(NamedTuple):
-    """Rules of one connective and number of terms, by index, whose strengths are found together.
+class RuleGroup(NamedTuple):
+    """Rules with the same connective and number of terms, by index, evaluated together.
 
     `terms`: for each term in turn, its input, its set, and whether it is negated, in every rule.
     """
@@ -123,8 +123,8 @@ class RulesAlike(NamedTuple):
 class Operators:
     """AND, OR, implication, aggregation and defuzzification, by MATLAB's names.
 
-    Aggregation by max lets rules merge to heights. The default of `defuzzification` is the centroid
-    of a curve and, for a Sugeno system, the weighted average.
+    Aggregation by max merges rules to heights. The default of `defuzzification` is the centroid of
+    a curve and, for a Sugeno system, the weighted average.
     """
 
     conjunction: Literal["min", "prod"] = "min"
@@ -143,7 +143,7 @@ class Operators:
 
     @property
     def is_centroid_of_union(self) -> bool:
-        """Whether the answer is the centroid of the maximum, which need not be sampled."""
+        """Whether the output is the centroid of the maximum, which can be integrated exactly."""
         return self.aggregation == "max" and self.defuzzification == "centroid"
 
 
@@ -151,8 +151,8 @@ class Operators:
 class FuzzySystem:
     """Inputs, output, rules and operators; every index of every rule is checked.
 
-    With `constant` or `linear` output sets it is a Sugeno system as it stands; with membership
-    functions it is a Mamdani or type-2 system, which Sugeno inference converts.
+    With `constant` or `linear` output sets it is a Sugeno system; with membership functions it is a
+    Mamdani or type-2 system, which Sugeno inference converts.
     """
 
     inputs: tuple[Variable, ...]
@@ -173,8 +173,8 @@ class FuzzySystem:
         _check_operators(self)
 
     @cached_property
-    def rules_alike(self) -> tuple[RulesAlike, ...]:
-        """The rules in groups: one at a time, thousands of them would be slow."""
+    def rule_groups(self) -> tuple[RuleGroup, ...]:
+        """The rules in groups that are evaluated together."""
         groups = defaultdict[tuple[Connective, int], list[int]](list)
         for number, rule in enumerate(self.rules):
             groups[rule.connective, len(rule.antecedents)].append(number)
@@ -186,11 +186,11 @@ class FuzzySystem:
         return self.output.sets[0].kind in FUNCTION_KINDS
 
 
-def _alike(rules: Sequence[Rule], connective: Connective, numbers: list[int]) -> RulesAlike:
+def _alike(rules: Sequence[Rule], connective: Connective, numbers: list[int]) -> RuleGroup:
     alike = [rules[n] for n in numbers]
     flat = np.fromiter(chain.from_iterable(chain.from_iterable(r.antecedents for r in alike)), int)
     terms = flat.reshape(len(alike), -1, len(Term._fields))
-    return RulesAlike(
+    return RuleGroup(
         connective,
         np.array(numbers),
         np.array([rule.weight for rule in alike]),
@@ -202,7 +202,7 @@ def _check_rules(system: FuzzySystem) -> None:
     counts = np.array([len(variable.sets) for variable in system.inputs])
     outputs = len(system.output.sets)
     fit = np.array([0 <= rule.consequent < outputs for rule in system.rules])
-    for group in system.rules_alike:
+    for group in system.rule_groups:
         fit[group.rules] &= bool(group.terms)  # every rule has an antecedent
         for inputs, sets, _ in group.terms:
             known = (inputs >= 0) & (inputs < len(counts))
@@ -263,7 +263,7 @@ def _check_kinds(system: FuzzySystem) -> None:
 
 
 def joins(operators: Operators) -> str:
-    """Words for a system's operators, as methods name them."""
+    """Description of a system's operators."""
     return (
         f"AND {operators.conjunction}, OR {operators.disjunction}, "
         f"implication {operators.implication}, aggregation {operators.aggregation}"
@@ -280,15 +280,15 @@ def firing_strengths(
 ) -> Array:
     """Strength of every rule at the readings X (N, inputs), shape (rules, N).
 
-    `opposite` gives the degrees that negated terms use: the upper bound of NOT A is one less the
-    lower bound of A.
+    `opposite` gives the degrees for negated terms: the upper bound of NOT A is 1 minus the lower
+    bound of A.
     """
     degrees = _degrees(system, X, membership)
     others = degrees if opposite is None else _degrees(system, X, opposite)
     sizes = [len(variable.sets) for variable in system.inputs]
     starts = np.cumsum([0, *sizes[:-1]])
     strengths = np.empty((len(system.rules), len(X)))
-    for group in system.rules_alike:
+    for group in system.rule_groups:
         join = _join(group.connective, system.operators)
         terms = (
             _of_terms(starts[inputs] + sets, negated, degrees, others)

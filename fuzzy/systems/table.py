@@ -1,4 +1,4 @@
-"""Tables of readings: a CSV file in, the same file with the answers of a fuzzy system out."""
+"""Evaluation of a fuzzy system for the readings of a CSV file."""
 
 import difflib
 import math
@@ -23,9 +23,9 @@ _ROW = r"\(row (\d+)(?: of \d+)?"
 
 
 class Blanks(NamedTuple):
-    """What a blank cell means: `value` stands in for the reading, and `note` says so.
+    """Meaning of a blank cell: `value` replaces the reading, with a `note`.
 
-    `system` gives the system that answers where only the inputs named have a reading.
+    `system` returns the system for rows in which only the given inputs have a reading.
     """
 
     value: float
@@ -34,7 +34,7 @@ class Blanks(NamedTuple):
 
 
 class _Group(NamedTuple):
-    """Rows (n,) of a table that one system answers, and their readings (n, inputs)."""
+    """Rows (n,) of a table for one system, and their readings (n, inputs)."""
 
     system: FuzzySystem
     rows: list[int]
@@ -53,11 +53,10 @@ def evaluate_table(
 ) -> tuple[str, ...]:
     """Write the table with the column `estimate`, for type-2 also `lower` and `upper`; its notes.
 
-    Columns are found by the names of the inputs, in their units; all columns are passed on as they
-    are, parted as they were, empty lines are left out. A blank cell is refused unless `blanks` says
-    what it means. An earlier `csv_out` is replaced once everything is computed; it may not be
-    `csv_in`. Raises ValueError naming file, line, column and remedy, also for a reading outside the
-    `plausible` ones.
+    Columns are identified by the names of the inputs, in their units. All columns are copied with
+    their delimiter; empty lines are dropped. A blank cell is refused unless `blanks` defines it. An
+    existing `csv_out` is replaced once everything is computed; it must not be `csv_in`. ValueError
+    with file, line, column and remedy, also for a reading outside the `plausible` range.
     """
     check_kind(system, kind)
     if csv_out.resolve() == csv_in.resolve():
@@ -96,7 +95,7 @@ def _on_blanks(X: Array, table: Table, system: FuzzySystem, blanks: Blanks) -> l
 
 
 def _groups(X: Array, table: Table, system: FuzzySystem, blanks: Blanks | None) -> Iterator[_Group]:
-    """The rows by the system that answers them, without blanks."""
+    """The rows grouped by system, without blanks."""
     if blanks is None or not np.isnan(X).any():
         yield _Group(system, list(range(len(X))), X)
         return

@@ -1,8 +1,8 @@
-"""Type reduction of sampled bounds: the interval of centroids between them, and one answer in it.
+"""Type reduction of sampled bounds to an interval of centroids, and its defuzzification.
 
-The ends belong to sets that switch once from one bound to the other (Karnik and Mendel). Prefix
-sums give the centroid for every switch point at once, so they are found without iteration; EIASC
-finds the same ends by stepping until the switch point passes the centroid.
+The ends of the interval belong to sets that switch once from one bound to the other (Karnik and
+Mendel). Prefix sums give the centroids for all switch points at once, without iteration. EIASC
+finds the same ends by increasing the switch point until it passes the centroid.
 """
 
 from collections.abc import Callable
@@ -57,7 +57,7 @@ def eiasc(quadrature: Quadrature, lower: Array, upper: Array) -> Array:
 
 
 def _stepped(y: Array, lower: Array, upper: Array) -> float:
-    """Least centroid of one row: take samples over to the upper bound while that lowers it."""
+    """Least centroid of one row: samples switch to the upper bound while that lowers it."""
     area, moment = float(lower.sum()), float(y @ lower)
     for y_k, gain in zip(y, upper - lower, strict=True):
         if area > LEAST_AREA and y_k * area > moment:
@@ -68,12 +68,12 @@ def _stepped(y: Array, lower: Array, upper: Array) -> float:
 
 
 class Reducer(NamedTuple):
-    """How an interval of centroids and an answer in it are found.
+    """A method of type reduction and defuzzification.
 
-    `ends` gives the interval (..., 2) of bounds (..., M) on samples; without samples its ends are
-    found as by Karnik and Mendel. `nie_tan`: the answer is the centroid of the mean of both bounds
-    (Nie and Tan), not the middle of the interval. `words` and `exact_words` name it with and
-    without samples.
+    `ends` returns the interval (..., 2) for sampled bounds (..., M); exact sampling uses the ends
+    of Karnik and Mendel. `nie_tan`: the output is the centroid of the mean of both bounds (Nie and
+    Tan) instead of the midpoint of the interval. `words` and `exact_words` describe the method with
+    and without samples.
     """
 
     ends: Callable[[Quadrature, Array, Array], Array]

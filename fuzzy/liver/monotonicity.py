@@ -1,8 +1,8 @@
-"""How far an estimate falls where one of several readings rises, which it never should.
+"""Violations of monotonicity: decreases of an estimate as one of several readings increases.
 
-From drawn patients, one reading rises over the whole scale in fine steps while the others stay. Two
-kinds of patients are drawn: readings anywhere on the scale, which no liver has, and readings of one
-liver with the noise of exams and operators.
+For random patients, one reading increases over the whole scale in fine steps with the others fixed.
+There are two kinds of patients: readings anywhere on the scale, which no liver has, and readings of
+one liver with the noise of exams and operators.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,19 +20,18 @@ from fuzzy.systems.compiled import compiled
 from fuzzy.systems.sets import Array
 
 POINTS = 121
-"""Of the scale, steps of 3 %."""
+"""Points on the scale, in steps of 3 %."""
 PATIENTS = 60
 LIVERS = (3.0, 50.0)
-"""From which true stiffness [kPa] livers are drawn, even in ln kPa."""
+"""Range of true stiffness [kPa] of the livers, uniform in ln kPa."""
 ABOUT = 0.35
-"""Of ln kPa, half the way over which a reading of one liver rises: three SDs of its noise."""
+"""Half-width in ln kPa of the increase of a reading of one liver: three SDs of its noise."""
 
 
 class Fall(NamedTuple):
-    """The largest fall of an estimate, relative to the highest before it, and where it is.
+    """Largest decrease of an estimate, relative to the largest value before it, and its place.
 
-    `anywhere` is for readings drawn over the whole scale, `of_one_liver` for readings that one
-    liver could have.
+    `anywhere`: for readings over the whole scale; `of_one_liver`: for readings of one liver.
     """
 
     readings: int
@@ -41,7 +40,7 @@ class Fall(NamedTuple):
 
 
 def falls(kind: str, settings: LiverSettings) -> Iterator[Fall]:
-    """The largest fall of one kind of system by the number of readings, whichever they are."""
+    """Largest decrease of one kind of system, by number of readings."""
     for number in range(1, len(AETIOLOGIES) + 1):
         found = [largest_fall(kind, settings, some) for some in combinations(AETIOLOGIES, number)]
         anywhere, of_one_liver = (max(part) for part in list(zip(*found, strict=True))[1:])
@@ -51,7 +50,7 @@ def falls(kind: str, settings: LiverSettings) -> Iterator[Fall]:
 def largest_fall(
     kind: str, settings: LiverSettings, present: Sequence[str], patients: int = PATIENTS
 ) -> Fall:
-    """The largest fall of one kind of system with readings of the aetiologies `present`."""
+    """Largest decrease of one kind of system with readings of the aetiologies `present`."""
     low, high = parameters()["input_low"], parameters()["input_high"]
     scale, rng = np.geomspace(low, high, POINTS), np.random.default_rng(len(present))
     drawn = low * (high / low) ** rng.random((patients, len(present)))
@@ -69,14 +68,14 @@ def largest_fall(
 
 
 def _raised(row: Array, column: int, values: Array) -> Array:
-    """Readings (P, n) with one of them through values (P,)."""
+    """Readings (P, n) in which one takes the values (P,)."""
     found = np.tile(row, (len(values), 1))
     found[:, column] = values
     return found
 
 
 def _fall(kind: str, settings: LiverSettings, present: Sequence[str], lines: Array) -> float:
-    """The largest fall along any of readings (patients, P, n) [kPa]."""
+    """Largest decrease along any series of readings (patients, P, n) [kPa]."""
     X = np.full((*lines.shape[:2], len(AETIOLOGIES)), parameters()["normal_liver"])
     X[..., [AETIOLOGIES.index(name) for name in present]] = lines
     system = liver_system(settings, tuple(present))
