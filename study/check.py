@@ -17,7 +17,7 @@ def is_scene(target: str) -> bool:
         return True
     try:
         return not Path(target).exists()
-    except OSError:  # a name too long, which no file has
+    except OSError:  # the name is too long for a file
         return True
 
 

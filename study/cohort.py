@@ -142,7 +142,7 @@ def _falls(rows: Iterable[CohortRow]) -> Iterator[str]:
     """What falls where it should rise, with one reading alone."""
     falling: dict[str, float] = {}
     for row in rows:
-        if row.largest_fall > 0:  # nor for NaN
+        if row.largest_fall > 0:  # false for NaN too
             falling[row.contender] = max(row.largest_fall, falling.get(row.contender, 0.0))
     for name, fall in falling.items():
         yield f"{name}: falls by up to {100 * fall:.2g} % where one reading rises"

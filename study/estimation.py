@@ -143,7 +143,7 @@ def _patient(request: EstimationRequest) -> Answer:
 
 def _check_plausible(kpa: float, where: str) -> None:
     low, high = PLAUSIBLE
-    if not low <= kpa <= high:  # nor for NaN
+    if not low <= kpa <= high:  # true for NaN too
         raise ValueError(f"{where}: no liver has that; give kPa, {low:g} to {high:g}")
 
 

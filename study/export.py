@@ -55,7 +55,7 @@ MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
 """Parameter of HHT: CalculiX's own default."""
-# Also what CalculiX leaves beside its decks.
+# Including the files that CalculiX writes beside its decks.
 FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     f"{deck}.{end}"
     for deck in ("static", "dynamic")

@@ -200,7 +200,7 @@ def _check(folder: Path, foreign: Foreign, writer: str) -> None:
             what = "is where a disk is mounted" if folder.is_mount() else "may not be written"
             raise FolderError(f"{folder}: {what}; give --out another folder")
         found = foreign({path.name for path in folder.iterdir()})
-    except OSError as error:  # a name too long, a folder that may not be looked into
+    except OSError as error:  # the name is too long, or the folder not readable
         raise FolderError(f"{folder}: cannot be written ({error.strerror})") from None
     if found is not None:
         raise FolderError(

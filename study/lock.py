@@ -34,12 +34,12 @@ def held(path: Path) -> Iterator[None]:
     """
     descriptor = _taken(path)
     try:
-        with suppress(OSError):  # on a full disk it is held without a name
+        with suppress(OSError):  # on a full disk the lock is held without a process id
             os.ftruncate(descriptor, 0)
             os.write(descriptor, str(os.getpid()).encode())
         yield
     finally:
-        with suppress(OSError):  # as on Windows, which removes no open file, and in a lost folder
+        with suppress(OSError):  # Windows removes no open file, and the folder may be gone
             path.unlink()
         os.close(descriptor)
 
@@ -72,7 +72,7 @@ def _lock(descriptor: int) -> None:
         else:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        if error.errno in {errno.EACCES, errno.EDEADLOCK}:  # Windows says so
+        if error.errno in {errno.EACCES, errno.EDEADLOCK}:  # the errors on Windows
             os.lseek(descriptor, 0, os.SEEK_SET)
             raise BlockingIOError from None
         if error.errno not in UNKNOWN:

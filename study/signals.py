@@ -13,7 +13,7 @@ Handler = Callable[[int, FrameType | None], object]
 
 EXIT_MACHINE = 3
 """Exit code when the machine or a person ends the program: no disk, no memory, a signal."""
-NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # not every system has them all
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some are missing on some systems
 
 _asked: list[int] = []
 
@@ -95,5 +95,5 @@ def _say(text: str) -> None:
     """Write to the descriptor itself, since Python's streams may be in the middle of a line."""
     try:
         os.write(2, f"{text}\n".encode())
-    except OSError:  # nobody listens
+    except OSError:  # the stream is closed
         return

@@ -72,7 +72,7 @@ def _guarded(stream: TextIO | None, kind: type[io.FileIO], number: int) -> TextI
     return io.TextIOWrapper(
         io.BufferedWriter(kind(number, "w", closefd=False)),
         encoding=None if stream is None else stream.encoding,
-        errors="backslashreplace",  # a terminal without Greek letters still gets its answer
+        errors="backslashreplace",  # for terminals without Greek letters
         line_buffering=number == 2 or os.isatty(number),
     )
 

@@ -12,9 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+import typst
 
 from msm.integrators import INTEGRATORS
 from msm.laws import LAWS
+from reports import report
 from reports.content import document
 from reports.report import make_report
 from study.known import suite
@@ -33,6 +35,7 @@ from study.tradeoff import study as tradeoff
 from study.tradeoff.contenders import configurations
 from study.tradeoff.problem import sampled
 from tests.conftest import SMALL
+from tests.report_samples import without_arrays
 
 MODEL = '''
 """A body without inertia: at every moment it is at rest under the load of that moment."""
@@ -319,3 +322,17 @@ def test_every_table_is_summed_up_and_held_by_the_results(table):
     assert table.file in manifest.DATA
     assert (table.file in manifest.ALWAYS) is not table.of_tools
     assert table.attribute in {field.name for field in fields(Results)}
+
+
+def test_a_section_of_the_report_is_an_entry_and_a_block(monkeypatch):
+    results, content, template = without_arrays(), report.document, report.template
+
+    def longer(name=report.TEMPLATE):
+        block = b"\n= Toys\n#items(data.toys)\n" if name == report.TEMPLATE else b""
+        return template(name) + block
+
+    monkeypatch.setattr(report, "template", longer)
+    with pytest.raises(typst.TypstError, match="toys"):
+        report.pdf(results)
+    monkeypatch.setattr(report, "document", lambda results: content(results) | {"toys": ["one"]})
+    assert report.pdf(results).startswith(b"%PDF")

@@ -117,7 +117,7 @@ def _parsed(text: str, unit: str) -> float:
 
 def _factor(name: str, unit: str, example: str) -> float:
     """Size of a unit in the SI unit. ValueError for an unknown unit or another dimension."""
-    if name == unit:  # as in every scene that a run has written
+    if name == unit:  # always so in scenes written by a run
         return 1.0
     known = USUAL.get(unit, {}).get(name)
     return _factor_of_pint(name, unit, example) if known is None else known

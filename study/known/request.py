@@ -66,7 +66,7 @@ class StabilityRequest:
         _ = Backend(self.workers, self.scheduler)
         for folder in (self.folder, self.store.folder):
             refuse_unwritable(folder, lambda _: None, "stability study")
-        from study.known.stability.cases import user_scene  # compiled, as suite's
+        from study.known.stability.cases import user_scene  # loads compiled kernels
 
         user_scene.refuse(read_suited(self.scene, ()))
 

@@ -41,7 +41,7 @@ def attempted(function: str, arguments: Mapping[str, Any], seconds: float) -> tu
         return (Finding("refused", message=str(error)),)
     except OverrunError:
         return (Finding("error", message=f"did not end within {seconds:g} s"),)
-    except Exception as error:  # whatever it is, it is what the case found
+    except Exception as error:  # any exception is a finding
         return (Finding("error", message=f"{type(error).__name__}: {error}"),)
 
 

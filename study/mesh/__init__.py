@@ -1,1 +1,1 @@
-"""Mesh files: read them through one guarded loader, check them, repair them or refuse them."""
+"""Mesh files: read by one guarded loader, then checked, repaired or refused."""

@@ -1,4 +1,4 @@
-"""Abaqus and CalculiX keyword files: nodes, elements, parts and where instances put them."""
+"""Abaqus and CalculiX keyword files: nodes, elements, parts and the placement of instances."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Cells(NamedTuple):
 
 
 class _Scope(NamedTuple):
-    """Nodes and elements that are numbered together: those of a part, or outside of all parts."""
+    """Nodes and elements that are numbered together: those of a part, or outside all parts."""
 
     nodes: list[NumberedLine]
     cells: list[_Cells]
@@ -58,7 +58,7 @@ class _Instance(NamedTuple):
 
 
 class _Model(NamedTuple):
-    """The file as it is read, and which part and instance it is in."""
+    """The file as it is read, with the part and instance being read."""
 
     free: _Scope
     parts: dict[str, tuple[int, _Scope]]
@@ -100,7 +100,7 @@ def _keywords(lines: Sequence[str]) -> list[_Keyword]:
 
 
 def _continued(start: int, text: str, following: Iterator[tuple[int, str]]) -> str:
-    """A keyword line that ends with a comma goes on in the next line that is no comment."""
+    """A keyword line that ends with a comma continues in the next line that is no comment."""
     while text.endswith(","):
         number, further = next(
             (line for line in following if not line[1].lstrip().startswith("**")), (start, "")
@@ -126,7 +126,7 @@ def _squeezed(text: str) -> str:
 
 
 def _refuse_cut_off(lines: Sequence[str], keywords: Sequence[_Keyword]) -> None:
-    """Neither nodes nor elements are announced by number, so that only the last line can tell."""
+    """No count of nodes or elements is announced, so only the last line can show truncation."""
     if lines[-1].strip() and keywords and keywords[-1].name in {"NODE", "ELEMENT"}:
         raise MeshError(
             f"line {len(lines)} is the last one and not ended: truncated? If it is complete, add "
@@ -175,7 +175,7 @@ def _open(keyword: _Keyword, model: _Model) -> _Scope:
 
 
 def _take(keyword: _Keyword, scope: _Scope) -> None:
-    """Put nodes and elements where they belong, pass over the harmless, refuse the rest."""
+    """Store nodes and elements, skip keywords that are harmless, and refuse the rest."""
     if keyword.name == "NODE":
         _check_options(keyword, _KNOWN_OPTIONS["NODE"])
         scope.nodes.extend((number, _numbers(text)) for number, text in keyword.rows)
@@ -219,13 +219,13 @@ def _check_options(keyword: _Keyword, known: set[str]) -> None:
 
 
 def _numbers(text: str) -> list[str]:
-    """Words between commas, Fortran's exponents as usual ones; a last comma ends the line."""
+    """Words between commas, with Fortran exponents converted; a trailing comma ends the line."""
     words = [word.strip() for word in text.upper().replace("D", "E").split(",")]
     return words[:-1] if words[-1] == "" else words
 
 
 def _coordinates(lines: Sequence[NumberedLine]) -> tuple[FloatArray, list[str]]:
-    """Numbers and coordinates of nodes, shape (n, 4), and a note on what stands for zero."""
+    """Numbers and coordinates of nodes, shape (n, 4), and a note on values taken as zero."""
     longest = max(lines, key=lambda line: len(line[1]), default=(0, []))
     if len(longest[1]) > _NODE_COLUMNS:
         raise MeshError(
@@ -258,7 +258,7 @@ def _cells(keyword: _Keyword) -> list[_Cells]:
 def _whole_rows(rows: Sequence[tuple[int, str]], width: int) -> tuple[list[int], list[list[str]]]:
     """Words of each element, and the line it begins in.
 
-    A line that ends with a comma goes on in the next one, unless the element is complete.
+    A line that ends with a comma continues in the next one, unless the element is complete.
     """
     lines: list[int] = []
     whole: list[list[str]] = []
@@ -302,7 +302,7 @@ def _integers(
 
 
 class _Piece(NamedTuple):
-    """The mesh of an instance where it is put, or what stands outside of all parts."""
+    """The mesh of a placed instance, or of what is outside all parts."""
 
     name: str
     points: FloatArray
@@ -311,7 +311,7 @@ class _Piece(NamedTuple):
 
 
 def _joined(model: _Model) -> RawMesh:
-    """The mesh of the whole model; several bodies would be welded where they touch."""
+    """The mesh of the whole model; several bodies in contact would be welded."""
     left_out = list(_left_out(model))
     free = "the assembly" if model.instances else "the model"
     pieces = [
@@ -335,7 +335,7 @@ def _joined(model: _Model) -> RawMesh:
 
 
 def _left_out(model: _Model) -> Iterator[str]:
-    """Notes on parts that no instance puts somewhere, which are not in the model then."""
+    """Notes on parts without an instance, which are not in the model."""
     used = {one.part for one in model.instances}
     for name, (line, scope) in model.parts.items():
         if name not in used and not used:

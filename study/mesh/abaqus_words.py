@@ -1,4 +1,4 @@
-"""What Abaqus and CalculiX call elements, and which of their keywords leave the mesh alone."""
+"""Element types of Abaqus and CalculiX, and their keywords that do not affect the mesh."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _NO_BODY = re.compile(
 
 
 def cell_type(element_type: str) -> tuple[str, int]:
-    """Usual name of an element type's cells (tetra, triangle, ...) and how many nodes one has.
+    """Usual name of an element type's cells (tetra, triangle, ...) and their number of nodes.
 
-    The type is in capitals without blanks. What has neither volume nor area is a line, with any
+    The type is in capitals without blanks. A type without volume and area is a line, with any
     number of nodes; an unknown type has no name.
     """
     solid = _SOLID.fullmatch(element_type)
@@ -104,9 +104,9 @@ REFUSED = {
     "SYMMETRICMODELGENERATION": "makes the mesh from another one",
     "SYSTEM": "moves and turns the nodes after it",
 }
-"""Keywords that change the mesh in a way that is not followed here, and what they do."""
+"""Keywords that change the mesh in a way that is not supported, with their effects."""
 
 
 def is_harmless(keyword: str) -> bool:
-    """Whether a keyword that is not in REFUSED leaves nodes and elements as they are."""
+    """Whether a keyword that is not in REFUSED leaves nodes and elements unchanged."""
     return bool(_HARMLESS.match(keyword))

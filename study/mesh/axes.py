@@ -1,4 +1,4 @@
-"""The axes of a mesh file, which the file itself does not say."""
+"""The axes of a mesh file, which the file itself does not state."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ _SIDES = {
     "I": "inferior",
 }
 MODELLING = {"y-up": "LSA", "z-up": "LPS"}
-"""Of modelling tools, by name: a patient upright who looks at the viewer of the front."""
+"""Axes of modelling tools by name, for an upright patient who faces the viewer."""
 AXES = tuple(
     "".join(letters) for order in permutations(("LR", "PA", "SI")) for letters in product(*order)
 )
-"""The 48 ways to lay three axes along the sides of a patient."""
+"""The 48 assignments of three axes to the sides of a patient."""
 
 
 def letters_of(axes: str) -> str:
-    """Three letters, the sides to which x, y and z point; MeshError for what names none."""
+    """Three letters, the sides to which x, y and z point; MeshError for an invalid name."""
     found = MODELLING.get(axes.strip().lower(), axes.strip().upper())
     if found not in AXES:
         raise MeshError(
@@ -59,7 +59,7 @@ def is_mirrored(axes: str) -> bool:
 def along_scene(
     points: FloatArray, elements: IndexArray, axes: str
 ) -> tuple[FloatArray, IndexArray]:
-    """Points and elements in the axes of a scene; a mirrored element is wound anew."""
+    """Points and elements in the axes of a scene; mirrored elements are reoriented."""
     moved = points @ to_scene(axes).T
     if is_mirrored(axes):
         elements = elements[:, [*range(elements.shape[1] - 2), -1, -2]]
@@ -67,7 +67,7 @@ def along_scene(
 
 
 def axes_note(axes: str | None) -> str:
-    """What was made of the axes, or of none being stated."""
+    """How the axes were interpreted, or that none were stated."""
     if axes is None:
         return (
             f"axes not stated, taken as {SCENE} (x to the patient's left, y to the posterior, z to "

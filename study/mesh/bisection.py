@@ -1,11 +1,11 @@
-"""Tetrahedra bisected where they are to be smaller, until no node hangs on a neighbour's edge.
+"""Local refinement of tetrahedra by bisection, until no node hangs on a neighbour's edge.
 
 A tetrahedron is cut through the middle of its longest edge; one that has that middle on one of its
 own edges is cut through its longest edge in turn, and so on. As all edges are in one order, two
-tetrahedra cut the face between them alike. Every child lies within its parent, so that functions
-piecewise polynomial on the old mesh are so on the new one. Rivara and Levin (1992), Commun. Appl.
-Numer. Methods 8:281. scikit-fem's own bisection tells neither parents nor cut edges, and sets the
-seed of numpy's global generator.
+tetrahedra cut their common face alike. Every child lies within its parent, so that functions that
+are piecewise polynomial on the old mesh are so on the new one. Rivara and Levin (1992), Commun.
+Appl. Numer. Methods 8:281. scikit-fem's own bisection returns neither parents nor cut edges, and
+sets the seed of numpy's global generator.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _KEY = 2**31
 
 @dataclass(frozen=True)
 class Bisection:
-    """A mesh with smaller tetrahedra, in which the points of the one before come first.
+    """A refined mesh, whose first points are those of the previous one.
 
-    `parents` (t,): tetrahedron of the old mesh that each of the new ones lies in.
+    `parents` (t,): tetrahedron of the old mesh that contains each new one.
     """
 
     mesh: TetrahedralMesh
@@ -40,7 +40,7 @@ class Bisection:
 def cut_into(mesh: TetrahedralMesh, parts: Floats) -> Bisection:
     """Each tetrahedron (t,) bisected until its pieces have at most its volume over its `parts`.
 
-    What keeps the mesh conforming may cut neighbours further.
+    To keep the mesh conforming, neighbours may be bisected too.
     """
     wanted = np.abs(volumes(mesh)) / parts
     found = Bisection(mesh, np.arange(len(mesh.tetrahedra)))

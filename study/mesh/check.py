@@ -79,7 +79,7 @@ def heights(points: FloatArray, tetrahedra: IndexArray) -> FloatArray:
 
 
 def _refuse_flat(draft: Draft) -> None:
-    """A corner nearer to the opposite face than the weld tolerance might as well lie on it."""
+    """A corner within the weld tolerance of the opposite face counts as lying on it."""
     flat = np.flatnonzero(heights(draft.points, draft.elements) <= draft.tolerance)
     if len(flat):
         raise MeshError(
@@ -117,7 +117,7 @@ def _crowded_faces(draft: Draft, groups: RowGroups) -> list[str]:
 
 
 def _folds(draft: Draft, faces: IndexArray, pairs: IndexArray) -> list[str]:
-    """Neighbours see their common face from opposite sides, unless one lies in the other."""
+    """Neighbours see their common face from opposite sides, unless one overlaps the other."""
     folded = pairs[same_turn(faces[pairs[:, 0]], faces[pairs[:, 1]])] // 4
     if not len(folded):
         return []
@@ -142,8 +142,8 @@ def _pieces(draft: Draft, neighbours: IndexArray) -> list[str]:
 def _overlaps(draft: Draft, boundary_elements: IndexArray) -> list[str]:
     """Elements on the boundary that reach into another one nearby.
 
-    Where well-connected elements overlap, the boundary of one lies inside another, so the inner
-    ones need no test. Sampled points can miss a slight overlap.
+    Where well-connected elements overlap, the boundary of one lies inside another, so inner
+    elements need no test. Sampling can miss a slight overlap.
     """
     from scipy.spatial import KDTree
 

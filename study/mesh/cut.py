@@ -1,4 +1,4 @@
-"""A plane through a body of tetrahedra."""
+"""A plane section of a tetrahedral mesh."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Ints = NDArray[np.int64]
 ON_PLANE = 1e-9
 """Distance from the plane over the body's extent below which a vertex counts as above it."""
 AT_VERTEX = 1e-6
-"""Share of an edge within which the plane goes through its end."""
+"""Share of an edge within which the plane passes through its end."""
 FLAT = 1e-12
-"""Area of a triangle over the square of the extent below which it is left out."""
+"""Area of a triangle over the square of the extent below which it is omitted."""
 
 
 def cut(mesh: TetrahedralMesh, place: Floats, normal: Floats) -> tuple[Floats, Ints]:

@@ -1,4 +1,4 @@
-"""A mesh under repair: the arrays, where they came from and what was done to them."""
+"""A mesh under repair: its arrays, their origin in the file, and the changes made."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Draft:
 
 
 def start_draft(points: FloatArray, elements: IndexArray, limit: float) -> Draft:
-    """Draft of a raw mesh: numbers checked, unused nodes dropped, moved to the origin if far.
+    """Draft of a raw mesh: numbers checked, unused nodes dropped, recentred if far away.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def start_draft(points: FloatArray, elements: IndexArray, limit: float) -> Draft
 
 
 def drop_unused_nodes(draft: Draft, *, noted: bool = True) -> Draft:
-    """Drop the nodes no element uses: they would have neither mass nor stiffness."""
+    """Drop the nodes that no element uses: they would have neither mass nor stiffness."""
     used = np.zeros(len(draft.points), dtype=bool)
     used[draft.elements] = True
     if used.all():
@@ -90,7 +90,7 @@ def weld(draft: Draft) -> Draft:
 
 
 def drop_duplicates(draft: Draft) -> Draft:
-    """Keep one of the elements that have the same nodes, in whatever order."""
+    """Keep one of the elements that have the same nodes, in any order."""
     groups = group_rows(draft.elements)
     if len(groups.first) == len(draft.elements):
         return draft

@@ -1,4 +1,4 @@
-"""Formats that are not read, by the endings of their files, and what to do about them."""
+"""Formats that are not read, by the endings of their files, with remedies."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ _BY_ENDING = {
 
 
 def refusal(ending: str, read: str) -> str:
-    """Why a file with this ending (`.nas`) is not read, what is, and the remedy."""
+    """Why a file with this ending (`.nas`) is not read, what is read, and the remedy."""
     known = f" ({ending} is for: {_BY_ENDING[ending]})" if ending in _BY_ENDING else ""
     return f"unknown file name ending `{ending}`; can be read: {read}{known}"
 
 
 def named() -> dict[str, str]:
-    """Names of the formats that are known and not read, and the first of their endings."""
+    """Names of the formats that are known but not read, and the first of their endings."""
     return {name: endings.split()[0] for name, (endings, _) in _FORMATS.items()}

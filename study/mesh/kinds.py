@@ -1,4 +1,4 @@
-"""Meshes as plain arrays, and the report that comes with a mesh file."""
+"""Meshes as plain arrays, and the report on a mesh file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ IndexArray = NDArray[np.int64]
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be used; the message says where, why and what to do about it."""
+    """A mesh that cannot be used; the message names the place, the reason and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class SurfaceQuality:
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What was found in a mesh file and what was changed."""
+    """What was found in a mesh file, and the changes made."""
 
     file: str
     sha256: str

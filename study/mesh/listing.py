@@ -1,4 +1,4 @@
-"""Many things of one kind told in one line."""
+"""Lists shortened to one line of text."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def listing(numbers: IndexArray, most: int = 5) -> str:
-    """First few numbers as text."""
+    """The first few numbers as text."""
     return some(numbers[: most + 1].tolist(), most)
 
 
 def some(things: Sequence[object], most: int = 5) -> str:
-    """First few things as text."""
+    """The first few items as text."""
     shown = ", ".join(str(thing) for thing in things[:most])
     return shown + (", ..." if len(things) > most else "")
 
 
 def one_per_kind(notes: Iterable[str]) -> tuple[str, ...]:
-    """The notes, but only the first of those that differ in nothing but numbers, with a count."""
+    """The notes, with one of each group that differ only in numbers, and their count."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
         kinds.setdefault(_NUMBER.sub("0", note), []).append(note)

@@ -67,7 +67,7 @@ FORMATS = (
 
 
 class Reading(NamedTuple):
-    """How a file is to be read: its unit, its axes, and whether other pieces are dropped."""
+    """How a file is read: its unit, its axes, and whether other pieces are dropped."""
 
     unit: str | None
     axes: str
@@ -156,7 +156,7 @@ def _checked(
 
 
 def _is_solid(raw: RawMesh) -> bool:
-    """Whether the mesh consists of tetrahedra; refuse volume cells that cannot be used."""
+    """Whether the mesh consists of tetrahedra; refuses unusable volume cells."""
     if raw.solids:
         cells = ", ".join(f"{count} {name}" for name, count in raw.solids.items())
         beside = f" beside {len(raw.tetrahedra)} tetrahedra" if len(raw.tetrahedra) else ""

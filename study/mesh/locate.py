@@ -1,4 +1,4 @@
-"""Find the tetrahedron round each point."""
+"""The tetrahedron that contains each point."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from study.stages.threads import allowed
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 FEW, CANDIDATES = 6, 32
-"""Tetrahedra that are looked at for each point, and for one that is inside none of the first."""
+"""Candidate tetrahedra per point, and for a point outside all of the first."""
 INSIDE = 1e-9
-"""Smallest coordinate of a point that is in no other tetrahedron."""
+"""Smallest barycentric coordinate of a point that counts as inside."""
 
 
 def locate(mesh: TetrahedralMesh, points: Floats) -> tuple[Ints, Floats]:

@@ -1,4 +1,4 @@
-"""Announced numbers from a stream, as text or binary."""
+"""A given count of numbers from a stream, as text or binary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shape figures of tetrahedra and surfaces."""
+"""Shape measures of tetrahedra and surfaces."""
 
 from __future__ import annotations
 

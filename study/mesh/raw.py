@@ -1,4 +1,4 @@
-"""What a mesh file says, before anything is checked."""
+"""The content of a mesh file before any check."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def is_solid(name: str) -> bool:
 
 
 class _Tally:
-    """How many cells of which types something was done to, and the first of them."""
+    """Count of the cells of each type that something was done to, and the first of them."""
 
     def __init__(self) -> None:
         self.types: dict[str, int] = {}
@@ -84,7 +84,7 @@ class _Tally:
         self.seen = 0
 
     def add(self, name: str, count: int, concerned: bool) -> None:
-        """Count the cells of a block, to all or none of which it is done."""
+        """Count the cells of a block, all or none of which are concerned."""
         if concerned:
             self.types[name] = self.types.get(name, 0) + count
             self.first += range(self.seen, self.seen + min(count, 6 - len(self.first)))
@@ -132,12 +132,12 @@ def strip_triangles(strips: NDArray[Any]) -> NDArray[Any]:
 
 
 def _within(polygons: NDArray[Any], count: int) -> bool:
-    """Whether the nodes exist, which is refused elsewhere if they do not."""
+    """Whether the nodes exist; missing ones are refused elsewhere."""
     return bool(polygons.min() >= 0 and polygons.max() < count)
 
 
 def _turned(points: FloatArray, polygons: NDArray[Any]) -> NDArray[Any]:
-    """Polygons begun at the corner whose fan is best, the first if it does not fold at all."""
+    """Polygons starting at the corner with the best fan, the first if its fan does not fold."""
     with np.errstate(all="ignore"):  # places that are no numbers are refused elsewhere
         corner = points[polygons]
         corner = corner - corner.mean(axis=1, keepdims=True)
@@ -151,9 +151,9 @@ def _turned(points: FloatArray, polygons: NDArray[Any]) -> NDArray[Any]:
 
 
 def _fan_margin(corner: FloatArray, area: FloatArray, first: int) -> FloatArray:
-    """Smallest component along the area vector of the triangles round one corner.
+    """Smallest component along the area vector of the triangles around one corner.
 
-    It is negative if a triangle of the fan is turned against the polygon as a whole.
+    Negative if a triangle of the fan is oriented against the polygon as a whole.
     """
     spokes = np.roll(corner, -first, axis=1)[:, 1:] - corner[:, first : first + 1]
     triangles = np.cross(spokes[:, :-1], spokes[:, 1:])

@@ -1,4 +1,4 @@
-"""A mesh of tetrahedra as a file that `organ.mesh` reads again."""
+"""A tetrahedral mesh as a file that `organ.mesh` reads."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 from study.mesh.kinds import TetrahedralMesh
 
 FORMAT = "gmsh"
-"""Gmsh 4.1 by meshio's name of it: binary, so that numbers are exact."""
+"""meshio's name of Gmsh 4.1: binary, so that numbers are exact."""
 
 
 def save(mesh: TetrahedralMesh, path: Path, format_: str = FORMAT) -> None:
-    """Write corners and tetrahedra in metres, in a format by meshio's name of it."""
+    """Write corners and tetrahedra in metres, in a format by meshio's name."""
     import meshio
 
     meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)]).write(path, format_)

@@ -14,11 +14,10 @@ Floats = NDArray[np.float64]
 
 
 class SignedDistance:
-    """Distance from a closed surface whose triangles face outwards, negative inside.
+    """Distance from a closed surface with outward triangles, negative inside.
 
-    The sign follows the mean normal at the nearest point, weighted by angles: Baerentzen and Aanaes
-    (2005), IEEE Trans. Vis. Comput. Graph. 11:243. VTK is imported when it is first
-    asked.
+    The sign follows the angle-weighted mean normal at the nearest point: Baerentzen and Aanaes
+    (2005), IEEE Trans. Vis. Comput. Graph. 11:243. VTK is imported at the first evaluation.
     """
 
     def __init__(self, surface: SurfaceMesh) -> None:

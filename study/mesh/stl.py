@@ -59,7 +59,7 @@ def _read_binary(data: bytes, count: int, surplus: int) -> RawMesh:
 def _refuse_more_triangles(
     rest: bytes, count: int, corners: np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 ) -> None:
-    """Bytes after the last triangle are padding, unless they hold triangles of the same size."""
+    """Bytes after the last triangle are padding, unless they contain triangles of similar size."""
     later = np.frombuffer(rest, _RECORD, len(rest) // _RECORD.itemsize)
     low, high = corners.min(axis=0), corners.max(axis=0)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -89,9 +89,9 @@ def _read_ascii(data: bytes) -> RawMesh:
 
 
 def _plain_facets(data: bytes) -> FloatArray | None:
-    """Corners of a file that holds nothing but whole facets and solids, else None.
+    """Corners of a file that consists of complete facets and solids only, else None.
 
-    It is many times quicker than going by lines, which finds out what is wrong.
+    Much faster than parsing by lines, which finds out what is wrong.
     """
     place, solids, rows = 0, 0, []
     for found in _FACET.finditer(data):

@@ -25,7 +25,7 @@ from study.mesh.topology import (
 )
 
 _INSIDE = 0.5
-"""Turns round a point that lies inside: 1, but for rounding and for what is open."""
+"""Winding number above which a point counts as inside: 1 but for rounding and openings."""
 
 
 def repair_surface(draft: Draft, *, largest: bool = False) -> Draft:
@@ -96,7 +96,7 @@ def _edge_pairs(draft: Draft, edges: IndexArray) -> IndexArray:
 
 
 def _holes(draft: Draft, edges: IndexArray, rows: IndexArray) -> list[str]:
-    """What is open: rows of edges that belong to one triangle only."""
+    """The openings: edges that belong to one triangle only."""
     if not len(rows):
         return []
     nodes, numbered = np.unique(edges[rows], return_inverse=True)
@@ -142,7 +142,7 @@ def _pieces(draft: Draft, neighbours: IndexArray) -> list[str]:
 
 
 def _winding(triangles: FloatArray, point: FloatArray) -> float:
-    """How often triangles (k, 3, 3) wind round a point, in either sense: solid angles over 4 pi."""
+    """Absolute winding number of triangles (k, 3, 3) around a point: solid angles over 4 pi."""
     a, b, c = np.moveaxis(triangles - point, 1, 0)
     la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     volume = np.einsum("kd,kd->k", a, np.cross(b, c))
@@ -152,10 +152,10 @@ def _winding(triangles: FloatArray, point: FloatArray) -> float:
 
 
 def _consistent(draft: Draft, edges: IndexArray, pairs: IndexArray) -> Draft:
-    """Turn triangles so that neighbours run along their common edge in opposite directions.
+    """Orient triangles so that neighbours traverse their common edge in opposite directions.
 
-    Every triangle stands for two items, as it is and turned; items that go together are linked.
-    A triangle linked to its own turned form lies on a one-sided surface.
+    Every triangle stands for two items, as it is and reversed; compatible items are linked. A
+    triangle linked to its own reversed form lies on a one-sided surface.
     """
     count = len(draft.elements)
     clash = same_turn(edges[pairs[:, 0]], edges[pairs[:, 1]])
@@ -203,7 +203,7 @@ def _noting_shape(draft: Draft) -> Draft:
 
 
 def _fan_count(triangles: IndexArray) -> int:
-    """Number of closed fans of triangles round a node, of a closed and consistently wound surface.
+    """Number of closed fans around a node of a closed, consistently oriented surface.
 
     Edge row i starts at corner i; across the edge the same node is where the other row ends.
     """

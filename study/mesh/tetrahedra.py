@@ -57,9 +57,9 @@ def smallest_dihedral_angle(mesh: TetrahedralMesh) -> Floats:
 
 
 def refined(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Each tetrahedron split into eight: four at the corners, four round the inner diagonal.
+    """Each tetrahedron split into eight: four at the corners, four around the inner diagonal.
 
-    The shortest of the three inner diagonals is taken, which keeps the elements best shaped.
+    The shortest of the three inner diagonals is used, which keeps the best element shapes.
     """
     edge_list = edges(mesh.tetrahedra)
     key = edge_list @ np.array([len(mesh.points), 1])

@@ -1,4 +1,4 @@
-"""Numbers out of text lines, with errors that name the line."""
+"""Numbers from text lines, with errors that name the line."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ NumberedLine = tuple[int, list[str]]
 
 
 def text_lines(data: bytes) -> list[str]:
-    """Lines of a text file, ended in any of the three ways, without a byte order mark."""
+    """Lines of a text file with any of the three line endings, without a byte order mark."""
     text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def unit_note(text: str) -> list[str]:
-    """A note if a header or a comment names a unit, since only the declared one counts."""
+    """A note if a header or a comment names a unit, since only a declared one counts."""
     found = re.search(r"\bunits?\s*[:= ]\s*([a-z]{1,12})\b", text, re.IGNORECASE)
     return [f"`{found[0]}` in the file is not used: `organ.unit` says the unit"] if found else []
 

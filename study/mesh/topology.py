@@ -1,4 +1,4 @@
-"""Which elements share nodes, edges and faces."""
+"""Elements that share nodes, edges and faces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from study.mesh.tetrahedra import FACES
 
 @dataclass(frozen=True)
 class RowGroups:
-    """Rows that hold the same nodes in whatever order."""
+    """Rows that contain the same nodes in any order."""
 
     group: IndexArray
     """Number of the group each row belongs to, shape (rows,)."""
@@ -63,7 +63,7 @@ def linked_rows(groups: RowGroups) -> IndexArray:
 
 
 def same_turn(first: IndexArray, second: IndexArray) -> NDArray[np.bool_]:
-    """Whether rows with the same nodes (edges or triangles) run through them the same way."""
+    """Whether rows with the same nodes (edges or triangles) have the same orientation."""
     return np.asarray(_even(first) == _even(second))
 
 

@@ -1,4 +1,4 @@
-"""The length unit of a mesh file, which the file itself does not say."""
+"""The length unit of a mesh file, which the file itself does not state."""
 
 from __future__ import annotations
 
@@ -50,15 +50,15 @@ def check_unit_name(unit: str | None, volume: float | None = None) -> None:
 
 
 def as_liver(volume: float) -> str:
-    """The units that would make a volume [file units^3] a liver's, as the end of a message."""
+    """The units in which a volume [file units^3] would be a liver's, as the end of a message."""
     said = [f"as {name} it would be {_litres(volume, name):.3g} L" for name in _fitting(volume)]
     return f"; {', '.join(said)}, a liver's" if said else ""
 
 
 def check_extent(extent: FloatArray, unit: str, volume: float) -> None:
-    """Raise MeshError unless every side [m] of the box is 1 mm to 1 m.
+    """Raise MeshError unless every side [m] of the bounding box is 1 mm to 1 m.
 
-    `volume` [file units^3] tells which unit would do.
+    `volume` [file units^3] indicates which unit would fit.
     """
     if not all(_EXTENT[0] <= side <= _EXTENT[1] for side in extent):
         sides = " x ".join(f"{side:.4g}" for side in extent)

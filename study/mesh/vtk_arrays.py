@@ -26,13 +26,13 @@ _MAX_BYTES = 2**30
 
 
 class _Stored(NamedTuple):
-    """Bytes of an array as they stand in the file, and what follows them."""
+    """The stored bytes of an array, and what follows them."""
 
     content: bytes
     raw: bool
 
     def size(self, count: int) -> int:
-        """Room that `count` bytes take."""
+        """Space that `count` bytes take in the file."""
         return count if self.raw else -(-count // 3) * 4
 
     def take(self, start: int, count: int) -> bytes:
@@ -83,7 +83,7 @@ def _array(tag: Tag, tags: list[Tag], data: bytes) -> NDArray[Any]:
 
 
 def _content(tag: Tag, data: bytes) -> bytes:
-    """Text of an array without elements of its own, which tell what it means."""
+    """Text of an array element, without its child elements, which describe it."""
     return re.sub(rb"<(\w+)\b.*</\1\s*>|<[^>]*>", b"", data[tag.start : tag.end], flags=re.DOTALL)
 
 
@@ -115,7 +115,7 @@ def _check_room(count: int, stored: _Stored) -> None:
 def _compressed(
     stored: _Stored, word: np.dtype[Any], unpack: Callable[[bytes, int], bytes]
 ) -> bytes:
-    """Blocks of equal size but perhaps the last, compressed each; their sizes come first."""
+    """Compressed blocks of equal size, except perhaps the last; their sizes come first."""
     first = np.frombuffer(stored.take(0, 3 * word.itemsize), word).tolist()
     blocks, block, last = first
     _check_room(blocks, stored)

@@ -11,7 +11,7 @@ from study.mesh.kinds import IndexArray, MeshError
 from study.mesh.raw import Block, strip_triangles
 
 EMPTY = 0
-"""VTK's number of a cell that is none."""
+"""VTK's number of an empty cell."""
 POINTS, LINES, STRIP, POLYGON = 2, 4, 6, 7
 """VTK's numbers of the cells of a surface, each with any number of nodes."""
 

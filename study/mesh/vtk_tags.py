@@ -1,4 +1,4 @@
-"""Tags of VTK's XML files: what they announce, and where their content stands."""
+"""Tags of VTK's XML files: the counts they announce, and the place of their content."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _parsed(head: bytes, whole: bool) -> list[Tag]:
 
 
 def _check_counts(tags: list[Tag]) -> None:
-    """Before anything is allocated."""
+    """Check the counts before anything is allocated."""
     pieces = [tag for tag in tags if tag.name == "Piece"]
     for name, value in (item for piece in pieces for item in piece.given.items()):
         if not name.startswith("NumberOf"):

@@ -136,7 +136,7 @@ def _joined(pieces: list[_Piece]) -> RawMesh:
 
 
 def _check_nodes(pieces: list[_Piece]) -> None:
-    """A number beyond the points of one piece would be a point of the next one."""
+    """Refuse a node number beyond its piece, which would refer to a point of the next piece."""
     for i, (points, _, _, nodes) in enumerate(pieces if len(pieces) > 1 else []):
         if len(nodes) and not (nodes.min() >= 0 and nodes.max() < len(points)):
             raise MeshError(

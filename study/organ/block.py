@@ -28,7 +28,7 @@ def block_of_cells(size: tuple[float, float, float], counts: NDArray[np.int64]) 
     number = np.arange(len(points)).reshape(counts + 1)
     lowest = number[:-1, :-1, :-1].ravel()
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
-    # Each order of walking the three axes from the lowest to the highest corner is a tetrahedron.
+    # Each permutation of the axes is a path from the lowest to the highest corner: a tetrahedron.
     walks = np.array([np.cumsum([0, *stride[list(order)]]) for order in permutations(range(3))])
     tetrahedra = (lowest[:, None, None] + walks[None]).reshape(-1, 4)
     return oriented(TetrahedralMesh(points, tetrahedra))

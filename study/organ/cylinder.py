@@ -32,7 +32,7 @@ def quarter_cylinder(radius: float, height: float, rings: int, layers: int) -> T
         np.concatenate([bottom + layer * len(disc), bottom + (layer + 1) * len(disc)], axis=1)
         for layer in range(layers)
     ]
-    # Cut along the diagonals from lower numbers below to higher numbers above: neighbours agree.
+    # Diagonals run from lower numbers below to higher numbers above, so that neighbours agree.
     cuts = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
     tetrahedra = np.concatenate(prisms)[:, cuts].reshape(-1, 4)
     return oriented(TetrahedralMesh(points, tetrahedra))

@@ -253,7 +253,7 @@ def _from_file(
     from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
 
-    del state  # a file that was written anew is another key
+    del state  # part of the cache key: a rewritten file is read again
     loaded, report = load_mesh(path, unit, axes, pieces)
     notes = (*report.notes, axes_note(axes))
     if isinstance(loaded, SurfaceMesh):

@@ -82,7 +82,7 @@ def equidistributed(mesh: TetrahedralMesh, errors: Floats, order: float, more: i
         gained = len(found.mesh.tetrahedra) - len(errors)
         if abs(gained - more) <= TOLERANCE * more:
             break
-        aim *= more / gained  # halves are no parts of any number, and neighbours are cut too
+        aim *= more / gained  # bisection gives powers of two, and cuts neighbours too
     return found
 
 

@@ -85,7 +85,7 @@ def body_centred_lattice(lower: Floats, upper: Floats, size: float) -> tuple[Flo
     shape = np.ceil((upper - lower) / size).astype(int) + 2
     origin = 0.5 * (lower + upper) - 0.5 * size * (shape - 1)
     corner = np.arange(np.prod(shape)).reshape(shape)
-    centre = corner[:-1, :-1, :-1] + corner.size  # the centre keeps its lowest corner's number
+    centre = corner[:-1, :-1, :-1] + corner.size  # numbered by its lowest corner
     grid = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
     nodes = np.concatenate([origin + size * grid, origin + size * (grid + 0.5)])
     return nodes, np.concatenate([_tetrahedra_across(corner, centre, axis) for axis in range(3)])
@@ -151,7 +151,7 @@ def _false_position(
     stayed = np.zeros(len(low))  # -1 where the lower end was moved last, 1 the higher
 
     def guess() -> Floats:
-        with np.errstate(divide="ignore", invalid="ignore"):  # both ends on the surface
+        with np.errstate(divide="ignore", invalid="ignore"):  # both ends may lie on the surface
             found = low - ends[0] * (high - low) / (ends[1] - ends[0])
         return np.where((low <= found) & (found <= high), found, low)
 
@@ -185,7 +185,7 @@ def _snap(
     limit = _snapping_distance(nodes, tetrahedra, crossed)
     distance = np.linalg.norm(ends - points[:, None], axis=2)
     near, side = np.nonzero(distance < limit)
-    order = np.argsort(-distance[near, side], kind="stable")  # the nearest crossing writes last
+    order = np.argsort(-distance[near, side], kind="stable")  # the nearest crossing is written last
     near, side = near[order], side[order]
     moved, zeroed = nodes.copy(), value.copy()
     moved[crossed[near, side]] = points[near]

@@ -1,1 +1,1 @@
-"""From what a scene requires to the least that has to be modelled, and why."""
+"""The least that has to be modelled to meet a scene's requirements, and why."""

@@ -1,6 +1,6 @@
-"""What may be modelled, with what each is expected to leave out and to cost.
+"""Candidates for modelling a scene, with their predicted errors and costs.
 
-To add one: a function of the look, and a line in `CANDIDATES`.
+To add one, write a function of the coarse solutions (`Look`) and a line in `CANDIDATES`.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from study.plan.prediction import (
 from study.scene import Scene
 
 SIZES = (1.0, 0.75, 0.75**2, 0.75**3)
-"""Of elements, times that of the scene: levels of its organ."""
+"""Element sizes over the scene's: levels of its organ."""
 SPACINGS = (2.0, 1.5, 1.25, 1.0, 0.8, 2.0 / 3.0, 0.5)
-"""Of lattices, times that of the scene."""
+"""Lattice spacings over the scene's."""
 CORRECTED = (2.0, 1.5, 1.0)
 VECTORS = 16
 SOLUTIONS = 3.0
-"""That so many Ritz vectors take, in solutions of the static problem to full accuracy: measured."""
+"""Measured cost of the Ritz vectors, in static solutions to full accuracy."""
 REFERENCES = 2.0
-"""What a reference with its coarser meshes costs, in subspaces on the scene's own mesh."""
+"""Cost of a reference with its coarser meshes, in subspaces on the scene's own mesh."""
 GROWTH = 1.2
-"""Power of the unknowns by which a solution grows."""
+"""Exponent of the unknowns in the cost of a solution."""
 STREAM = 5e9
-"""Numbers a second that a product with a few vectors reads, of any machine of these years."""
+"""Numbers per second that a product with a few vectors reads on a current machine."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
     """A way to model a scene.
 
-    `scene`: the same with these models and settings; `step` [s] and `step_wall` [s] of a step;
-    `setup` [s], with a reference where the error is not known without one; `memory` [byte] on top
-    of the program; `leaves_out`: in words.
+    `scene`: with these models and settings; `step` [s] and `step_wall` [s]: of a step; `setup` [s]:
+    with a reference where the error is unknown without one; `memory` [byte]: in addition to the
+    program's; `leaves_out`: what is neglected, in words.
     """
 
     name: str
@@ -63,17 +63,17 @@ class Candidate:
 
     @property
     def is_linear(self) -> bool:
-        """Whether it has small displacements alone."""
+        """Whether it is limited to small displacements."""
         return any(part.cause == GEOMETRY for part in self.prediction.parts)
 
     @property
     def wall_per_s(self) -> float:
-        """Wall per simulated second."""
+        """Wall time per simulated second."""
         return self.step_wall / self.step
 
     @property
     def wall(self) -> float:
-        """Wall of the whole run [s]."""
+        """Wall time of the whole run [s]."""
         return self.setup + self.wall_per_s * self.scene.time.duration
 
 
@@ -81,7 +81,7 @@ Kind = Callable[[Scene, Look, Foresight], Iterator[Candidate]]
 
 
 def candidates(scene: Scene, look: Look, foresight: Foresight) -> list[Candidate]:
-    """All there are for a motion in time."""
+    """All candidates for a motion."""
     return [one for kind in CANDIDATES.values() for one in kind(scene, look, foresight)]
 
 
@@ -94,7 +94,7 @@ def _superpositions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[
 
 
 def superposition(scene: Scene, look: Look, foresight: Foresight, times: float) -> Candidate:
-    """Ritz vectors of linear finite elements, of so many times the scene's size."""
+    """Ritz vectors of linear finite elements, with `times` the scene's element size."""
     parts = (
         Part(GEOMETRY, foresight.geometry),
         Part(MESH, foresight.mesh(times * _scene_size(look))),
@@ -110,7 +110,7 @@ def superposition(scene: Scene, look: Look, foresight: Foresight, times: float) 
 
 
 def on_elements(scene: Scene, look: Look, times: float) -> Candidate:
-    """A subspace of finite elements and what it costs; its error is for others to say."""
+    """A subspace of finite elements and its cost, without its error."""
     chosen = replace(
         scene.reference, element_size=times * scene.reference.element_size, accuracy=None
     )
@@ -128,7 +128,7 @@ def on_elements(scene: Scene, look: Look, times: float) -> Candidate:
 
 
 def _scene_size(look: Look) -> float:
-    """Size of the scene's own mesh, in the measure of its levels."""
+    """Size of the scene's own mesh, in the unit of its levels."""
     base = look.problem.geometry.level(0)
     assert base is not None  # noqa: S101 - the organ was built of it
     return base.size
@@ -206,7 +206,7 @@ def _sum(
     coarse: Candidate,
     parts: tuple[Part, ...],
 ) -> Candidate:
-    """A coarse lattice with these errors beside finite elements of so many times the size."""
+    """A coarse lattice with these errors, and finite elements with `times` the scene's size."""
     fine = on_elements(scene, look, size)
     own = (Part(MESH, foresight.mesh(size * _scene_size(look))), Part(TRUNCATION, SUBSPACE))
     return Candidate(
@@ -233,7 +233,7 @@ def _regions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candida
 
 
 def region(scene: Scene, look: Look, one: GradedLook) -> Candidate:
-    """A graded lattice that was looked at, stepped explicitly, and its cost."""
+    """One of the solved graded lattices, stepped explicitly, and its cost."""
     seen = one.lattice
     plain = lattice(scene, look, scene.lattice.spacing)
     graded = replace(scene.region, spacing=seen.spacing, radius=one.radius)
@@ -250,7 +250,7 @@ def region(scene: Scene, look: Look, one: GradedLook) -> Candidate:
 
 
 def _corrected_regions(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
-    """All but the one that tells the others' error."""
+    """All except the one that gives the others' error."""
     for size in SIZES:
         for one in look.graded[:-1]:
             coarse = region(scene, look, one)
@@ -274,7 +274,7 @@ CANDIDATES: dict[str, Kind] = {
 
 
 def resting(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candidate]:
-    """What there is for rest under the full load: finite elements, and their correction."""
+    """Candidates for rest under the full load: finite elements, and their correction."""
     for times in SIZES:
         found = on_elements(scene, look, times)
         wall = found.setup / SOLUTIONS

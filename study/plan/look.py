@@ -1,6 +1,6 @@
-"""A quick look at a scene: coarse lattices and coarse finite elements at rest under the full load.
+"""Coarse solutions of a scene: lattices and finite elements at rest under the full load.
 
-It takes seconds, and tells from solutions that are cheap what dear ones would cost and be worth.
+They take seconds, and give predictions of the cost and error of expensive solutions.
 """
 
 from __future__ import annotations
@@ -30,17 +30,19 @@ from study.scene.graded import unfit
 Floats = NDArray[np.float64]
 
 SPACINGS = (2.0, 1.5, 1.0)
-"""Of the lattices, times that of the scene."""
+"""Spacings of the lattices, over that of the scene."""
 FINEST, REACHES = 0.5, (0.6, 1.0, 1.5)
-"""Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
-reach from the tool, in its radii; the last is what the others are compared with."""
+"""For graded lattices: edge of their finest cells over the scene's spacing, and their radii.
+
+The radii are in radii of the tool; the others are compared with the last.
+"""
 LEVELS = (-1, 0, 1)
 MOST_UNKNOWNS = 30_000
-"""Of a mesh that is looked at, which takes a few seconds; one is, however large."""
+"""Largest coarse mesh, which takes a few seconds; one is solved whatever its size."""
 AT_REST = 1e-5
 """Residual of a lattice at rest, relative to its load."""
 STEPS, TURNS = 40, 3
-"""Timed at once, and how often: the least counts, which others on the machine disturb least."""
+"""Steps timed together, and repetitions: the least time is used, with the least disturbance."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,15 @@ class Rest:
     field: Floats
 
     def plus(self, other: Rest, times: float = 1.0) -> Rest:
-        """The sum of this and so many times another."""
+        """The sum of this and `times` another."""
         return Rest(self.probes + times * other.probes, self.field + times * other.field)
 
 
 @dataclass(frozen=True)
 class LatticeLook:
-    """A lattice of a spacing [m] at rest, of small displacements and, if it got there, of large.
+    """A lattice of a spacing [m] at rest: linear and, if it converged, nonlinear.
 
-    `critical`: its critical step [s]; `nbytes`: its arrays.
+    `critical`: its critical step [s]; `nbytes`: size of its arrays.
     """
 
     spacing: float
@@ -73,7 +75,7 @@ class LatticeLook:
 
 @dataclass(frozen=True)
 class GradedLook:
-    """A graded lattice at rest, its finest cells within a radius [m]; what its step takes [s]."""
+    """A graded lattice at rest, the radius [m] of its finest cells, and its step time [s]."""
 
     radius: float
     lattice: LatticeLook
@@ -82,7 +84,7 @@ class GradedLook:
 
 @dataclass(frozen=True)
 class ElementsLook:
-    """Finite elements of a `size` [m] at rest, and what the solution took [s]."""
+    """Finite elements of a `size` [m] at rest, and the time [s] of the solution."""
 
     level: int
     size: float
@@ -93,9 +95,9 @@ class ElementsLook:
 
 @dataclass(frozen=True)
 class Look:
-    """Solutions from coarse to fine, and what a step of the finest lattice takes a spring [s].
+    """Solutions from coarse to fine, and the step time of the finest lattice per spring [s].
 
-    `strain`: largest of the finite elements.
+    `strain`: the largest of the finite elements.
     """
 
     problem: Problem
@@ -107,7 +109,7 @@ class Look:
 
 
 def look(scene: Scene, problem: Problem) -> Look:
-    """Look at a scene. ValueError where support or tool misses even the coarsest of its models."""
+    """Solve the coarse models. ValueError where support or tool misses even the coarsest one."""
     elements, strain = _elements(scene, problem)
     lattices = [on_lattice(scene, problem, times) for times in SPACINGS]
     return Look(
@@ -121,7 +123,7 @@ def look(scene: Scene, problem: Problem) -> Look:
 
 
 def _graded_at_rest(scene: Scene, problem: Problem) -> Iterator[GradedLook]:
-    """From where the fewest cells are fine to the most; none for settings that they have not."""
+    """From the smallest fine region to the largest; none for settings without support."""
     if any(unfit(scene.lattice)):
         return
     region = model(scene, "region")
@@ -146,7 +148,7 @@ def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...],
 
 
 def meshes(scene: Scene, problem: Problem) -> Iterator[tuple[int, float, PreparedElements]]:
-    """Number, size and elements of each mesh that is looked at, from coarse to fine."""
+    """Number, size and elements of each coarse mesh, from coarse to fine."""
     found = 0
     for level in LEVELS:
         at = problem.geometry.level(level)
@@ -170,7 +172,7 @@ def _at_rest(prepared: PreparedElements, level: int, size: float) -> tuple[Eleme
 
 
 def on_lattice(scene: Scene, problem: Problem, times: float) -> PreparedLattice:
-    """A lattice of the tissue's modulus, of so many times the scene's spacing."""
+    """A lattice of the tissue's modulus, with `times` the scene's spacing."""
     tissue = model(scene, "tissue")
     assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
     spacing = times * scene.lattice.spacing
@@ -178,7 +180,7 @@ def on_lattice(scene: Scene, problem: Problem, times: float) -> PreparedLattice:
 
 
 def lattice_at_rest(prepared: PreparedLattice) -> LatticeLook:
-    """A lattice under the full load, of small displacements and of large."""
+    """A lattice under the full load, linear and nonlinear."""
     assembly, material = prepared.assembly, prepared.springs.material
     net = arrays(assembly, material)
     large, how = relax(material.law, net, tolerance=AT_REST)
@@ -194,14 +196,14 @@ def lattice_at_rest(prepared: PreparedLattice) -> LatticeLook:
 
 
 def _seen(prepared: PreparedLattice, nodal: Floats) -> Rest:
-    """A displacement of the nodes (n, 3), where it is looked at."""
+    """A nodal displacement (n, 3) at the points of observation."""
     seen, lattice = prepared.problem.observation, prepared.assembly.lattice
     places = seen.probes, seen.volume_points
     return Rest(*(np.asarray(lattice.interpolation(points)[0] @ nodal) for points in places))
 
 
 def _step_wall(prepared: PreparedLattice) -> float:
-    """Wall of a step of a run [s]."""
+    """Wall time of a step of a run [s]."""
     stepper = prepared.stepper()
     walls = []
     for _ in range(TURNS):

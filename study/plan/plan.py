@@ -1,8 +1,8 @@
-"""What of a scene is modelled and what not, derived from what it requires.
+"""What of a scene is modelled, derived from its requirements.
 
-Chosen is the cheapest candidate that is expected to keep error, rate and memory, by its steps where
-there is a rate and by the whole run where there is none; without an error the most accurate. It is
-chosen before anything heavy runs.
+The choice is the cheapest candidate that is predicted to meet error, rate and memory: by its step
+time if a rate is required, else by the time of the whole run. Without a required error it is the
+most accurate. The choice is made before anything expensive runs.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from study.scene import Require, Scene
 from study.scene.problem import problem_of
 
 FIELD = "field"
-"""Quantities that are those of a motion."""
+"""The required quantity that includes the whole organ."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What was decided about a part of the model, and why; `cost` is that of one machine."""
+    """A decision about a part of the model, with its reason; `cost` is that on this machine."""
 
     about: str
     choice: str
@@ -37,7 +37,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """The scene to run, and the decisions that made it.
+    """The scene to run, and the decisions that led to it.
 
     `candidate`: None where the scene's own models are kept.
     """
@@ -48,7 +48,7 @@ class Plan:
 
     @property
     def moves(self) -> bool:
-        """Whether anything is stepped in time, and not only brought to rest."""
+        """Whether a motion is computed, and not only the state at rest."""
         required = self.scene.require
         return required is None or required.moves
 
@@ -61,7 +61,8 @@ class Plan:
 def plan(scene: Scene) -> Plan:
     """Decide what is modelled of a scene.
 
-    Raises ValueError, with the nearest that can be had, for what no candidate is expected to keep.
+    Raises ValueError, with the nearest alternative, if no candidate is predicted to meet the
+    requirements.
     """
     required = scene.require
     if required is None:
@@ -80,7 +81,7 @@ def plan(scene: Scene) -> Plan:
 
 
 def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
-    """Of a scene with moved tools, or more than one load: lattices, corrected where they may be."""
+    """For moved tools or more than one load: lattices, corrected where that is possible."""
     seen = moved.look(scene, problem, measure(required, problem))
     offered = [*moved.lattices(scene, seen), *moved.corrected(scene, seen)]
     chosen = choose(offered, required)
@@ -88,7 +89,7 @@ def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
 
 
 def measure(required: Require, problem: Problem) -> Measure:
-    """Where the error counts. ValueError for a control point that there is not."""
+    """Where the error is evaluated. ValueError for an unknown control point."""
     for name in required.at:
         if name not in problem.probes:
             raise ValueError(
@@ -100,7 +101,7 @@ def measure(required: Require, problem: Problem) -> Measure:
 
 
 def choose(offered: Sequence[Candidate], required: Require) -> Candidate:
-    """The cheapest that keeps everything. ValueError, with the nearest, where none does."""
+    """The cheapest that meets all requirements. ValueError, with the nearest, where none does."""
     able = [one for one in offered if _keeps(one, required)]
     if not able:
         raise ValueError(_refusal(offered, required))
@@ -120,12 +121,12 @@ def _keeps(one: Candidate, required: Require) -> bool:
 
 
 def in_time(one: Candidate, rate: float) -> bool:
-    """Whether the steps of a frame at a rate [Hz] are expected to be done within it."""
+    """Whether the steps of a frame at a rate [Hz] are predicted to finish within it."""
     return whole_steps(1.0 / rate, one.step) * one.step_wall <= 1.0 / rate
 
 
 def _refusal(offered: Sequence[Candidate], required: Require) -> str:
-    """What cannot be had, and the nearest that can: an error at the rate and memory, or a rate."""
+    """What cannot be met, and the nearest error at this rate and memory, or the nearest rate."""
     rest = [one for one in offered if _keeps(one, replace(required, error=None))]
     if required.error is not None and rest:
         nearest = min(rest, key=lambda one: one.prediction.error)
@@ -243,12 +244,12 @@ def _left_out(scene: Scene, chosen: Candidate) -> tuple[str, str]:
 
 
 def _percent(value: float) -> str:
-    """To a tenth where that says something."""
+    """A percentage, with a decimal where that is significant."""
     return f"{100.0 * value:.1f} %" if value < 0.0995 else f"{100.0 * value:.0f} %"
 
 
 def lines(found: Plan, *, costs: bool = True) -> list[str]:
-    """The decisions, for a person; without costs they are the same on every machine."""
+    """The decisions for a reader; without costs they are the same on every machine."""
     return [_line(one, one.cost if costs else "") for one in found.decisions]
 
 

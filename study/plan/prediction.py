@@ -1,7 +1,7 @@
-"""What is left out by a model, and about how much it matters, predicted from a look at rest.
+"""Predicted errors of a model by what it neglects, from coarse solutions at rest.
 
-Everything here is an estimate, nothing a bound. What the look cannot tell, such as what the steps
-cost a motion, is told by the run itself.
+Everything here is an estimate, not a bound. Errors that coarse solutions at rest do not show, such
+as the time-step error of a motion, are stated by the run itself.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ GEOMETRY, MESH, SPACING, COMPARED, REMAINDER, TRUNCATION = (
     "subspace",
 )
 NONLINEAR_ORDER = 1.5
-"""Of the lattice's part by large displacements, observed between 20, 10 and 5 mm on the liver."""
+"""Order of the nonlinear part of a lattice, observed at 20, 10 and 5 mm on the liver."""
 CAUTION = 2.0
-"""On what two coarse meshes or lattices tell: the errors that a run states have factors too."""
+"""Factor of safety on estimates from two coarse meshes or lattices, as in a run's own errors."""
 SUBSPACE = 1e-3
-"""Error of displacement that so many Ritz vectors leave, which the run tells itself."""
+"""Displacement error of this number of Ritz vectors, which the run estimates itself."""
 
 
 @dataclass(frozen=True)
@@ -45,25 +45,25 @@ class Part:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model leaves out; the errors are added, as they may have the same sign."""
+    """The neglected effects; their errors are added, since they may have the same sign."""
 
     parts: tuple[Part, ...]
 
     @property
     def error(self) -> float:
-        """Of all parts."""
+        """Sum of all parts."""
         return math.fsum(part.error for part in self.parts)
 
 
 @dataclass(frozen=True)
 class Measure:
-    """Where an error counts: at which control points (p,), and over the organ if `volumes`."""
+    """Where an error is evaluated: at control points (p,), and over the organ if `volumes`."""
 
     probes: tuple[int, ...]
     volumes: Floats | None
 
     def __call__(self, apart: Rest, whole: Rest) -> float:
-        """The largest relative size of a difference."""
+        """The largest relative norm of a difference."""
         chosen = list(self.probes)
         size = np.linalg.norm(whole.probes[chosen], axis=1)
         found = (np.linalg.norm(apart.probes[chosen], axis=1) / size).tolist()
@@ -74,16 +74,17 @@ class Measure:
 
 @dataclass(frozen=True)
 class Foresight:
-    """Errors that a look foretells for models on meshes and lattices that it did not solve."""
+    """Predicted errors of models on meshes and lattices that were not solved."""
 
     look: Look
     measure: Measure
 
     @cached_property
     def whole(self) -> Rest:
-        """The best displacement known: finest elements, and what large displacements change.
+        """The best known displacement: the finest elements plus the nonlinear effect.
 
-        That on the graded lattice that is fine farthest from the tool, else on the finest uniform.
+        The latter from the graded lattice with the largest fine region, else from the finest
+        uniform one.
         """
         linear, lattices = self.look.elements[-1].rest, [self.look.lattices[-1]]
         if self.look.graded:
@@ -93,9 +94,10 @@ class Foresight:
 
     @cached_property
     def geometry(self) -> float:
-        """What a linear model leaves out; infinite where a lattice found no rest.
+        """Error of a linear model; infinite where a lattice has no rest.
 
-        The part of the finest lattice and its change from the one before, as it still grows.
+        The nonlinear effect on the finest lattice, plus its change from the one before, as it still
+        grows.
         """
         parts = [_nonlinear(one) for one in self.look.lattices[-2:]]
         if any(part is None for part in parts):
@@ -104,9 +106,9 @@ class Foresight:
         return self._size(last) + self._size(last.plus(before, -1.0))
 
     def remainder(self, spacing: float) -> float:
-        """What large displacements still leave, told on a lattice of a spacing [m] alone.
+        """Error of the nonlinear effect on a lattice of a spacing [m].
 
-        From the coarsest and the finest lattice, by the order observed.
+        From the coarsest and the finest lattice, with the observed order.
         """
         first, last = self.look.lattices[0], self.look.lattices[-1]
         parts = _nonlinear(first), _nonlinear(last)
@@ -117,9 +119,9 @@ class Foresight:
         return float(CAUTION * change * gain * spacing**NONLINEAR_ORDER)
 
     def graded_remainder(self, one: GradedLook) -> float:
-        """What large displacements still leave, told on a graded lattice.
+        """Error of the nonlinear effect on a graded lattice.
 
-        By how far its finest cells reach, from the one that reaches farthest, and by their size.
+        Due to the radius of its finest cells, against the largest radius, and to their size.
         """
         own, far = map(_nonlinear, (one.lattice, self.look.graded[-1].lattice))
         if own is None or far is None:
@@ -127,16 +129,16 @@ class Foresight:
         return CAUTION * (self._size(own.plus(far, -1.0)) + self._by_finest_cells)
 
     def graded(self, one: GradedLook) -> float:
-        """Error of a graded lattice, against the best displacement known and with its own error."""
+        """Error of a graded lattice, against the best known displacement, plus its own error."""
         apart = self._size(self._of(one.lattice).plus(self.whole, -1.0))
         return apart + self._by_finest_cells
 
     @cached_property
     def _by_finest_cells(self) -> float:
-        """What the size of the finest cells leaves of large displacements.
+        """Error of the nonlinear effect due to the size of the finest cells.
 
-        From the graded lattice that reaches farthest and the finest uniform one, by the order
-        observed.
+        From the graded lattice with the largest fine region and the finest uniform one, with the
+        observed order.
         """
         fine, coarse = self.look.graded[-1].lattice, self.look.lattices[-1]
         parts = _nonlinear(fine), _nonlinear(coarse)
@@ -146,9 +148,9 @@ class Foresight:
         return float(self._size(parts[0].plus(parts[1], -1.0)) / gain)
 
     def mesh(self, size: float) -> float:
-        """Discretisation error of elements of a size [m]; infinite where one mesh is all there is.
+        """Discretisation error of elements of a size [m]; infinite with a single mesh.
 
-        By Richardson from the two finest meshes looked at, with the order of curved organs and
+        By Richardson extrapolation from the two finest meshes, with the order of curved organs and
         edges of supports.
         """
         if len(self.look.elements) < 2:
@@ -159,7 +161,7 @@ class Foresight:
         return float(CAUTION * change / gain * (size / last.size) ** ASSUMED_ORDER)
 
     def spacing(self, spacing: float) -> float:
-        """Error of a lattice of a spacing [m], by a fit of C h^p to those looked at."""
+        """Error of a lattice of a spacing [m], by a fit of C h^p to those solved."""
         seen = self.look.lattices
         errors = [self._size(self._of(one).plus(self.whole, -1.0)) for one in seen]
         sizes = np.log([one.spacing for one in seen])
@@ -174,5 +176,5 @@ class Foresight:
 
 
 def _nonlinear(one: LatticeLook) -> Rest | None:
-    """What large displacements change on a lattice."""
+    """The effect of large displacements on a lattice."""
     return None if one.nonlinear is None else one.nonlinear.plus(one.linear, -1.0)

@@ -161,7 +161,7 @@ def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
 
 def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
     """Composition of each tetrahedron; None for homogeneous tissue."""
-    if not isinstance(tissue, HeterogeneousTissue):  # and SciPy's statistics take a while to load
+    if not isinstance(tissue, HeterogeneousTissue):  # avoids loading SciPy's statistics
         return None
     corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])

@@ -45,7 +45,7 @@ def _sinusoid(history: LoadHistory, times: Floats) -> Floats:
 
 
 HISTORIES: dict[str, Callable[[LoadHistory, Floats], Floats]] = {
-    "step": _step,  # from the start
+    "step": _step,  # full load from time 0
     "ramp-hold-release": _ramp_hold_release,
     "sinusoid": _sinusoid,
 }

@@ -63,7 +63,7 @@ class StationFactor:
         at = np.asarray(np.interp(times, self.times, self.marks))
         found = np.zeros_like(at)
         for one in self.pieces:
-            on = (one.first <= at) & (at <= one.last)  # where two meet, both are the same
+            on = (one.first <= at) & (at <= one.last)  # adjacent pieces agree where they meet
             found[on] = one.share(at[on])
         return found
 

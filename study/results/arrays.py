@@ -28,7 +28,7 @@ def read(path: Path) -> Arrays:
     if not path.exists():
         return {}
     try:
-        with path.open("rb") as file:  # numpy leaves a file open that it takes for no .npz
+        with path.open("rb") as file:  # numpy does not close a path that is no .npz
             found = np.load(file, allow_pickle=False)
             if not isinstance(found, np.lib.npyio.NpzFile):
                 raise ValueError("it is no .npz file")  # noqa: TRY004 - the file is at fault

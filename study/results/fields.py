@@ -70,7 +70,7 @@ class Frames:
         self.file.seek(sample * (self.size + CHECKSUM))
         data = np.array([u, v], dtype=np.float64).tobytes()
         frame = memoryview(data + _checksum(data))
-        while frame:  # an unbuffered file may take less than all
+        while frame:  # an unbuffered write may be partial
             frame = frame[self.file.write(frame) :]
         self.count = sample + 1
 

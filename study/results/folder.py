@@ -63,7 +63,7 @@ __all__ = ["Arrays", "Results", "ResultsError", "read", "replacing", "write"]
 
 MARK, SCENE = "results.json", "scene.toml"
 FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, manifest.PAGE, "export"}
-OURS, FIELDS = (".report.", ".export."), manifest.FIELDS  # the first, of killed programs
+OURS, FIELDS = (".report.", ".export."), manifest.FIELDS  # the former of killed programs
 CHECKSUMS = "sha256"
 """Where results.json has the checksums of the other files, so that two runs are not mixed."""
 
@@ -171,7 +171,7 @@ def read(folder: Path) -> Results:
         _check_version(folder, table)
         altered = manifest.altered(folder)
         for name in altered:
-            if name.endswith(".npz"):  # says nothing of use to whoever opens it
+            if name.endswith(".npz"):  # numpy's own messages do not help the user
                 _refuse(folder, name)
         results = _content(folder, table)
         if altered:
@@ -368,7 +368,7 @@ def _check_same(state: Path, scene: Scene) -> None:
     """Raise if the states are of another scene, before any model is run."""
     try:
         before = tomllib.loads((state / SCENE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # there is none, or a kill left half of it: each state tells
+    except (OSError, ValueError):  # missing or half written: each state is checked itself
         return
     now = tomllib.loads(write_scene(scene))
     moving = sorted((before.keys() | now.keys()) - {"title", "renders", "remarks"})

@@ -47,7 +47,7 @@ def write(path: Path, points: Floats, cells: Ints, times: Floats, fields: Fields
     writer.SetInputConnection(source.GetOutputPort())
     writer.SetFileName(str(path))
     writer.SetCompressionLevel(COMPRESSION)
-    path.touch()  # says why, where the writer would only fail
+    path.touch()  # raises an error with a reason, which the writer does not
     done = writer.Write()
     if source.error is not None:
         raise source.error
@@ -101,7 +101,7 @@ class _Source(VTKPythonAlgorithmBase):
                 array = numpy_to_vtk(values, deep=True)  # type: ignore[no-untyped-call] # VTK has no types here
                 array.SetName(name)
                 output.GetPointData().AddArray(array)
-        except Exception as error:  # VTK would print it and go on; it is raised afterwards
+        except Exception as error:  # VTK would print it and continue; raised afterwards
             self.error = error
             return 0
         return 1

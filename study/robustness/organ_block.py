@@ -62,7 +62,7 @@ class Asked:
     def draws(self) -> list[OrganDraw]:
         """The draws of the row."""
         of = unknowns(self.spacing)
-        size = 2 ** max(1, self.row.bit_length())  # the least that has it
+        size = 2 ** max(1, self.row.bit_length())  # the smallest design that contains the row
         found = draws(shares(self.seed, size, of)[self.row, : self.points], of)
         return [draw._replace(spacing=draw.spacing / self.finer) for draw in found]
 

@@ -153,7 +153,7 @@ def _estimated(values: Floats) -> tuple[Floats, Floats]:
     """Indices by Saltelli et al. 2010, doi 10.1016/j.cpc.2009.09.018, table 2 (b) and (f)."""
     centred = values - values[:, :2].mean()
     a, b, mixed = centred[:, :1], centred[:, 1:2], centred[:, 2:]
-    variance = centred[:, :2].var() or 1.0  # of an output that never changes
+    variance = centred[:, :2].var() or 1.0  # an output that never changes
     first = (b * (mixed - a)).mean(axis=0) / variance
     return first, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
 

@@ -1,4 +1,4 @@
-"""The scene: everything a study is told, in SI units; `study.scene.file` reads it."""
+"""The scene: the complete input of a study, in SI units; `study.scene.file` reads it."""
 
 from study.problem.history import LoadHistory
 from study.problem.tissue import Tissue

@@ -1,7 +1,7 @@
-"""What is raised for a scene that cannot be used."""
+"""The error of an unusable scene."""
 
 from __future__ import annotations
 
 
 class SceneError(ValueError):
-    """A scene that cannot be used; the message lists every problem with its key and remedy."""
+    """An unusable scene; the message lists every problem with its key and remedy."""

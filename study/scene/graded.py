@@ -1,4 +1,4 @@
-"""What of a scene is not for a lattice of cells of several sizes, and what to do about it."""
+"""Restrictions of lattices of graded cells, with their remedies."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ NO_TOLERANCE = (
 
 
 def has_graded(scene: Scene) -> bool:
-    """Whether a model of a scene has cells of several sizes."""
+    """Whether a model of a scene has graded cells."""
     return "region" in scene.models or (
         "corrected" in scene.models and scene.corrected.coarse == "graded"
     )
 
 
 def contradictions(scene: Scene) -> Iterator[str]:
-    """Keys that contradict each other where a model has cells of several sizes."""
+    """Keys that contradict each other where a model has graded cells."""
     if scene.corrected.coarse == "graded" and scene.corrected.spacing is not None:
         yield "corrected.spacing: a graded lattice has that of the table region; remove it"
     if not has_graded(scene):
@@ -36,7 +36,7 @@ def contradictions(scene: Scene) -> Iterator[str]:
 
 
 def unfit(lattice: Lattice) -> Iterator[str]:
-    """Settings of lattices that one of cells of several sizes does not have."""
+    """Settings that a lattice of graded cells does not support."""
     from msm.integrators import INTEGRATORS
 
     if lattice.springs == "tetrahedra":

@@ -1,4 +1,4 @@
-"""A spring law as a scene gives it: the name of one in `msm.laws.LAWS`, and its numbers."""
+"""A spring law of a scene: the name of a law in `msm.laws.LAWS`, and its parameters."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Numbers = float | tuple[float, ...]
 KINDS = Choice("msm.laws:LAWS")
 DEFAULT = "piecewise"
 FREE_OF_TENSION = 1e-9
-"""How far from zero the tension of a law at rest may round, relative to its stiffness."""
+"""Largest tension of a law at rest that counts as rounding, over its stiffness."""
 
 
 class _Wrong(NamedTuple):
-    """A key of the table, or none for the whole, with what is wrong about its value."""
+    """A key of the table, or none for the whole, and what is wrong with its value."""
 
     key: tuple[str, ...]
     message: str
@@ -45,7 +45,7 @@ class SpringLaw:
     parameters: Mapping[str, Numbers]
 
     def make(self, k: float) -> Law:
-        """The law in proportion to a linear spring of k [N/m]; ValueError if there is none."""
+        """The law scaled to a linear spring of k [N/m]; ValueError if there is none."""
         from msm.laws import LAWS
 
         return LAWS[self.kind].make(k, **self.parameters)
@@ -58,7 +58,7 @@ class SpringLaw:
         return LAWS[self.kind].linear
 
     def table(self) -> dict[str, str | float | list[float]]:
-        """The table of a scene that reads as this."""
+        """The scene's table that reads as this law."""
         numbers = {
             key: list(value) if isinstance(value, tuple) else value
             for key, value in self.parameters.items()
@@ -92,7 +92,7 @@ class SpringLaw:
 
 
 def _refuse_unsound(kind: str, law: Law) -> None:
-    """ValueError for a law that no spring at rest can have, whatever its numbers are."""
+    """Raise ValueError for a law that no spring at rest can have."""
     from msm.laws import stiffness_at_rest, tension
 
     pull, slopes = tension(law, 0.0), stiffness_at_rest(law)
@@ -124,7 +124,7 @@ def _wrong_keys(kind: str, given: Mapping[str, object]) -> Iterator[_Wrong]:
 
 
 def _wrong_value(value: object, *, alone: bool) -> str | None:
-    """What is wrong about a value that should be a number `alone` or a list of them."""
+    """What is wrong with a value that should be a number (`alone`) or a list of numbers."""
     if alone and isinstance(value, list | tuple):
         return "should be one number"
     entries = value if isinstance(value, list | tuple) else [value]

@@ -1,4 +1,4 @@
-"""What rigid tools meet on their way: nothing, or a surface that cannot make way for them."""
+"""What moved rigid tools meet: nothing, or a fixed surface that cannot yield."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
 LOOKS = 64
-"""Times at most at which a tool is looked at, spread evenly over its motion."""
+"""Largest number of times at which a tool is checked, evenly distributed over its motion."""
 ENTERED = 0.01
-"""Of a tool's travel, how deep a fixed point may be in it: the surface is told by points."""
+"""Depth of a fixed point inside a tool, over its travel, above which it counts as entered."""
 BLOCKED = 0.1
-"""Part of a unit normal along which a point is free, up to which it cannot leave the tool."""
+"""Free part of a unit normal up to which a point cannot leave the tool."""
 
 
 def refuse_blocked(
     tools: Iterable[RigidTool], support: Support, rule: SurfaceRule, times: Floats
 ) -> None:
-    """ValueError naming a tool that is moved into a surface that does not move.
+    """Raise ValueError naming a tool that is moved into a fixed surface.
 
-    Its force would have no bound, and whatever a model gave for it would be that of its mesh.
-    `times` [s] (k,) of the motion.
+    Its force would be unbounded, and its computed value would depend on the mesh. `times` [s] (k,)
+    of the motion.
     """
     fixed = support.fixed(rule.points, rule.normals)
     some = fixed.any(axis=1)
@@ -44,7 +44,7 @@ def refuse_blocked(
 
 
 def notes_on_misses(tools: Iterable[RigidTool], rule: SurfaceRule, times: Floats) -> Iterator[str]:
-    """A sentence on each tool that is not bonded and never comes to the surface as it is given."""
+    """A sentence on each tool in unilateral contact that never reaches the undeformed surface."""
     for tool in tools:
         if tool.bonded:
             continue
@@ -60,7 +60,7 @@ def notes_on_misses(tools: Iterable[RigidTool], rule: SurfaceRule, times: Floats
 def _drags(
     tool: RigidTool, points: Floats, normals: Floats, fixed: Booleans, times: Floats
 ) -> bool:
-    """Whether a bonded tool would move, along what is fixed, any of the points that it holds."""
+    """Whether a bonded tool would move any of its points along a fixed direction."""
     held = tool.holds(points, normals)
     moved = np.abs(tool.travel(times)).max(axis=0) > 0.0
     return bool((fixed[held] & moved).any())
@@ -69,7 +69,7 @@ def _drags(
 def _enters(
     tool: RigidTool, points: Floats, normals: Floats, fixed: Booleans, times: Floats
 ) -> bool:
-    """Whether a tool that is not bonded would have a point in it that cannot leave it."""
+    """Whether a tool in unilateral contact would contain a point that cannot leave it."""
     del normals
     outside = tool.gap(points, float(times[0]))[0] >= -1e-9
     points, fixed = points[outside], fixed[outside]

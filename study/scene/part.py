@@ -1,4 +1,4 @@
-"""A scene without what something does not read, so that it cannot depend on it."""
+"""A scene without the keys that something does not depend on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNSEEN = ("title", "models", "renders", "remarks", "require")
 
 
 def without(scene: Scene, keys: Iterable[str]) -> Scene:
-    """The scene with the tables and keys of these names, and those of UNSEEN, as by default."""
+    """The scene with these tables and keys, and those of UNSEEN, at their defaults."""
     for key in (*UNSEEN, *keys):
         table, _, name = key.partition(".")
         value = _reset(getattr(scene, table), name) if name else _default(Scene, table)

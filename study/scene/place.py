@@ -1,4 +1,4 @@
-"""Places on the organ, from a side, a share of its bounding box, or coordinates."""
+"""Places on the organ: from a side, by fractions of its bounding box, or by coordinates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OUTWARD: dict[Side, Floats] = {
 
 
 def resolve(place: Place, surface: SurfaceMesh) -> tuple[Floats, Floats]:
-    """Point [m] (3,) of a place, and the outward normal of the surface there or nearest to it."""
+    """Point [m] (3,) of a place, and the outward normal of the surface at or nearest to it."""
     lower, upper = surface.points.min(axis=0), surface.points.max(axis=0)
     if place.side is not None and place.at is not None:
         return _from_side(place.side, place.at, surface, lower, upper)
@@ -62,7 +62,7 @@ def refuse_far(places: Mapping[str, Place], surface: SurfaceMesh, offset: Floats
 def _from_side(
     side: Side, at: tuple[float, float], surface: SurfaceMesh, lower: Floats, upper: Floats
 ) -> tuple[Floats, Floats]:
-    """Where a ray from the side first meets the surface, or the surface nearest to that ray."""
+    """Where a ray from the side first meets the surface, or the point nearest to that ray."""
     outward = OUTWARD[side]
     axis = int(np.abs(outward).argmax())
     lateral = [i for i in range(3) if i != axis]
@@ -85,7 +85,7 @@ def _from_side(
 
 
 def depths(point: Floats, direction: Floats, surface: SurfaceMesh) -> Floats:
-    """How far [m] (hits,) along a unit vector from a point the surface that faces it is met."""
+    """Distances [m] (hits,) along a unit vector at which a ray meets the surface facing it."""
     corner = surface.points[surface.triangles]
     normal = _unit_normals(corner)
     first = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
@@ -97,7 +97,7 @@ def depths(point: Floats, direction: Floats, surface: SurfaceMesh) -> Floats:
 
 
 def _triangles_under(corner: Floats, target: Floats) -> NDArray[np.bool_]:
-    """Whether a projected triangle (k, 3, 2) covers a point; edges count."""
+    """Whether a projected triangle (k, 3, 2) contains a point; edges count."""
     a, b, c = (corner[:, i] - target for i in range(3))
     station_loads: Floats = np.stack([_cross(a, b), _cross(b, c), _cross(c, a)])
     slack = 1e-12 * np.abs(station_loads).sum(axis=0)
@@ -114,7 +114,7 @@ def _unit_normals(corner: Floats) -> Floats:
 
 
 def _nearest(point: Floats, surface: SurfaceMesh) -> tuple[Floats, Floats]:
-    """Nearest point of the surface and its normal: on each triangle's inside, edges or corners."""
+    """Nearest point of the surface and its normal: on faces, edges or corners of triangles."""
     corner = surface.points[surface.triangles]
     normal = _unit_normals(corner)
     candidates = np.concatenate([_onto_plane(point, corner, normal), *_onto_edges(point, corner)])
@@ -123,7 +123,7 @@ def _nearest(point: Floats, surface: SurfaceMesh) -> tuple[Floats, Floats]:
 
 
 def _onto_plane(point: Floats, corner: Floats, normal: Floats) -> Floats:
-    """Projections that fall inside their triangle; elsewhere a corner stands in."""
+    """Projections that fall inside their triangle; elsewhere a corner in their place."""
     foot = point - np.einsum("kd,kd->k", point - corner[:, 0], normal)[:, None] * normal
     sides = np.roll(corner, -1, axis=1) - corner
     station_loads = (np.cross(sides, foot[:, None] - corner) @ normal[:, :, None])[..., 0]

@@ -1,4 +1,4 @@
-"""The problem that a scene poses: its organ built, support, tool and probes placed on it."""
+"""The problem of a scene: its organ built, with supports, tools and control points placed on it."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ SURFACE_POINTS = 6
 VOLUME_POINTS = 2
 AXES = "xyz"
 OUTSIDE = -0.1
-"""Barycentric coordinate below which a point is not merely off by rounding or a flat facet."""
+"""Barycentric coordinate below which a point is outside by more than rounding or a flat facet."""
 
 
 def problem_of(scene: Scene) -> Problem:
-    """Build the organ and place support, tool and probes on it.
+    """Build the organ and place supports, tools and control points on it.
 
-    Raises ValueError naming the key whose support or tool misses the organ.
+    Raises ValueError naming the key of a support or tool that misses the organ.
     """
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
@@ -98,7 +98,7 @@ def problem_of(scene: Scene) -> Problem:
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, Place]]:
-    """Every place that a scene states, by its key."""
+    """Every place in a scene, by its key."""
     yield from ((f"control_points.{name}", one) for name, one in scene.control_points.items())
     for name, tool in zip(_names("tool", len(scene.tools)), scene.tools, strict=True):
         yield f"{name}.place", tool.place
@@ -113,14 +113,14 @@ def _places(scene: Scene) -> Iterator[tuple[str, Place]]:
 
 
 def _names(table: str, count: int) -> list[str]:
-    """Names of tables of which the first has no number."""
+    """Names of tables, of which the first has no number."""
     return [table, *(f"{table}.{n}" for n in range(2, count + 1))]
 
 
 def _probes(scene: Scene, surface: SurfaceMesh, loads: Sequence[Load]) -> dict[str, Floats]:
-    """Control points [m] (3,) by name; by default those of the tissue where the tool is placed.
+    """Control points [m] (3,) by name; by default the tissue at the tool.
 
-    Of one that travels, where its path ends too.
+    Of a travelling tool also at the end of its path.
     """
     if scene.control_points:
         return {name: resolve(one, surface)[0] for name, one in scene.control_points.items()}
@@ -132,7 +132,7 @@ def _probes(scene: Scene, surface: SurfaceMesh, loads: Sequence[Load]) -> dict[s
 
 
 def _loads(tool: Tool, name: str, surface: SurfaceMesh) -> tuple[Load, ...]:
-    """A blunt tool as a load, or one at each station of its path; a moved one where it starts."""
+    """A blunt tool as a load, or one per station of its path; a moved tool at its start."""
     patch = _tool(tool, name, surface)
     if tool.travels:
         return travelling(tool, patch, surface)
@@ -140,7 +140,7 @@ def _loads(tool: Tool, name: str, surface: SurfaceMesh) -> tuple[Load, ...]:
 
 
 def _further_loads(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Iterator[Load]:
-    """Further tools of a given force. ValueError naming one that touches nothing."""
+    """Further tools of given force. ValueError naming one that touches nothing."""
     for number, one in enumerate(scene.further_tools, 2):
         if not one.is_moved:
             name = f"tool.{number}"
@@ -150,15 +150,15 @@ def _further_loads(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Ite
 
 
 def _moved(scene: Scene) -> list[tuple[str, Tool]]:
-    """Tools that are moved, by the names of their tables."""
+    """Moved tools by the names of their tables."""
     named = zip(_names("tool", len(scene.tools)), scene.tools, strict=True)
     return [(name, one) for name, one in named if one.is_moved]
 
 
 def _rigid(name: str, tool: Tool, surface: SurfaceMesh, rule: SurfaceRule) -> RigidTool:
-    """A tool that starts off the surface that it touches first, and faces as it would push.
+    """A rigid tool at its first contact with the surface, facing as it would push.
 
-    Over a surface that is not square to it a tool whose tip is at its place would start inside.
+    On an inclined surface, a tool whose tip is at its place would start inside the organ.
     """
     patch = _tool(tool, name, surface)
     bonded = tool.contact == BONDED
@@ -182,7 +182,7 @@ def _rigid(name: str, tool: Tool, surface: SurfaceMesh, rule: SurfaceRule) -> Ri
 
 
 def _extent(tool: Tool, patch: ToolPatch, times: Floats) -> Floats:
-    """How far a tool is moved, or how hard it pushes, at times [s], up to a factor."""
+    """Displacement of a moved tool, or force of a blunt one, at times [s], up to a factor."""
     if not tool.is_moved:
         return tool.history.factor(times)
     return np.asarray(_travel(tool, patch.direction)(times) @ patch.direction)
@@ -215,7 +215,7 @@ def _weights(scene: Scene, surface: SurfaceMesh, rule: SurfaceRule) -> Iterator[
 def point_problem_of(scene: Scene) -> PointProblem:
     """The single control mass point of a scene.
 
-    Its mass is declared, or that for which eq. (2) meets the benchmark's gamma_0.
+    Its mass is as declared, or such that eq. (2) meets the benchmark's gamma_0.
     """
     from msm.control_point import mass_that_meets
 
@@ -234,7 +234,7 @@ def point_problem_of(scene: Scene) -> PointProblem:
 
 
 def geometry_of(organ: Organ, element_size: float) -> Geometry:
-    """Meshes of an organ, of elements of about `element_size` [m]. ValueError if it has none."""
+    """Meshes of an organ with elements of about `element_size` [m]. ValueError if it has none."""
     if organ.mesh is not None:
         how = (organ.axes, organ.pieces)
         return shapes.from_file(Path(organ.mesh), organ.unit, element_size, *how)
@@ -244,7 +244,7 @@ def geometry_of(organ: Organ, element_size: float) -> Geometry:
 
 
 def _support(scene: Scene, surface: SurfaceMesh) -> Support:
-    """All supports, a single foundation as it is. ValueError naming one that holds no surface."""
+    """All supports, or a single foundation itself. ValueError naming one that holds no surface."""
     parts = []
     rule = over_surface(surface, SURFACE_POINTS)
     for number, one in enumerate(scene.supports, 1):
@@ -258,7 +258,7 @@ def _support(scene: Scene, surface: SurfaceMesh) -> Support:
 
 
 def _extent_of(support: SupportTable, surface: SurfaceMesh) -> Foundation:
-    """Where a support is, as the foundation that would be there."""
+    """The extent of a support, as the foundation that would be there."""
     outward = OUTWARD[support.side]
     level = float((surface.points @ outward).max())
     if support.place is None:
@@ -276,7 +276,7 @@ def _held(support: SupportTable, extent: Foundation) -> Support:
 
 
 def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
-    """Tool pushing along its direction, or straight in from its side, or against the surface."""
+    """A tool that pushes along its direction, or inwards from its side, or against the surface."""
     centre, normal = resolve(tool.place, surface)
     if tool.direction is not None:
         direction = np.array(tool.direction)
@@ -294,7 +294,7 @@ def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
 
 
 def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...]) -> None:
-    """A probe beside the organ would be extrapolated, and scored, without meaning."""
+    """Refuse control points outside the organ, where the field would be extrapolated."""
     outside = locate(mesh, probes)[1].min(axis=1) < OUTSIDE
     if outside.any():
         name = names[int(outside.argmax())]
@@ -304,7 +304,7 @@ def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...])
 
 
 def _check_held(support: Support, rule: SurfaceRule) -> None:
-    """A body that may move freely has no rest, and no motion that is of interest."""
+    """Refuse a body with a free rigid motion: it has no rest."""
     free = free_motion(support, rule.points, rule.normals, rule.weights)
     if free is not None:
         shift, turn = np.abs(free[0]), np.abs(free[1])

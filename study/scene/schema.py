@@ -23,7 +23,7 @@ Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
 Component = Annotated[float, Quantity("", -1.0, 1.0)]
 
 TOOL_POINT, END_POINT = "tool", "tool-end"
-"""Names of the control points of a scene that has none: at the tool, and where its path ends."""
+"""Names of the default control points: at the tool, and where its path ends."""
 
 Side = Literal["right", "left", "anterior", "posterior", "inferior", "superior"]
 SystemName = Annotated[str, Choice("fuzzy.systems.kinds:SYSTEMS")]
@@ -49,9 +49,9 @@ Aetiology = Annotated[str, Choice("fuzzy.liver.table1:AETIOLOGIES")]
 class Place:
     """A place on or in the organ, given in one of three ways.
 
-    `side` and `at`: seen from that side, two fractions of the bounding box along its two other axes
-    (in the order x, y, z), on the first surface met. `fraction`: three fractions of the bounding
-    box. `point`: coordinates [m]. The last two move to the nearest surface if `snap` is set.
+    `side` and `at`: seen from that side, two fractions of the bounding box along its other axes (in
+    the order x, y, z), on the first surface met. `fraction`: three fractions of the bounding box.
+    `point`: coordinates [m]. The last two move to the nearest surface if `snap` is set.
     """
 
     side: Side | None = None
@@ -66,11 +66,11 @@ class Organ:
     """The shape: a built-in one, or a mesh file, which takes precedence.
 
     `volume` scales the built-in liver, `size` is the block's. `point` is a single control mass
-    point without a mesh; its mass is `mass`, or, without one, that for which eq. (2) at the scene's
-    damping ratio meets the benchmark's gamma_0. Of a mesh file: its length `unit`; its `axes`, the
-    sides of the patient to which x, y and z point, for example RAS, LPS where they are not stated;
-    whether the largest of several `pieces` is kept or they are refused; keys of the scene to
-    `suit` to it (`study.run.suiting`): in a built-in scene those that are not overridden.
+    point without a mesh; its `mass`, if not given, is such that eq. (2) at the scene's damping
+    ratio meets the benchmark's gamma_0. For a mesh file: its length `unit`; its `axes`, the sides
+    of the patient to which x, y and z point, for example RAS, with LPS as default; whether the
+    largest of several `pieces` is kept or they are refused; keys of the scene to `suit` to it
+    (`study.run.suiting`): in a built-in scene those that are not overridden.
     """
 
     shape: Literal["liver", "block", "point"] = "liver"
@@ -88,9 +88,9 @@ class Organ:
 class Support:
     """What holds the surface that faces `side`, down to `depth` from its extreme point.
 
-    Or, with a `place`, the surface within a `radius` of it, whichever way it faces. A foundation is
-    elastic, its `stiffness` a traction per displacement [Pa/m]; a clamped surface does not move, a
-    sliding one not along the line to `side`.
+    Or, with a `place`, the surface within a `radius` of it, whatever its orientation. A foundation
+    is elastic, its `stiffness` a traction per displacement [Pa/m]; a clamped surface is fixed, a
+    sliding one is fixed along the line to `side`.
     """
 
     kind: Annotated[str, Choice("study.problem.supports:KINDS")] = "foundation"
@@ -103,11 +103,11 @@ class Support:
 
 @dataclass(frozen=True, kw_only=True)
 class Inclusion:
-    """Tissue of another stiffness than that around it, which an estimate is of.
+    """Tissue with another stiffness than the surrounding tissue, to which an estimate refers.
 
-    A ball of a `radius` or an ellipsoid of `semi_axes` along x, y and z about a `place`, or what a
-    closed `mesh` encloses, in its `unit` and `axes` as of the organ's file. Poisson ratio and
-    density are those of the tissue around unless they are given.
+    A ball of a `radius` or an ellipsoid of `semi_axes` along x, y and z about a `place`, or the
+    inside of a closed `mesh`, in its `unit` and `axes` as for the organ's file. Poisson ratio and
+    density are those of the surrounding tissue unless given.
     """
 
     youngs_modulus: Annotated[float, Quantity("Pa", 10.0, 1e9)]
@@ -123,11 +123,11 @@ class Inclusion:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessMap:
-    """A modulus at each voxel of a NIfTI image, as elastography gives it.
+    """A modulus at each voxel of a NIfTI image, as from elastography.
 
-    `quantity` in a `unit`; of a shear modulus Young's follows with the tissue's Poisson ratio. The
-    image's own affine takes voxels to millimetres in RAS. Where it has no value, or none above
-    zero, the tissue is as around, or the scene is refused, as `elsewhere` says.
+    `quantity` in a `unit`; Young's modulus follows from a shear modulus with the tissue's Poisson
+    ratio. The image's own affine maps voxels to millimetres in RAS. Where it has no value, or none
+    above zero, the surrounding tissue applies, or the scene is refused, as `elsewhere` says.
     """
 
     file: str
@@ -138,7 +138,7 @@ class StiffnessMap:
 
 @dataclass(frozen=True, kw_only=True)
 class OrganTissue(Tissue):
-    """The tissue of the organ, and what differs from it in places; an inclusion outdoes the map."""
+    """The tissue of the organ and its heterogeneity; an inclusion takes precedence over the map."""
 
     inclusion: tuple[Inclusion, ...] = ()
     stiffness_map: StiffnessMap | None = None
@@ -151,9 +151,10 @@ class OrganTissue(Tissue):
 
 @dataclass(frozen=True, kw_only=True)
 class Waypoint:
-    """Where a tool is at a time: how far along its direction, or how far in x, y and z.
+    """Position of a tool at a time: along its direction, or as an offset in x, y and z.
 
-    Of a rigid one its tip. Of a blunt one, which has offsets alone, what is across its push counts.
+    For a rigid tool the position of its tip. A blunt tool has offsets only, whose part across its
+    push counts.
     """
 
     time: Annotated[float, Quantity("s", 0.0, 3600.0)]
@@ -165,12 +166,11 @@ class Waypoint:
 class Tool:
     """A tool: where it touches, which way it faces (inwards by default), and what drives it.
 
-    A blunt one is a smooth pressure of a given `force`, over time as its `history`; on a `path` it
-    travels over the surface, starting at its `place`. The other
-    shapes are rigid and moved: by a `displacement` along the direction, over time as its `history`,
-    or on a `path` of straight pieces; their tip starts at `place`, `clearance` off the surface.
-    `contact`: bonded to what they touch at the start, or pressing only, with `friction` by
-    Coulomb's coefficient.
+    A blunt tool is a smooth pressure of a given `force`, over time as its `history`; on a `path` it
+    travels over the surface, starting at its `place`. The other shapes are rigid and moved: by a
+    `displacement` along the direction, over time as its `history`, or on a `path` of straight
+    pieces; their tip starts at `place`, with a `clearance` from the surface. `contact`: bonded to
+    what they touch at the start, or unilateral, with Coulomb's coefficient `friction`.
     """
 
     place: Place = field(default_factory=lambda: Place(side="anterior", at=(0.3, 0.5)))
@@ -187,18 +187,18 @@ class Tool:
 
     @property
     def is_moved(self) -> bool:
-        """Whether it is a rigid one, whose force is a result."""
+        """Whether it is a rigid tool, whose force is a result."""
         return self.shape != "blunt"
 
     @property
     def travels(self) -> bool:
-        """Whether it is a blunt one whose place changes."""
+        """Whether it is a blunt tool whose place changes."""
         return not self.is_moved and bool(self.path)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gravity:
-    """Of an `acceleration` `towards` a side of the organ.
+    """Gravity of an `acceleration` `towards` a side of the organ.
 
     `given`: whether the shape is that of the unloaded organ, or that at rest under gravity.
     """
@@ -210,7 +210,7 @@ class Gravity:
 
 @dataclass(frozen=True, kw_only=True)
 class AttachedWeight:
-    """A body of a mass fixed on a patch of the surface."""
+    """A body of a mass attached to a patch of the surface."""
 
     place: Place
     mass: Annotated[float, Quantity("kg", 1e-9, 100.0)]
@@ -219,7 +219,7 @@ class AttachedWeight:
 
 @dataclass(frozen=True, kw_only=True)
 class Patient:
-    """Elastography reading per aetiology [Pa]; `fuzzy.absent` says what one not given means."""
+    """Elastography reading per aetiology [Pa]; `fuzzy.absent` says what a missing one means."""
 
     hcv: Reading | None = None
     hbv: Reading | None = None
@@ -230,14 +230,14 @@ class Patient:
 
 @dataclass(frozen=True, kw_only=True)
 class Fuzzy:
-    """Which fuzzy systems estimate the stiffness, and the readings of the paper they adopt.
+    """The fuzzy systems that estimate the stiffness, and the interpretations of the paper they use.
 
-    `knowledge`: the base of sets and rules. Of the base severity, `reading` of Table I by name,
+    `knowledge`: the base of sets and rules. For the base severity: `reading` of Table I by name,
     `consequent` of a combination, `placement` of the sets on elastography data. `footprint` of
-    uncertainty and its factor on the published spread, what an `absent` reading does; then how the
-    systems are evaluated. `surface`: the two readings of the output surfaces.
+    uncertainty and its factor on the published spread, the meaning of an `absent` reading; then how
+    the systems are evaluated. `surface`: the two readings of the output surfaces.
     `sensitivity_readings`: readings over which each of these choices is varied. `rule_base`: a
-    fuzzy system of one's own (.fis or .json) instead, which answers in `unit` to `inputs`, its
+    fuzzy system of the user's (.fis or .json) instead, which answers in `unit` to `inputs`, its
     readings by name in its own units.
     """
 
@@ -268,10 +268,10 @@ class Lattice:
     `springs`: those of a cubic lattice of this spacing, or one along each edge of the organ's
     finite-element mesh. `law` of the fuzzy-tuned springs, linear if none is given. `volume_term`
     gives these models the tissue's Poisson ratio; without it every cubic lattice of springs has
-    1/4. `geometry`: whether forces follow the deformed lattice. `precision` of the steps; what
-    single costs is measured by a run in double beside it. The step is at most
-    `step_fraction` of the critical one, which is followed as the body deforms, unless `time_step`
-    or `step_rate` fixes it.
+    1/4. `geometry`: whether forces follow the deformed lattice. `precision` of the steps; the error
+    of single precision is measured by a second run in double. The step is at most `step_fraction`
+    of the critical one, which is updated as the body deforms, unless `time_step` or `step_rate`
+    fixes it.
     """
 
     springs: Literal["lattice", "tetrahedra"] = "lattice"
@@ -316,15 +316,15 @@ class BasafaConstants:
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Finite-element reference: elements, their size (edge of the mesh lattice), motion in time.
+    """Finite-element reference: elements, their size (edge of the mesh lattice), time method.
 
-    With `accuracy`, a relative error, a finer mesh is taken until the displacement of each control
-    point is estimated to be as accurate. `element`: auto is quadratic, with a pressure of its own
-    above a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of
-    `modes` modes of vibration, or steps of TR-BDF2 or HHT-alpha. `steps_per_sample`: of these, or
-    for the load of a superposition 16 times as many; by default as many steps as the motion needs,
-    however often it is sampled. `large_strain`: law of a static solution beside it where strains
-    exceed what linear elasticity is good for.
+    With `accuracy`, a relative error, the mesh is refined until the displacement of each control
+    point is estimated to be as accurate. `element`: auto is quadratic, with a pressure field above
+    a Poisson ratio of 0.48. `method`: superposition of load-dependent Ritz vectors or of `modes`
+    modes of vibration, or steps of TR-BDF2 or HHT-alpha. `steps_per_sample`: of these, or for the
+    load of a superposition 16 times as many; by default as many steps as the motion needs, however
+    often it is sampled. `large_strain`: law of a static solution for comparison, where strains
+    exceed the validity of linear elasticity.
     """
 
     element: ElementName = "auto"
@@ -339,10 +339,10 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class Superposition:
-    """Of the model of that name: Ritz vectors or modes of vibration, and how many.
+    """Settings of the model of that name: Ritz vectors or modes, and their number.
 
-    `certificate`: vectors of a longer Krylov space by which the error of these few is bounded; with
-    0 it is not.
+    `certificate`: vectors of a longer Krylov space that bounds the error of these few; 0 for no
+    bound.
     """
 
     vectors: Literal["ritz", "modal"] = "ritz"
@@ -352,9 +352,10 @@ class Superposition:
 
 @dataclass(frozen=True, kw_only=True)
 class Corrected:
-    """Of the model of that name: `spacing` of its coarse lattice, else twice `lattice.spacing`.
+    """Settings of the model of that name: `spacing` of its coarse lattice.
 
-    `coarse`: that lattice, or a graded one as the table `region` has it, in place of a `spacing`.
+    By default twice `lattice.spacing`. `coarse`: uniform, or graded as the table `region` says,
+    without a `spacing`.
     """
 
     spacing: Length | None = None
@@ -363,11 +364,11 @@ class Corrected:
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Of the model of that name: `spacing` of its finest cells, else half of `lattice.spacing`.
+    """Settings of the model of that name: `spacing` of its finest cells.
 
-    They reach out to `radius` from the tools and from the control points `at`, or as far as
-    `tolerance` asks for, a relative difference from the finest cells throughout. Beyond, cells
-    double up to `levels` sizes in all.
+    By default half of `lattice.spacing`. They extend to `radius` from the tools and from the
+    control points `at`, or as far as `tolerance` requires, a relative difference from the finest
+    cells throughout. Beyond, cells double up to `levels` sizes in all.
     """
 
     spacing: Length | None = None
@@ -387,12 +388,12 @@ class Time:
 
 @dataclass(frozen=True, kw_only=True)
 class Require:
-    """What is wanted of a scene, from which `study.plan` derives what of it is modelled.
+    """Requirements of a scene, from which `study.plan` derives what is modelled.
 
     `quantities`: the rest under the full load, the history of the motion, the largest force of
-    tools that are moved, and with "field" the whole organ beside the control points `at`, all by
-    default. `error`: relative, the largest of these; `rate`: states per second in real time;
-    `memory` on top of the program's own.
+    moved tools, and with "field" the whole organ beside the control points `at`, all by default.
+    `error`: relative, the largest of these; `rate`: states per second in real time; `memory` in
+    addition to the program's own.
     """
 
     quantities: tuple[Quantities, ...] = ("history",)
@@ -403,7 +404,7 @@ class Require:
 
     @property
     def moves(self) -> bool:
-        """Whether anything is to be stepped in time, and not only brought to rest."""
+        """Whether a motion is required, and not only the state at rest."""
         return not {"history", "peak-force"}.isdisjoint(self.quantities)
 
 
@@ -412,8 +413,7 @@ class Scene:
     """A whole scene. `models`: `msm` stands for one mass-spring model per fuzzy system.
 
     `tool`: the first, or in a file [[tool]], each of several; `further_tools` are the others;
-    likewise `support`.
-    `remarks`: sentences that stand among the notes of its results.
+    likewise `support`. `remarks`: sentences that are added to the notes of its results.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic's name; nested ones inherit
@@ -445,24 +445,24 @@ class Scene:
 
     @property
     def tools(self) -> tuple[Tool, ...]:
-        """All of them."""
+        """All tools."""
         return (self.tool, *self.further_tools)
 
     @property
     def probes(self) -> tuple[str, ...]:
-        """Names of the control points of an organ; no end of a path that comes back."""
+        """Names of the control points of an organ; without an end for a path that returns."""
         path = self.tool.path
         ends = (END_POINT,) if self.tool.travels and path[-1].offset != path[0].offset else ()
         return tuple(self.control_points) or (TOOL_POINT, *ends)
 
     @property
     def supports(self) -> tuple[Support, ...]:
-        """All of them."""
+        """All supports."""
         return (self.support, *self.further_supports)
 
     @property
     def features(self) -> tuple[str, ...]:
-        """What not every model can follow: names of `study.problem.features.FEATURES`."""
+        """Features that not every model supports: names of `study.problem.features.FEATURES`."""
         asked = {
             "moved-tools": any(tool.is_moved for tool in self.tools),
             "several-loads": any(not tool.is_moved for tool in self.further_tools),

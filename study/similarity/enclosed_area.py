@@ -37,7 +37,7 @@ def _crossing_ordinates(start: Floats, end: Floats) -> Floats:
     crossing = turn != 0.0
     first, second, turn = first[crossing], second[crossing], turn[crossing]
     apart = start[second] - start[first]
-    # A share beyond double range is none: the edges are parallel to rounding.
+    # A share beyond the double range means edges that are parallel up to rounding: no crossing.
     with np.errstate(over="ignore"):
         share = _cross(apart, along[second]) / turn
         other = _cross(apart, along[first]) / turn
@@ -63,7 +63,7 @@ def _between_levels(start: Floats, end: Floats, levels: Floats) -> float:
     abscissa = start[edge, 0] + share * (end[edge, 0] - start[edge, 0])
     order = np.lexsort([abscissa, slab])
     edge, slab, abscissa = edge[order], slab[order], abscissa[order]
-    # As many edges rise in a slab as fall, so the sum starts anew from 0 in each.
+    # In each slab as many edges rise as fall, so the cumulative sum returns to 0.
     winding = np.abs(np.cumsum(np.where(rising[edge], 1, -1)))[:-1]
     heights = np.diff(levels)[slab[:-1]]
     return float(np.sum(winding * heights * np.diff(abscissa)))

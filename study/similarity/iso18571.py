@@ -99,7 +99,7 @@ def _correlation(x: Floats, y: Floats) -> float:
     """Pearson's coefficient; -inf, so never the best, where either curve is constant."""
     dx, dy = x - x.mean(), y - y.mean()
     xx, yy = dx @ dx, dy @ dy
-    # What rounding of the mean leaves of a constant is below 1e-15 of its size.
+    # The mean of a constant is exact to 1e-15 of its size.
     if xx <= 1e-24 * (x @ x) or yy <= 1e-24 * (y @ y):
         return -math.inf
     return float(dx @ dy / math.sqrt(xx * yy))

@@ -10,7 +10,7 @@ from study.problem.response import Motion
 Floats = NDArray[np.float64]
 
 SAMPLE_MINIMUM = 8
-# SI sizes no organ reaches; between them, squares and products of samples stay in double range.
+# SI values that no organ reaches, within which squares and products stay in the double range.
 LARGEST, SMALLEST = 1e30, 1e-30
 
 

@@ -48,9 +48,9 @@ def leash(gaps: Floats) -> float:
     at once, as none of them needs another.
     """
     n, m = gaps.shape
-    at = np.full((n + m - 1, n), np.inf)  # by i + j and i; infinite where there is no j
+    at = np.full((n + m - 1, n), np.inf)  # indexed by i + j and i; infinite where j is out of range
     at[np.add.outer(np.arange(n), np.arange(m)), np.arange(n)[:, None]] = gaps
-    before, last = np.full((2, n + 1), np.inf)  # of two and of one step less, by i + 1
+    before, last = np.full((2, n + 1), np.inf)  # the two previous diagonals, indexed by i + 1
     before[0] = -np.inf  # the walk starts without a gap
     for gap in at:
         here = np.full(n + 1, np.inf)
@@ -75,7 +75,7 @@ def pcm_distance(candidate: Floats, reference: Floats) -> float:
     shorter, longer = sorted(comparable(candidate, reference), key=lambda c: arc_length(c)[-1])
     own, other = arc_length(shorter), arc_length(longer)
     offsets = np.linspace(0.0, other[-1] - own[-1], OFFSET_COUNT)
-    position = other - offsets[:, None]  # along the shorter curve; np.interp holds its ends
+    position = other - offsets[:, None]  # along the shorter curve; np.interp extends its ends
     gaps = np.hypot(*(np.interp(position, own, shorter[:, k]) - longer[:, k] for k in (0, 1)))
     return float(np.trapezoid(gaps, other, axis=1).min() / other[-1])
 

@@ -34,7 +34,7 @@ def _cheapest_steps(x: Floats, y: Floats, half_width: int) -> tuple[Choices, Ind
     first = np.maximum(np.maximum(0, rank - n + 1), (rank - half_width + 1) // 2)
     last = np.minimum(np.minimum(n - 1, rank), (rank + half_width) // 2)
     steps = np.zeros((len(rank), int((last - first).max()) + 1), dtype=np.uint8)
-    # By i + 1, with a border that no path crosses.
+    # Indexed by i + 1, with an infinite border that no path crosses.
     before, last_but_one, row = (np.full(n + 2, np.inf) for _ in range(3))
     before[1] = (x[0] - y[0]) ** 2
     for k, a, b in zip(range(1, len(first)), first[1:], last[1:] + 1, strict=True):
@@ -42,7 +42,7 @@ def _cheapest_steps(x: Floats, y: Floats, half_width: int) -> tuple[Choices, Ind
         best = totals.argmin(axis=0)
         steps[k, : b - a] = best
         row[a + 1 : b + 1] = (x[a:b] - y[k - b + 1 : k - a + 1][::-1]) ** 2 + totals.min(axis=0)
-        row[a], row[b + 1] = np.inf, np.inf  # what an older row left beside the band
+        row[a], row[b + 1] = np.inf, np.inf  # clear entries of an older row beside the band
         before, last_but_one, row = row, before, last_but_one
     return steps, first
 

@@ -121,7 +121,7 @@ def _named(thing: Any, modules: set[str]) -> Any:
     """Module and name of a class or function defined at the top level of a module."""
     if thing.__module__ == "builtins":
         return thing.__qualname__
-    if "<" in thing.__qualname__:  # within a function, and so of what that was given
+    if "<" in thing.__qualname__:  # a closure depends on values that are not described
         raise NoFingerprintError(f"{thing.__qualname__} is made within a function")
     modules.add(thing.__module__)
     return f"{thing.__module__}:{thing.__qualname__}"

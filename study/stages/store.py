@@ -90,7 +90,7 @@ class Store:
             if found is None:
                 path.unlink()
             else:
-                os.utime(path)  # used now: the last to be removed
+                os.utime(path)  # most recently used: removed last
         return found
 
     def put(self, key: str, value: Any, arrays: Arrays, wall: float) -> Entry:

@@ -36,9 +36,9 @@ def attempt(function: str, arguments: str, identity: str) -> Attempt:
     start = time.perf_counter()
     try:
         called = getattr(importlib.import_module(module), name)
-        start = time.perf_counter()  # a first import is no part of the run
+        start = time.perf_counter()  # the first import is not part of the time
         value = _plain(called(**json.loads(arguments)))
-    except Exception as error:  # the run's own, whatever it is
+    except Exception as error:  # any exception of the run is its outcome
         message = f"{type(error).__name__}: {error}"
         return Attempt("failed", None, message, time.perf_counter() - start)
     return Attempt("done", value, "", time.perf_counter() - start)

@@ -73,7 +73,7 @@ class Store:
                 _write(aside, canonical(record | {"sha256": digest(record)}))
                 aside.replace(path)
         finally:
-            with suppress(OSError):  # with its folder
+            with suppress(OSError):  # the folder may not exist
                 aside.unlink(missing_ok=True)
 
     def __iter__(self) -> Iterator[Stored]:

@@ -145,7 +145,7 @@ def _started(client: Client, task: Task, worker: str) -> dict[Future[Attempt], R
         task.function,
         canonical(task.arguments),
         program(task.module),
-        key=f"{task.function}-{uuid.uuid4().hex}",  # of this sweep alone, on a shared scheduler
+        key=f"{task.function}-{uuid.uuid4().hex}",  # unique to this sweep on a shared scheduler
         workers=[worker],
     )
     return {future: Running(task, worker, time.perf_counter())}
@@ -153,7 +153,7 @@ def _started(client: Client, task: Task, worker: str) -> dict[Future[Attempt], R
 
 def _wait(running: dict[Future[Attempt], Running]) -> None:
     """Wait until a task has ended, or until the next check of the workers."""
-    with suppress(TimeoutError, CancelledError):  # a cancelled one is told by its result
+    with suppress(TimeoutError, CancelledError):  # a cancelled task is reported by its result
         distributed.wait(list(running), timeout=POLL, return_when="FIRST_COMPLETED")
 
 
@@ -171,7 +171,7 @@ def _found(future: Future[Attempt], at: Running, alive: set[str]) -> Attempt | N
         return crashed
     except TimeoutError:  # done, but the worker died with the result
         pass
-    except Exception as error:  # it could not even begin
+    except Exception as error:  # the task could not be started
         raise ValueError(
             f"worker {at.worker} cannot run {at.task.function}: {error}; start the workers from "
             "this checkout, in this environment"

@@ -129,7 +129,7 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
         field_error=share * relative_l2(coarser.field, finest.field, volumes),
         curve_errors=share * curves,
         force_errors=over_time,
-        peak_errors=np.maximum(over_time, peak),  # which two lattices may meet in by chance
+        peak_errors=np.maximum(over_time, peak),  # single numbers may coincide
     )
 
 

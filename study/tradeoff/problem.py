@@ -33,7 +33,7 @@ def sampled(scene: Scene) -> Scene:
             'organ.shape: "point" has no displacement field to be accurate in; choose a scene with '
             "an organ"
         )
-    free = replace(scene.lattice, time_step=None, step_rate=None)  # contenders have their own
+    free = replace(scene.lattice, time_step=None, step_rate=None)  # contenders set their own steps
     scene = replace(scene, lattice=free)
     interval = SAMPLING / (_parts(scene) if "moved-tools" in scene.features else 1)
     count = int(scene.time.duration / interval * (1.0 + 1e-9))

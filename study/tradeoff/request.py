@@ -94,7 +94,7 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
     backend = request.backend
-    with study.place(folder) as partial:  # refused now, not after the work
+    with study.place(folder) as partial:  # refuse the folder before the work
         found = study.study(scene, chosen, _store(folder), backend, repeats, progress)
         study.write(found, scene, repeats, partial)
     return [*table.lines(found.entries), *_against(found), f"table in {folder / study.TABLE}"]
@@ -134,7 +134,7 @@ def advise(
     path = request.out or Path(f"{request.name}-{_suffix(wanted, absolute)}.toml")
     check_file(path)
     problem = _set_up(recommend.judged_by(sampled(given)))
-    lattice = model(given, "tissue").varied().prepare(problem)  # one of its spacing
+    lattice = model(given, "tissue").varied().prepare(problem)  # with the scene's own spacing
     if absolute is not None:
         at_rest = model(given, "fem").prepare(problem) if problem.has_further_loads else lattice
         reach = float(np.linalg.norm(at_rest.rest(), axis=1).max())

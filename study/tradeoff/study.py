@@ -158,7 +158,9 @@ def costs(
     `sized`: with the memory that each holds, which makes the setup slower.
     """
     with progress.stage("setting up") as advance:
-        for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
+        for name in dict.fromkeys(
+            one.contender for one in chosen
+        ):  # compile kernels before anything is timed
             _stepper(given, next(one for one in chosen if one.contender == name))
         ready, setups, memories = [], [], []
         for one in chosen:

@@ -84,7 +84,7 @@ class Cost:
         return low / self.step, middle / self.step, high / self.step
 
 
-@dataclass(frozen=True, eq=False)  # a front is of these, not of any that are equal
+@dataclass(frozen=True, eq=False)  # fronts compare by identity
 class Entry:
     """A configuration with its errors and, where it was timed, its cost.
 

@@ -271,7 +271,7 @@ def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
     known = curve.uncertainty is not None
     _refuse_undetermined(slope, free)
     spread = np.sqrt(np.diag(np.linalg.inv(slope.T @ slope)))
-    # A model that does not follow the curve makes the interval wider, never narrower.
+    # A model that does not follow the curve widens the interval, and never narrows it.
     spread *= np.sqrt(max(1.0, variance) if known else variance)
     half = float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * spread
     _refuse_open(best.x, half, limits, free)

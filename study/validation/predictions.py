@@ -179,7 +179,7 @@ def _network(specimen: Specimen, level: int, chosen: _Springs) -> tuple[CellLatt
     volume = none(spacing)
     if chosen.modulus is not None and nu > SPRING_POISSON_RATIO:
         volume = volume_term(lattice, chosen.modulus, nu)
-    layout = connect(lattice, Lattice().flexion)  # as a scene has it by default
+    layout = connect(lattice, Lattice().flexion)  # the default of a scene
     unheld = csr_array((len(mass), len(mass)))
     return lattice, network(layout, mass, unheld, load, volume, UNDAMPED)
 

@@ -221,7 +221,7 @@ def _coarser_settings(model: Model, problem: Problem) -> Iterator[tuple[dict[str
 def _simulated(model: Model, problem: Problem, settings: dict[str, float]) -> Simulation | None:
     try:
         return model.varied(**settings).prepare(problem).simulate()
-    except (TypeError, ValueError):  # it has no such setting, or none that fits
+    except (TypeError, ValueError):  # the model has no such setting, or refuses it
         return None
 
 

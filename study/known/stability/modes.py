@@ -39,7 +39,9 @@ def sharp_limit(integrator: str, omega: Floats, c: float, beta: float) -> float:
         lead = beta * omega**2 - c
         return float(((np.sqrt(lead**2 + 4.0 * omega**2) - lead) / omega**2).min())
     if integrator == "velocity-verlet":
-        return float(2.0 / omega.max())  # half the damping before and half after: none in the limit
+        return float(
+            2.0 / omega.max()
+        )  # damping is split symmetrically and does not affect the limit
     if integrator == "runge-kutta-4":
         return min(_runge_kutta_limit(w, c) for w in omega)
     raise ValueError(f"no sharp limit is known for {integrator}")
@@ -65,7 +67,7 @@ def _over_mass(assembly: Assembly, material: Material) -> Floats:
 def _runge_kutta_limit(omega: float, c: float) -> float:
     """Where |1 + z + z^2/2 + z^3/6 + z^4/24| = 1 for a root z / dt of the mode, by bisection."""
     roots = np.roots([1.0, c, omega**2]).astype(np.complex128)
-    low, high = 0.0, 4.0 / float(np.abs(roots).max())  # outside the region, whatever the angle
+    low, high = 0.0, 4.0 / float(np.abs(roots).max())  # outside the stability region at any angle
     for _ in range(50):
         middle = 0.5 * (low + high)
         z = roots * middle

@@ -111,7 +111,7 @@ def _chi(x: Floats, y: Floats, nu: float) -> tuple[Floats, Floats, Floats]:
     for n in range(1, TERMS + 1):
         k = n * np.pi / B
         c = 4.0 * nu * B**2 * (-1) ** n / (np.pi**2 * n**2) / k
-        # Over cosh(k a), which would overflow by itself.
+        # Divided by cosh(k a), which alone would overflow.
         plus, minus = np.exp(k * (x - A)), np.exp(-k * (x + A))
         rise, level = (f / (1.0 + np.exp(-2.0 * k * A)) for f in (plus - minus, plus + minus))
         chi = chi + c * rise * np.cos(k * y)

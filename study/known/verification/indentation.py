@@ -80,7 +80,9 @@ def exact_force(shape: int, tissue: Tissue, *, bonded: bool) -> float:
     nu, mu = tissue.poisson_ratio, shear_modulus(tissue)
     stiffness = tissue.youngs_modulus / (1.0 - nu**2)
     if shape == SPHERE:
-        return float(4.0 / 3.0 * stiffness * TOUCHED * DEPTH)  # R^(1/2) d^(1/2) is that radius
+        return float(
+            4.0 / 3.0 * stiffness * TOUCHED * DEPTH
+        )  # the contact radius is R^(1/2) d^(1/2)
     if bonded:
         return float(4.0 * mu * TOUCHED * DEPTH * np.log(3.0 - 4.0 * nu) / (1.0 - 2.0 * nu))
     return float(2.0 * stiffness * TOUCHED * DEPTH)

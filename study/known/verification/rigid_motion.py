@@ -22,7 +22,7 @@ def findings() -> Iterator[Finding]:
     body = block(TISSUE, "p2", 0.02)
     elastic = (body.stiffness.matrix - body.support).toarray()
     values = eigh(elastic, body.mass.toarray(), eigvals_only=True, subset_by_index=[0, 6])
-    # A mechanism would make the seventh as small as the sixth.
+    # A mechanism would be a seventh eigenvalue as small as the sixth.
     yield error_of("sixth eigenvalue over the seventh", float(abs(values[5] / values[6])), LIMIT)
     x, y, _ = body.points.T
     along, turning = np.zeros((2, body.node_count, 3))

@@ -71,7 +71,7 @@ def error(name: ElementName, nu: float, layers: int = LAYERS[-1]) -> float:
 def _pressure(points: Floats, normals: Floats) -> Floats:
     """Traction [Pa] against the outward normal of the inner sphere."""
     inside = np.linalg.norm(points, axis=-1) < 0.5 * (INNER + OUTER)
-    # Only the spheres have normals along the radius; planes of symmetry have them across.
+    # Only the spheres have radial normals; those of the symmetry planes are tangential.
     radial = np.abs((points * normals).sum(axis=-1)) > 0.5 * np.linalg.norm(points, axis=-1)
     return np.asarray(np.where((inside & radial)[..., None], -PRESSURE * normals, 0.0))
 

@@ -56,7 +56,7 @@ def octant() -> Iterator[Finding]:
             tissue = Tissue(poisson_ratio=nu)
             body = solid(curved(*ball_octant(refinements)), name, tissue)
             plane = body.points < 1e-9
-            # What lies along a plane is held: a component is, on the planes of both others.
+            # A symmetry plane fixes tangential components here, so each is fixed on two planes.
             held = np.roll(plane, 1, axis=1) | np.roll(plane, 2, axis=1)
             means.append(float(_frequencies(body, tissue, ~held.ravel(), 2).mean()))
         order = observed_order([abs(mean - exact()) for mean in means])

@@ -80,7 +80,7 @@ def history(integrator: str, nu: float | None, *, linear: bool, steps: int) -> F
     for i in range(found.size):
         method.advance(material.law, net, factors, dt, u, v)
         at_once = v
-        if integrator == "symplectic-euler":  # its velocities lag half a step behind
+        if integrator == "symplectic-euler":  # its velocities are staggered by half a step
             internal_forces(material.law, net, u, force)
             at_once = v + 0.5 * dt * force / net.mass[:, None]
         found.flat[i] = energy.kinetic(net, at_once) + energy.potential(k, net, u)

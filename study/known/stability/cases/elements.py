@@ -116,7 +116,7 @@ def leaps(method: str) -> Finding:
     """Steps far longer than any period, under a constant load with damping."""
     body = pressed.column(block_mesh(COLUMN, CELL), Tissue(), "p2")
     system = Oscillator(body.mass, body.stiffness, body.load, RayleighDamping(10.0))
-    # HHT's first step overshoots by (omega dt)^2, of which each step leaves nine tenths.
+    # HHT's first step overshoots by (omega dt)^2; each further step leaves nine tenths of it.
     scheme, count = {"tr-bdf2": (march, 100), "hht-alpha": (hht, 800)}[method]
     *_, (u, _) = scheme(system, np.ones_like, 1e4, count)
     return beside(solve_static(body), u)

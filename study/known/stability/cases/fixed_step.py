@@ -58,7 +58,7 @@ def held(integrator: str, times: float) -> Finding:
     """A linear lattice under an uneven load at `times` its critical step."""
     assembly, material = _uneven()
     limit = critical_time_step(assembly, material, integrator)
-    if integrator == "split-volume":  # the run's limit is the cautious one of springs alone
+    if integrator == "split-volume":  # the run uses the conservative limit of springs alone
         limit = split_limit(assembly, material)
     dt = times * limit
     far = DIVERGED_SIZE * float(np.ptp(assembly.lattice.nodes, axis=0).max())

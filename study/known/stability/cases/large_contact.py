@@ -39,7 +39,7 @@ FAMILY = Family("large strain in contact", __name__)
 
 def cases() -> Iterator[Case]:
     """Cases by what is extreme."""
-    # Waves of the tissue are slower than the last: what is hit piles up in less than an element.
+    # The last speed exceeds the wave speed: the material piles up within one element.
     for speed in (0.1, 1.0, 10.0):
         yield _case(f"impact at {speed:g} m/s", {"speed": speed})
     yield _case("sphere sunk by more than its radius", {"depth": 0.02})

@@ -81,7 +81,7 @@ def stretch(law: str, pressure: float) -> Finding:
     message = path.failure and f"{path.failure}; compared at {path.reached:g} of it"
     if not path.converged:
         path = solve(body, TISSUE, law, (path.reached,))
-    # Height of the top over that of the base, both by their mean.
+    # Mean height of the top minus mean height of the base.
     u = path.states[-1].displacement.reshape(-1, 3)
     top, base = (np.abs(body.points[:, 2] - z) < 1e-9 for z in (EDGE, 0.0))
     found = 1.0 + (u[top, 2].mean() - u[base, 2].mean()) / EDGE

@@ -53,7 +53,7 @@ def cases() -> Iterator[Case]:
         yield _case(f"impact at {speed:g} m/s", [*times, *samples], quick=speed == 1.0)
     for shape in ("sphere", "punch", "plate"):
         through = [f"tool.shape={shape}", "tool.displacement=55 mm"]
-        # Springs let cells be turned inside out by a small tool, which a plate does to all at once.
+        # A small tool inverts single cells of springs; a plate would invert all of them at once.
         yield _case(f"{shape} through the body", through, lost=shape == "plate")
     for friction in (0.0, 0.5, 1.0, 2.0):
         yield _case(f"friction {friction:g}", [f"tool.friction={friction:g}"])

@@ -110,7 +110,7 @@ def fastest_part(net: Network, k: float) -> float:
     springs = k * net.scale / net.length * (lightness[i] + lightness[j])
     per_corner = 3.0 * net.bulk / (4.0 * net.spacing) ** 2
     cells = per_corner * lightness[net.cells.astype(int)].sum(axis=1)
-    support = net.value * lightness[net.column.astype(int)]  # here a diagonal
+    support = net.value * lightness[net.column.astype(int)]  # diagonal here
     return float(max(springs.max(), cells.max(), support.max()))
 
 

@@ -121,7 +121,7 @@ def _has_corner(law: Law) -> bool:
 def rests(name: str, scene: Plain, mesh: str | None) -> Finding:
     """Rest under the full load, by relaxation and by long implicit steps."""
     one, _ = _lattice(name, scene, mesh)
-    material = replace(one.springs.material, damping=UNDAMPED)  # which the rest does not depend on
+    material = replace(one.springs.material, damping=UNDAMPED)  # the rest does not depend on it
     law, net = material.law, arrays(one.assembly, material, linear=one.linear)
     found, ended = relax(law, net)
     if ended.status != "at rest":
