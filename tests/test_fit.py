@@ -176,7 +176,8 @@ def write(path, header, rows):
         ("time_s,displacement_m", ["0,0"], r"give 3 or more"),
         ("time_s,displacement_m,force_N", ["0,0,0"], r"give one of the columns"),
         ("displacement_m", ["0", "1", "2"], r"time_s is missing"),
-        ("time_s,depth", ["0,0"], r"give one of the columns"),
+        ("time_s,depth", ["0,0"], r"give one of the columns .* and not time_s, depth"),
+        ("depth_m,force_N", ["0,0", "1,1", "2,2"], r"time_s is missing.*force over depth"),
         ("time_s,displacement_m,uncertainty", ["0,0,1", "1,1,0", "2,2,1"], r"line 3: uncertainty"),
     ],
 )

@@ -63,7 +63,15 @@ def read_curve(path: Path) -> Curve:
     table = _table(path)
     found = [name for name in CURVES if name in table.header]
     if len(found) != 1:
-        raise ValueError(f"{path}: give one of the columns {' and '.join(CURVES)} beside {TIME}")
+        raise ValueError(
+            f"{path}: give one of the columns {' and '.join(CURVES)} beside {TIME}, and not "
+            f"{', '.join(table.header)}"
+        )
+    if TIME not in table.header:
+        raise ValueError(
+            f"{path}: line 1: {TIME} is missing; give it beside {found[0]}: a force over depth has "
+            "the times at which the scene's tool is so deep"
+        )
     times, values = table.numbers((TIME, found[0])).T
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
@@ -106,7 +114,9 @@ class _Table(NamedTuple):
         for name in columns:
             if self.header.count(name) != 1:
                 said = "stands there twice" if name in self.header else "is missing"
-                raise ValueError(f"{self.path}: line 1: the column {name} {said}; give {columns}")
+                raise ValueError(
+                    f"{self.path}: line 1: the column {name} {said}; give {', '.join(columns)}"
+                )
         if len(self.rows) < FEWEST:
             raise ValueError(
                 f"{self.path}: {len(self.rows)} lines of numbers; give {FEWEST} or more"
