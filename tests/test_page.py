@@ -203,7 +203,7 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
 def test_the_error_at_the_tool_is_told_with_the_errors_of_both():
     found = answer(results_of())
     assert "1.993 ± 0.002 mm at most" in said(results_of())
-    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) farther" in said(results_of())
+    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) more" in said(results_of())
     assert found.numbers[1].value == "+1.00 ± 0.01 mm"
 
 
@@ -216,7 +216,7 @@ def test_a_gap_at_the_tool_below_its_errors_is_not_resolved():
 
 def test_a_gap_whose_errors_are_not_all_known_has_no_bar():
     found = with_model(results_of(), "basafa", time_step_errors={})
-    assert "1.0 mm (100 %) farther, by errors that are not all known" in said(found)
+    assert "1.0 mm (100 %) more, by errors that are not all known" in said(found)
 
 
 def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does_not():

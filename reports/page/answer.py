@@ -229,9 +229,10 @@ def _difference(found: Nearest) -> str:
         return f"{percent(found.share)} (the error of that is not known)"
     if found.share < found.error:
         return f"less than {percent(found.error)}, which is {_whose(found)}"
-    by = "which shows in no digit" if found.error < NEGLIGIBLE * found.share else "shown by ±"
+    small = found.error < NEGLIGIBLE * found.share
+    meant = f"{_whose(found)} is below the last digit" if small else f"± is {_whose(found)}"
     stated = _stated(100.0 * found.share, 100.0 * found.error)
-    return f"{stated} % ({_whose(found)}, {by})"
+    return f"{stated} % ({meant})"
 
 
 def _whose(found: Nearest) -> str:
@@ -283,7 +284,7 @@ class _Gap:
         if not self.is_resolved:
             return f"they are apart by less than their errors, {self.value}"
         caution = "" if self.is_known else ", by errors that are not all known"
-        too = "farther" if self.is_more else "less far"
+        too = "more" if self.is_more else "less"
         return f"{self.value} ({self.share}) {too}{caution}"
 
 
@@ -435,7 +436,7 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
     else:
         value = f"{_stated(100.0 * found.share, 100.0 * found.error)} %"
         is_seen = found.error >= NEGLIGIBLE * found.share
-        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} shows in no digit"
+        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} is below the last digit"
         yield Number(f"difference {what}", value, kind)
     if DASH not in {_peak(results, name) for name in (found.model.name, found.reference)}:
         yield _number_at_the_tool(results, found)
