@@ -68,20 +68,20 @@ def signed(share: float) -> str:
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """Whether a better estimate would help, and what else would: of the most different model."""
+    """Whether a better estimate would help, and what else would: of the nearest model."""
     found = by_reference(results).get("fem")
     if not found:
         return
     named = labels(results)
-    worst = max(found, key=lambda one: one.total)
-    parts = [part for part in worst.parts if part.cause != "remainder" and part.size >= SMALL]
+    nearest = min(found, key=lambda one: one.total)
+    parts = [part for part in nearest.parts if part.cause != "remainder" and part.size >= SMALL]
     steps = ", ".join(f"{cause_name(part.cause, 'fem')} {percent(part.left)}" for part in parts)
     if steps:
         yield (
-            f"Error budget: the field of {named[worst.model]} is {percent(worst.total)} off the "
-            f"finite elements; with one cause after another mended there is left, {steps}."
+            f"Error budget: the field of {named[nearest.model]} is {percent(nearest.total)} off "
+            f"the finite elements; mending one cause after another leaves: {steps}."
         )
     largest = max(parts, key=lambda part: part.contribution, default=None)
     if largest is not None:
         name = cause_name(largest.cause, "fem")
-        yield f"The largest part of it, {signed(largest.contribution)}, is the {name}."
+        yield f"The largest part of that is the {name}, {signed(largest.contribution)}."

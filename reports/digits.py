@@ -24,6 +24,10 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 LONGEST_WORD = 20
 QUANTITY = re.compile(r"(-?\d[\d.]*(?:e[+-]?\d+)?)(?: (.+))?")
 RANGE = re.compile(r"(-?[\d.e+-]+) to (-?[\d.e+-]+) (\S+)")
+BEFORE_UNIT = re.compile(
+    r"(?<=[\d)]) (?=±|(?:%|mm/s|mm|kPa|MPa|Pa|ms|s|Hz|kHz|mN|N|mJ|L)(?!\w))|(?<=±) (?=\d)"
+)
+"""A space within a number with its error and unit."""
 LARGER_UNITS = {"Pa": (1e3, 1e-3, "kPa"), "Pa/m": (1e6, 1e-6, "MPa/m")}
 SMALLER_UNITS = {"m": (1e3, "mm"), "m^3": (1e3, "L")}
 
@@ -115,6 +119,11 @@ def words(text: str) -> str:
     """Text without control characters, whose long words may be broken at the end of a line."""
     clean = "".join(c if c.isprintable() else " " for c in text)
     return re.sub(rf"\S{{{LONGEST_WORD}}}(?=\S)", lambda found: found[0] + "\u200b", clean)
+
+
+def unbroken(text: str) -> str:
+    """Text in which no line ends within a number with its error and unit."""
+    return BEFORE_UNIT.sub("\u00a0", text)
 
 
 def short(text: str, length: int = 32) -> str:

@@ -25,8 +25,8 @@ ALTERNATIVES = {
     "time of a frame; the answers are in the table that follows",
     "stability": "Counts of how the cases ended, by family, and the share of its tolerance that "
     "each used up; the sentences above sum it up",
-    "critical_step": "Longest stable step measured over the one predicted: points on the diagonal "
-    "within the tolerance",
+    "critical_step": "Longest stable step measured by bisection over the one predicted, less one, "
+    "by case: points within the tolerance, which is shaded",
     "ranking": "Share of draws in which each fuzzy system is nearest to the benchmark, and total "
     "Sobol' indices of the unknowns; shares are in the table that follows",
     "ranking_spacing": "The nearest system by measure over the reference spacing, and two scores "

@@ -27,4 +27,9 @@ OF_EVERY_RUN = (
 def sources(results: Results) -> list[str]:
     """What a report rests on, a line each; those of elastography where a fuzzy system estimates."""
     read = elastography_sources() if results.record.fuzzy.systems else []
-    return [*OF_EVERY_RUN, *(", ".join(dict.fromkeys(one)) for one in read)]
+    return [*OF_EVERY_RUN, *(_cited(*one) for one in read)]
+
+
+def _cited(citation: str, identifier: str) -> str:
+    """A citation with what finds it, where the citation does not say that itself."""
+    return citation if identifier in citation else f"{citation}, {identifier}"

@@ -21,6 +21,7 @@ from reports import canvas
 from reports.budget_figure import budget_figure
 from reports.content import document
 from reports.cut_figure import cut_figure
+from reports.digits import unbroken
 from reports.field_figures import Views, explain, field_figures, job, views
 from reports.first_figure import first_figure
 from reports.fuzzy_figures import sets_figure, surfaces_figure
@@ -251,7 +252,7 @@ def compile_pdf(content: dict[str, object], figures: Figures, name: str = TEMPLA
 
 def _fill(root: Path, content: Mapping[str, object]) -> str:
     """Write what a template prints; its text."""
-    text = json.dumps(content, allow_nan=False, ensure_ascii=False)
+    text = unbroken(json.dumps(content, allow_nan=False, ensure_ascii=False))
     (root / "content.json").write_text(text, encoding="utf-8")
     return text
 

@@ -249,10 +249,7 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
         _draw_stem(axes, constant, share)
         if share < LEAST_SHARE:
             continue
-        place: Style = {
-            "textcoords": "offset points",
-            "va": "center",
-        }
-        axes.annotate(str(name), (constant, share), (4, 0), **place)
+        place: Style = {"textcoords": "offset points", "va": "bottom"}
+        axes.annotate(str(name), (constant, share), (4, 0), **place)  # clear of the axis
         text = f"{name}: {fixed(constant, 2)} {unit}, weight {_percent(share)}"
         axes.plot([], [], color=CONSEQUENT, marker="o", markersize=2.6, linewidth=1.6, label=text)

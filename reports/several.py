@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from reports.appearance import system_name
 from reports.differences import elements, field_errors, own_error
 from reports.digits import DASH, PA_PER_KPA, significant, with_error
 from reports.motion_figures import peak
@@ -87,7 +88,7 @@ def _numbers(run: Results) -> Iterator[tuple[Key, Measured]]:
             key = ("field off the finite elements at the peak", model.label, "%")
             yield key, Measured(100.0 * share_off, None if own is None else 100.0 * own)
     for system, one in run.record.fuzzy.systems.items():
-        key = ("estimated Young's modulus", system, "kPa")
+        key = ("estimated Young's modulus", system_name(system), "kPa")
         yield key, Measured(one.estimate_pa / PA_PER_KPA, one.quadrature_error_pa / PA_PER_KPA)
 
 

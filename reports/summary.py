@@ -298,11 +298,9 @@ def _resolution(found: list[Lead]) -> str:
         if (n := sum(lead.is_resolved is value for lead in found))
     ]
     turned = sum(lead.hangs_on_view for lead in found)
-    verb = "is no larger than its" if turned == 1 else "are no larger than their"
-    view = (
-        f" {turned if turned else 'None'} {verb} spread over windows of the motion and axes of the "
-        "phase plane."
-    )
+    exceed = {0: "All exceed their", 1: "1 does not exceed its"}
+    verb = exceed.get(turned, f"{turned} do not exceed their")
+    view = f" {verb} spread over windows of the motion and axes of the phase plane."
     return f"Of these leads {', '.join(parts)}.{view}"
 
 

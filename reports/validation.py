@@ -11,7 +11,7 @@ from statistics import median
 from typing import NamedTuple
 
 from reports.benchmarks import Line, read
-from reports.digits import DASH, Group, Table, percent, significant, words
+from reports.digits import DASH, Group, Table, fixed, percent, significant, words
 
 NAME = "validation"
 CYLINDERS, CANTILEVER, CUBE = "cylinders", "cantilever", "cube"
@@ -134,7 +134,10 @@ def _by_faces(lines: list[Line], problem: str) -> Iterator[tuple[str, Table]]:
 def _body_row(line: Line) -> list[str]:
     """Model, case, quantity, measured, model, difference, uncertainty, own error, verdict."""
     found, measured = line["found"], _number(line, "measured")
-    off = f"{_number(line, 'found') - measured:+.2f}" if found else DASH
+    off = DASH
+    if found:
+        gap = _number(line, "found") - measured
+        off = f"{_sign(gap)}{fixed(abs(gap), 2)}"
     return [
         line["model"],
         line["case"],
@@ -159,7 +162,12 @@ def _within(lines: list[Line]) -> str:
 
 
 def _signed(share: float) -> str:
-    return f"{100.0 * share:+.1f} %"
+    return f"{_sign(share)}{fixed(abs(100.0 * share), 1)} %"
+
+
+def _sign(value: float) -> str:
+    """Of a difference, as it is printed."""
+    return "−" if value < 0.0 else "+"
 
 
 def _number(line: Line, column: str) -> float:

@@ -65,7 +65,7 @@ def _cylinders(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
             axes.fill_between([x - 0.45, x + 0.45], -200 * spread[0], 200 * spread[0], color=BAND)
     axes.set_xticks(range(len(quantities)), [name.removeprefix("force at ") for name in quantities])
     axes.set_xlabel("compression of the cylinder, faces bonded")
-    axes.set_ylabel("force, model - measured [%]")
+    axes.set_ylabel("force, model − measured [%]")
     axes.set_ylim(1.05 * LOWEST, 1.05 * HIGHEST)
 
 
@@ -81,7 +81,7 @@ def _beam(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
     axes.axhspan(-spread, spread, color=BAND, zorder=0)
     axes.set_xticks([])
     axes.set_xlabel("beam under its weight")
-    axes.set_ylabel("tip down, model - measured [mm]")
+    axes.set_ylabel("tip down, model − measured [mm]")
 
 
 def _cube(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from itertools import groupby
 
 from reports.benchmarks import Line, read
-from reports.digits import DASH, Group, Table, count, fixed, significant, words
+from reports.digits import DASH, Group, Table, count, fixed, significant, symbols, words
 
 GROWTH = "growth: "
 PARTS = ("mesh", "assembly", "solution")
@@ -45,7 +46,7 @@ def outcomes(lines: list[Line]) -> str:
 def _finding(line: Line) -> list[str]:
     """Quantity, exact value, ours, error, order, limit, outcome."""
     return [
-        words(line["quantity"]),
+        words(in_symbols(line["quantity"])),
         _number(line["exact"], 5),
         _number(line["ours"], 5),
         _number(line["error"], 2),
@@ -53,6 +54,12 @@ def _finding(line: Line) -> list[str]:
         _number(line["limit"], 2),
         _outcome(line),
     ]
+
+
+def in_symbols(quantity: str) -> str:
+    """A quantity with the symbols that its ASCII stands for: "p2, nu 0.3" as "p2, ν 0.3"."""
+    text = symbols(quantity.replace("taylor-hood", "Taylor-Hood").replace("c_s", "cₛ"))
+    return re.sub(r"\bomega\b", "ω", re.sub(r"\bnu\b", "ν", text))
 
 
 def _outcome(line: Line) -> str:

@@ -21,8 +21,22 @@ from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.sets import Array
 
 PA_PER_KPA = 1e3
-HEAD = ("contender", "bias kPa", "rms kPa", "rms 1", "95 %", "rms 2+", "displ.", "in band", "width")
-WIDTHS = (30, 9, 8, 7, 13, 7, 7, 8, 6)
+LEGEND = """Errors of the estimated stiffness: bias and rms in kPa over all; rms in % of
+the true stiffness of those with one reading, with its 95 % interval, and of those with more (2+).
+Then the rms error in % of the displacement that follows, the share of patients within the type-2
+interval, and the mean width of that in % of the true stiffness."""
+HEAD = (
+    "contender",
+    "bias kPa",
+    "rms kPa",
+    "rms 1 %",
+    "95 %",
+    "2+ %",
+    "displ. %",
+    "in band %",
+    "width %",
+)
+WIDTHS = (30, 9, 8, 8, 13, 7, 9, 10, 8)
 DIGITS = 4
 
 
@@ -62,7 +76,7 @@ def cohort_lines(study: CohortStudy) -> Iterator[str]:
     """A line per contender over all patients, then the comparisons in sentences."""
     by_group = {(row.contender, row.readings): row for row in study.rows if row.aetiology == "all"}
     (every, *_) = study.rows
-    yield f"{every.patients} virtual patients; rms and width over the true stiffness, by readings"
+    yield f"{every.patients} virtual patients. {LEGEND}"
     yield _aligned(HEAD)
     for name in dict.fromkeys(row.contender for row in study.rows):
         whole, one, more = (by_group[name, readings] for readings in ("all", "1", "2 or more"))

@@ -177,6 +177,7 @@ def write(path, header, rows):
         ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' stands there twice"),
         ("time_s,displacement_m", ["0,0"], r":2: 1 lines of numbers; give 3 or more"),
         ("time_s,displacement_m,force_N", ["0,0,0"], r":1: give one of the columns"),
+        ("depth_m,force_N", ["0,0", "1,1", "2,2"], r":1: .* time_s is missing.*force over depth"),
         ("displacement_m", ["0", "1", "2"], r":1: the column time_s is missing"),
         ("time_s,depth", ["0,0"], r":1: column 'depth' is none of .* rename or remove it"),
         ("time_s,displacement_m,uncertainty", ["0,0,1", "1,1,0", "2,2,1"], r":3: uncertainty must"),

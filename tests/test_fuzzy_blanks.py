@@ -60,7 +60,9 @@ def test_every_row_is_answered_as_the_patient_alone(table, system, absent):
     ]
     found = PA_PER_KPA * np.array(estimates(path.parent / "out.csv"))
     assert found == pytest.approx(alone, rel=1e-12)
-    done = {"normal": "normal liver's", "silent": "rules that name it left out"}[absent]
+    done = {"normal": "normal liver's", "silent": "rules on a disease without one are left out"}[
+        absent
+    ]
     assert len(said.notes) == len(AETIOLOGIES)
     assert all(done in note for note in said.notes)
     assert said.notes[0].startswith("hcv: no reading (line 6); ")

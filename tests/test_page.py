@@ -18,7 +18,7 @@ import pytest
 
 from fuzzy.liver import stiffness
 from reports.page import write
-from reports.page.answer import answer, nearest
+from reports.page.answer import answer, nearest, question
 from reports.page.data import film, interpolation_error, page
 from study.commands.view import view
 from study.results import folder as results_folder
@@ -146,11 +146,11 @@ def test_the_nearest_model_is_named_with_the_error_of_the_reference():
     assert "Nearest to the finite-element reference is MSM Sugeno" in said(results)
     assert "20 ± 3 %" in said(results)
     assert answer(results).numbers[0].value == "20 ± 3 %"
-    assert "does not tell it from" not in said(results)
+    assert "cannot tell it apart" not in said(results)
 
 
 def test_models_within_the_error_of_the_reference_are_not_told_apart():
-    assert "This reference does not tell it from" in said(results_of())
+    assert "This reference cannot tell it apart from" in said(results_of())
 
 
 def test_a_difference_below_the_error_of_the_reference_is_not_resolved():
@@ -203,7 +203,7 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
 def test_the_error_at_the_tool_is_told_with_the_errors_of_both():
     found = answer(results_of())
     assert "1.993 ± 0.002 mm at most" in said(results_of())
-    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) farther" in said(results_of())
+    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) more" in said(results_of())
     assert found.numbers[1].value == "+1.00 ± 0.01 mm"
 
 
@@ -216,7 +216,7 @@ def test_a_gap_at_the_tool_below_its_errors_is_not_resolved():
 
 def test_a_gap_whose_errors_are_not_all_known_has_no_bar():
     found = with_model(results_of(), "basafa", time_step_errors={})
-    assert "1.0 mm (100 %) farther, by errors that are not all known" in said(found)
+    assert "1.0 mm (100 %) more, by errors that are not all known" in said(found)
 
 
 def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does_not():
@@ -230,6 +230,27 @@ def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does
     for name in MODELS:
         slow = with_model(slow, name, wall_s=2.0)
     assert "No model that finished is ready in time here" in said(slow)
+
+
+def test_what_was_measured_before_is_told_of_the_organ_that_it_was_measured_on():
+    results = results_of()
+    assert "measured before on the built-in liver" in said(results)
+    block = replace(results.scene, organ=replace(results.scene.organ, shape="block"))
+    assert "measured before" not in said(replace(results, scene=block))
+
+
+def test_the_question_is_not_how_far_the_finite_elements_are_from_themselves():
+    asked = question(results_of())
+    assert "Basafa benchmark" in asked
+    assert "Finite elements" not in asked
+
+
+def test_a_slider_without_a_reading_starts_at_the_reading_of_the_other():
+    results = results_of()
+    patient = replace(results.scene.patient, hcv=9.5e3, hbv=None)
+    found = page(replace(results, scene=replace(results.scene, patient=patient))).fuzzy
+    assert found.start == (9.5, 9.5)
+    assert found.unread == ("hbv",)
 
 
 def test_digits_of_the_table_of_motion_follow_the_error_of_the_curve():

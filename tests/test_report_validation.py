@@ -44,7 +44,7 @@ def test_medians_and_ranges_are_of_the_cases_with_an_answer():
     assert (found.within, found.answered, found.cases) == (1, 2, 2)
     assert summed(groups["springs alone", "force at 10 %"]) is None
     (group,) = validation()["cylinders"]
-    assert group["rows"][0][:4] == ["linear FE", "force at 10 %", "+0.0 %", "-10.0 % to +10.0 %"]
+    assert group["rows"][0][:4] == ["linear FE", "force at 10 %", "+0.0 %", "−10.0 % to +10.0 %"]
     assert group["rows"][1][2] == "gives way"
 
 
@@ -64,7 +64,7 @@ def test_bodies_stand_with_difference_uncertainty_and_verdict():
 def test_the_figure_is_drawn_of_what_there_is():
     svg = validation_figure()
     assert svg is not None
-    assert b"model - measured" in svg or b"<svg" in svg
+    assert "model − measured".encode() in svg or b"<svg" in svg
 
 
 def test_without_a_table_there_is_nothing(tmp_path, monkeypatch):

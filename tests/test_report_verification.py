@@ -10,7 +10,7 @@ import pytest
 
 from reports import benchmarks
 from reports.digits import significant
-from reports.verification import verification
+from reports.verification import in_symbols, verification
 from tests.report_samples import beforehand_pdf, printed_beforehand
 
 DATA = Path(benchmarks.__file__).parent / "data"
@@ -86,7 +86,7 @@ def test_growth_has_one_row_per_mesh():
 @pytest.mark.usefixtures("folder")
 def test_the_document_prints_them_and_says_that_they_are_of_no_run():
     texts = printed_beforehand()
-    assert texts.count("None of these figures are of a run.") == 1
+    assert texts.count("No number here is of a run of yours.") == 1
     assert {"Sphere", "frequency, p2", "2.5012", "noted", "calculix", "4.5", "320"} <= set(texts)
     assert "Some processor, 2 cores" in " ".join(texts)
 
@@ -141,3 +141,9 @@ def test_every_number_of_the_tables_that_come_with_the_program_is_printed(name, 
         if line[column] and math.isfinite(float(line[column]))
     }
     assert wanted <= set(printed_beforehand())
+
+
+def test_symbols_of_a_quantity_are_printed_as_such():
+    assert in_symbols("displacement, taylor-hood, nu 0.3") == "displacement, Taylor-Hood, ν 0.3"
+    assert in_symbols("moment of inertia [kg m^2]") == "moment of inertia [kg m²]"
+    assert in_symbols("number of omega R / c_s") == "number of ω R / cₛ"

@@ -45,7 +45,7 @@ def test_all_problems_are_reported_at_once_with_key_and_remedy(tmp_path):
         read_scene(written(tmp_path, text))
     message = str(caught.value)
     for part in (
-        "7 problem(s)",
+        "7 problems",
         "frobs: unknown key",
         "tissue.youngs_modulus: must lie between",
         "tissue.posson_ratio: unknown key, did you mean 'poisson_ratio'?",

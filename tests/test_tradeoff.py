@@ -501,6 +501,25 @@ def test_a_recommended_corrected_lattice_has_its_spacing_in_the_scene():
     assert "#     0.01 s    2.0 +- 1.0 %    12 MB  corrected lattice of 15 mm" in text
 
 
+def test_a_table_of_candidates_says_whose_frames_are_late():
+    """The more accurate one is faster than real time, and yet its slow frames are not in time."""
+    frames = Frame(6, 0.002, 0.004, True), Frame(6, 0.004, 0.03, False)
+    cheap, accurate = (
+        advice.Candidate(
+            Configuration("volume-springs", {"spacing": spacing}),
+            advice.Promise(spacing, 0.001),
+            Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-6 / spacing), None)),
+            own,
+        )
+        for spacing, own in zip((0.02, 0.01), frames, strict=True)
+    )
+    head, first, second = advice.table_of([cheap, accurate], taken=cheap)
+    assert "95 % of its frames" in head
+    assert "4 ms, in time" in first
+    assert "<- taken" in first
+    assert "30 ms, late" in second
+
+
 @pytest.mark.parametrize("contender", ["region", "corrected-graded"])
 def test_a_recommended_graded_lattice_has_its_size_in_the_scene(contender, tmp_path):
     path = tmp_path / "scene.toml"

@@ -61,7 +61,7 @@ ABSENT: dict[str, Absent | None] = {
     ),
     "silent": Absent(
         True,
-        "the rules that name it left out",
+        "rules on a disease without one are left out",
         "takes every rule that names it out of the rule base",
     ),
 }

@@ -215,5 +215,6 @@ def _refusal(name: str, reading: float) -> str:
 
 
 def _missing_notes(readings: Mapping[str, float], settings: LiverSettings) -> list[str]:
+    names = [name for name in AETIOLOGIES if name not in readings]
     done = settings.missing.note.format(normal=NORMAL_LIVER / PA_PER_KPA)
-    return [f"{name}: no reading; {done}" for name in AETIOLOGIES if name not in readings]
+    return [f"{', '.join(names)}: no reading; {done}"] if names else []

@@ -33,14 +33,14 @@ def _answer(explanation: Explanation, unit: str) -> str:
     if explanation.switches is None:
         return text
     places = " and ".join(
-        f"{s.before:g}" if s.before == s.after else f"{s.before:g}-{s.after:g}"
+        f"{s.before:g}" if s.before == s.after else f"{s.before:g} to {s.after:g}"
         for s in explanation.switches
     )
     return f"{text}, bounds switch at {places} {unit}"
 
 
 def _span(lower: float, upper: float) -> str:
-    return _degree(upper) if lower == upper else f"{_degree(lower)}-{_degree(upper)}"
+    return _degree(upper) if lower == upper else f"{_degree(lower)} to {_degree(upper)}"
 
 
 def _degree(value: float) -> str:

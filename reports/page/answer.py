@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from reports import budget
+from reports import budget, tradeoff
 from reports.appearance import labels, reference_name, system_name
 from reports.differences import (
     ELEMENTS,
@@ -21,6 +21,7 @@ from reports.differences import (
 from reports.digits import DASH, fixed, percent, significant, spread, with_error, words
 from reports.motion_figures import peak
 from reports.ranking import references, tool_probe
+from reports.reference import is_built_in_liver
 from reports.summary import printed_peak, status
 from reports.tool_force import MOST_TOOLS, printed_force, tools
 from study.results.folder import Results
@@ -33,16 +34,15 @@ NEGLIGIBLE = 5e-5
 PEAK = "field-relative-l2-peak"
 FRAME_RATE = 60.0
 """Of a display [Hz], by whose frames a cost is told."""
+MEASURED_RATE = "60hz"
+"""The same among the rates of the trade-off measured before."""
 GLOSSES = {
     "reading": ", springs of the stiffness that is read, without a fuzzy system",
     "tissue": ", springs of the stiffness that the reference has",
     "basafa": ", the nonlinear mass-spring model of the paper",
 }
 """What models without a fuzzy system are, by name."""
-CHOOSE = (
-    "Which spacing, and so which error, your machine has time for: liver-study recommend SCENE "
-    '--rate "60 Hz".'
-)
+CHOOSE = 'What your own machine has time for is told by liver-study recommend SCENE --rate "60 Hz".'
 REMEDIES = {
     "stiffness": (
         "another estimate of stiffness (patient, fuzzy.knowledge) changes it; a finer lattice "
@@ -185,7 +185,7 @@ def _answers(results: Results, found: Nearest) -> Iterator[str]:
     yield from _in_time(results, found)
     yield from _limit(results, found)
     if found.is_field:
-        yield CHOOSE
+        yield " ".join([*_measured_before(results), CHOOSE])
 
 
 def _which(results: Results, found: Nearest) -> str:
@@ -196,7 +196,7 @@ def _which(results: Results, found: Nearest) -> str:
         else f"its displacement over time at {words(tool_probe(results))}"
     )
     alike = (
-        f" This reference does not tell it from {', '.join(named[name] for name in found.alike)}."
+        f" This reference cannot tell it apart from {_listed(named[n] for n in found.alike)}."
         if found.alike
         else ""
     )
@@ -211,6 +211,12 @@ def _which(results: Results, found: Nearest) -> str:
     )
 
 
+def _listed(names: Iterable[str]) -> str:
+    """Names in a row of words, the last after an "or"."""
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last
+
+
 def _gloss(model: ModelRecord) -> str:
     """What a model is, for whoever meets its name here first."""
     if model.system is None:
@@ -223,9 +229,10 @@ def _difference(found: Nearest) -> str:
         return f"{percent(found.share)} (the error of that is not known)"
     if found.share < found.error:
         return f"less than {percent(found.error)}, which is {_whose(found)}"
-    by = "which shows in no digit" if found.error < NEGLIGIBLE * found.share else "shown by ±"
+    small = found.error < NEGLIGIBLE * found.share
+    meant = f"{_whose(found)} is below the last digit" if small else f"± is {_whose(found)}"
     stated = _stated(100.0 * found.share, 100.0 * found.error)
-    return f"{stated} % ({_whose(found)}, {by})"
+    return f"{stated} % ({meant})"
 
 
 def _whose(found: Nearest) -> str:
@@ -277,7 +284,7 @@ class _Gap:
         if not self.is_resolved:
             return f"they are apart by less than their errors, {self.value}"
         caution = "" if self.is_known else ", by errors that are not all known"
-        too = "farther" if self.is_more else "less far"
+        too = "more" if self.is_more else "less"
         return f"{self.value} ({self.share}) {too}{caution}"
 
 
@@ -393,6 +400,19 @@ def _limit(results: Results, found: Nearest) -> Iterator[str]:
             )
 
 
+def _measured_before(results: Results) -> Iterator[str]:
+    """What other settings reached at the rate of frames, of the organ measured then."""
+    free = [one for one in tradeoff.timed(tradeoff.configurations()) if one.any_load]
+    chosen = tradeoff.best(free, MEASURED_RATE)
+    if chosen is None or not is_built_in_liver(results.scene):
+        return
+    yield (
+        "Of other settings, measured before on the built-in liver, the most accurate in time at "
+        f"60 Hz under any load is {chosen.name}: off by {chosen.stated_error}, in "
+        f"{percent(tradeoff.share(chosen, MEASURED_RATE), 2)} of the frame."
+    )
+
+
 def _left(results: Results, part: BudgetPart) -> str:
     """What freeing the Poisson ratio leaves, where that is the cause and was tried."""
     limits = results.record.lattice_limits
@@ -416,7 +436,7 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
     else:
         value = f"{_stated(100.0 * found.share, 100.0 * found.error)} %"
         is_seen = found.error >= NEGLIGIBLE * found.share
-        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} shows in no digit"
+        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} is below the last digit"
         yield Number(f"difference {what}", value, kind)
     if DASH not in {_peak(results, name) for name in (found.model.name, found.reference)}:
         yield _number_at_the_tool(results, found)
@@ -459,7 +479,10 @@ def _third(results: Results, model: ModelRecord) -> Iterator[Number]:
 
 
 def question(results: Results) -> str:
-    """What the run asked."""
-    models = ", ".join(model.label for model in results.record.models)
-    reference = "the finite elements" if finite_elements(results) else "each other"
-    return f"How far from {reference}, and how fast, are these models of one scene: {models}?"
+    """What the run asked, of every model but the finite elements."""
+    compared_with = finite_elements(results)
+    models = ", ".join(one.label for one in results.record.models if one is not compared_with)
+    if not models:
+        return "How does this organ move by finite elements, and how fast are they?"
+    reference = "the finite elements" if compared_with else "each other"
+    return f"How far from {reference} are these models of the same scene, and how fast: {models}?"

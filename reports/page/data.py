@@ -169,7 +169,8 @@ class Surface:
 class Fuzzy:
     """Sets, and surfaces over the readings `inputs`, grid lines `x` and `y` [kPa].
 
-    `start`: the readings [kPa] of the scene where the sliders stand at first.
+    `start`: readings [kPa] where the sliders stand at first. `unread`: the inputs that the scene
+    has no reading of.
     """
 
     sets: tuple[Sets, ...]
@@ -178,6 +179,7 @@ class Fuzzy:
     x: Packed
     y: Packed
     start: tuple[float, float]
+    unread: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -383,20 +385,31 @@ def _fuzzy(results: Results) -> Fuzzy | None:
         return None
     inputs = results.scene.fuzzy.surface
     x, y = (KILO * arrays[f"surface.{axis}"] for axis in "xy")
+    read = _readings(results, inputs)
     return Fuzzy(
         sets=tuple(_sets(results, name) for name in fuzzy_figures.variables(arrays)),
         surfaces=tuple(_surface(results, system) for system in systems),
         inputs=inputs,
         x=packed(x),
         y=packed(y),
-        start=(_start(results, inputs[0], x), _start(results, inputs[1], y)),
+        start=(_start(read, inputs[0], x), _start(read, inputs[1], y)),
+        unread=tuple(name for name in inputs if name not in read),
     )
 
 
-def _start(results: Results, name: str, lines: Floats) -> float:
-    """The scene's reading [kPa], or the lowest line where it has none."""
-    reading = getattr(results.scene.patient, name, None)
-    kilo = float(lines[0]) if reading is None else KILO * float(reading)
+def _readings(results: Results, inputs: Sequence[str]) -> dict[str, float]:
+    """The scene's readings [kPa] among some inputs, by input."""
+    found = {name: getattr(results.scene.patient, name, None) for name in inputs}
+    return {name: KILO * float(value) for name, value in found.items() if value is not None}
+
+
+def _start(read: Mapping[str, float], name: str, lines: Floats) -> float:
+    """The scene's reading [kPa]; where it has none that of the other, the lowest line without any.
+
+    Two readings that agree are nearest to one alone, so that the page starts at about the scene's
+    own estimate.
+    """
+    kilo = read.get(name, next(iter(read.values()), float(lines[0])))
     return float(np.clip(kilo, lines[0], lines[-1]))
 
 

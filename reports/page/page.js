@@ -103,6 +103,8 @@
     return first.rows[1].reduce((best, u, k, all) => (Math.abs(u) > Math.abs(all[best]) ? k : best), 0);
   }
 
+  // As in page.css: panels side by side would be overprinted by each other's titles.
+  const NARROW = matchMedia("(max-width: 50rem)");
   const PANELS = [["x", "y", 0, 1], ["x2", "y2", 0, 2], ["x3", "y3", 1, 2]];
   const state = { probe: data.tool_probe, sample: farthest(), playing: 0 };
 
@@ -141,8 +143,9 @@
     const time = longest[state.sample];
     const line = (x) => ({ type: "line", xref: x, yref: `${x.replace("x", "y")} domain`, x0: time,
       x1: time, y0: 0, y1: 1, line: { color: variable("--quiet"), width: 1, dash: "dot" } });
+    const grid = NARROW.matches ? { rows: 3, columns: 1, ygap: 0.3 } : { rows: 1, columns: 3, xgap: 0.18 };
     Plotly.react("motion-plot", traces, layout({
-      grid: { rows: 1, columns: 3, pattern: "independent", xgap: 0.18 }, shapes: [line("x"), line("x2")],
+      grid: { ...grid, pattern: "independent" }, shapes: [line("x"), line("x2")],
       xaxis: { title: { text: "time [s]" } }, yaxis: { title: { text: "displacement [mm]" }, ...limits(found, 1) },
       xaxis2: { title: { text: "time [s]" } }, yaxis2: { title: { text: "velocity [mm/s]" }, ...limits(found, 2) },
       xaxis3: { title: { text: "displacement [mm]" }, ...limits(found, 1) },
@@ -207,6 +210,7 @@
     $("probe").addEventListener("input", (e) => { state.probe = e.target.value; drawMotion(); });
     $("time").addEventListener("input", (e) => goTo(Number(e.target.value)));
     $("play").addEventListener("click", play);
+    NARROW.addEventListener("change", drawMotion);
     drawMotion();
   }
 
@@ -471,6 +475,12 @@
     return mix(mix(grid[i][j], grid[i][j + 1], s), mix(grid[i + 1][j], grid[i + 1][j + 1], s), t);
   }
 
+  /** Why the sliders do not give the scene's own estimate, where it lacks one of their readings. */
+  function unread() {
+    const names = data.fuzzy.unread.map((name) => name.toUpperCase()).join(" and ");
+    return names ? ` The scene has no reading of ${names}: its own estimate does without, the sliders do not.` : "";
+  }
+
   const readings = () => [0, 1].map((k) => Number($(`reading-${k}`).value));
 
   function drawEstimates() {
@@ -532,7 +542,7 @@
     $("variable").value = data.fuzzy.inputs[0];
     $("system").addEventListener("input", drawSurface);
     $("variable").addEventListener("input", drawSets);
-    $("fuzzy-note").textContent = `Bilinear between ${fuzzy.x.length} × ${fuzzy.y.length} lines of readings that the run evaluated, the other readings as in the scene; a reading lower than the first line counts as that. Both sliders are readings: an aetiology that the scene has no reading of is left out of its own estimate, but not here. The error is what leaving out every second line would miss.`;
+    $("fuzzy-note").textContent = `Bilinear between ${fuzzy.x.length} × ${fuzzy.y.length} lines of readings that the run evaluated, the other readings as in the scene; a reading lower than the first line counts as that. The error is what leaving out every second line would miss.${unread()}`;
     drawEstimates();
   }
 

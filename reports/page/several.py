@@ -71,10 +71,31 @@ def _traces(
 def _layout(labels: Sequence[str]) -> dict[str, object]:
     rows = max(1, -(-len(labels) // COLUMNS))
     axes: dict[str, object] = {}
-    for panel, label in enumerate(labels, 1):
-        axes[f"xaxis{panel}"] = {"title": {"text": f"time [s]<br><b>{markup.escape(label)}</b>"}}
+    for panel in range(1, len(labels) + 1):
+        axes[f"xaxis{panel}"] = {"title": {"text": "time [s]"}}
         axes[f"yaxis{panel}"] = {"title": {"text": "displacement [mm]"}}
+    named = [_title(panel, label) for panel, label in enumerate(labels, 1)]
     grid = {"rows": rows, "columns": COLUMNS, "pattern": "independent", "ygap": 0.35}
-    legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom"}
-    margin = {"l": 60, "r": 15, "t": 40, "b": 70}
-    return {**axes, "grid": grid, "legend": legend, "hovermode": "x", "margin": margin}
+    legend = {"orientation": "h", "y": 1.0, "yanchor": "top", "yref": "container"}
+    return {
+        **axes,
+        "annotations": named,
+        "grid": grid,
+        "legend": legend,
+        "hovermode": "x",
+        "margin": {"l": 60, "r": 15, "t": 60, "b": 50},
+    }
+
+
+def _title(panel: int, label: str) -> dict[str, object]:
+    """Name of a model above its panel."""
+    return {
+        "text": f"<b>{markup.escape(label)}</b>",
+        "xref": f"x{panel} domain",
+        "yref": f"y{panel} domain",
+        "x": 0.0,
+        "y": 1.0,
+        "xanchor": "left",
+        "yanchor": "bottom",
+        "showarrow": False,
+    }

@@ -15,7 +15,7 @@ from pathlib import Path
 from string import Template
 
 from reports import summary, tradeoff, tradeoff_answers
-from reports.digits import Table, symbols, words
+from reports.digits import Table, symbols, unbroken, words
 from reports.page.answer import Answer, answer, question
 from reports.page.data import page
 from reports.tables import provenance_rows
@@ -114,12 +114,17 @@ def _glance(results: Results) -> str:
 
 
 def _paragraphs(lines: Iterable[str]) -> str:
-    return "\n".join(f"<p>{markup.escape(line)}</p>" for line in lines)
+    return "\n".join(f"<p>{_text(line)}</p>" for line in lines)
 
 
 def _items(lines: Iterable[str]) -> str:
-    found = "\n".join(f"<li>{markup.escape(line)}</li>" for line in lines)
+    found = "\n".join(f"<li>{_text(line)}</li>" for line in lines)
     return f"<ul>\n{found}\n</ul>" if found else "<p>None.</p>"
+
+
+def _text(line: str) -> str:
+    """Text of an element, whose numbers stay with their units."""
+    return markup.escape(unbroken(line))
 
 
 def _numbers(found: Answer) -> str:
@@ -150,5 +155,5 @@ def table(header: Iterable[str], rows: Table, caption: str) -> str:
 
 def _row(row: list[str]) -> str:
     first, *others = row
-    cells = "".join(f"<td>{markup.escape(cell)}</td>" for cell in others)
+    cells = "".join(f"<td>{_text(cell)}</td>" for cell in others)
     return f'<th scope="row">{markup.escape(first)}</th>{cells}'

@@ -25,7 +25,7 @@ def compare(
     errors: Switch = False,
     out: Path | None = None,
 ) -> None:
-    """Say which numbers differ between two results folders, and what made them otherwise.
+    """Say which numbers differ between two results folders, and what may have changed them.
 
     Exit code 1 if any number differs by more than the tolerance. Wall times are left out; what
     differs in scene, versions or platform is told and does not count. Of more than two folders, or

@@ -13,5 +13,6 @@ def table_i() -> list[list[str]]:
 
 
 def elastography_sources() -> list[tuple[str, str]]:
-    """Citation and identifier of each source of the elastography data."""
-    return [(row["citation"], row["identifier"]) for row in rows("sources.csv")]
+    """Citation and identifier of each published source of the elastography data."""
+    published = [row for row in rows("sources.csv") if row["identifier"] != "none"]
+    return [(row["citation"], row["identifier"]) for row in published]

@@ -316,7 +316,8 @@ def _place_fields() -> list[str]:
 
 
 def _summary(source: str, lines: Sequence[str]) -> str:
-    return "\n  ".join([f"{source}: {len(lines)} problem(s)", *lines])
+    counted = "1 problem" if len(lines) == 1 else f"{len(lines)} problems"
+    return "\n  ".join([f"{source}: {counted}", *lines])
 
 
 def _remove(table: Any, keys: Sequence[str | int]) -> None:

@@ -44,7 +44,7 @@ from study.tradeoff.errors import Errors, errors
 from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
-from study.tradeoff.rates import Frame, frame
+from study.tradeoff.rates import SLOW, Frame, frame
 from study.tradeoff.reference import ReferenceSolution
 from study.tradeoff.selection import DOUBLE, described, scene_with
 from study.tradeoff.table import Cost, is_beaten
@@ -482,11 +482,24 @@ def table_of(
     ]
     if not front:
         return
-    yield f"chosen from (wall per simulated second, expected error of the {quantity}, memory):"
+    framed = any(one.frame is not None for one in front)
+    yield (
+        f"chosen from (wall per simulated second, expected error of the {quantity}, memory"
+        + (f", {SLOW:g} % of its frames):" if framed else "):")
+    )
     for one in sorted(front, key=lambda one: one.wall_per_second):
         memory = "" if one.cost.memory is None else _in_mb(one.cost.memory)
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
-            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {described(one.configuration)}"
-            + (" <- taken" if one is taken else "")
+            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {_frame_of(one)}"
+            f"{described(one.configuration)}" + (" <- taken" if one is taken else "")
         )
+
+
+def _frame_of(one: Candidate) -> str:
+    """How long frames take at most, and whether they are late: why a candidate is not taken."""
+    if one.frame is None:
+        return ""
+    within = one.frame.wall if one.frame.slow is None else one.frame.slow
+    verdict = "in time" if one.frame.in_time else "late"
+    return f"{1e3 * within:>7.3g} ms, {verdict:<7}  "

@@ -77,7 +77,7 @@ def judged(
     """
     if not has_reference(scene):
         refuse_unlike(scene, chosen)
-    with on_stderr("errors") as tell:
+    with on_stderr("reference and models solved") as tell:
         outcomes = run(tasks(scene, chosen), store, backend, tell)
     given, known, value, why = scene_problem(**scene_arguments(scene)), None, None, ""
     if has_reference(scene):

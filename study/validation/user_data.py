@@ -65,6 +65,12 @@ class UserMarkers:
 def read_curve(path: Path) -> Curve:
     """A curve from a CSV file; ValueError naming file, line and column if it is malformed."""
     table = read_table(path)
+    if TIME not in map(str.strip, table.header):
+        raise table.fault(
+            table.header_line,
+            f"the column {TIME} is missing; for a force over depth give the times at which the "
+            "scene's tool has that depth",
+        )
     names = _names(table, (TIME, *CURVES, UNCERTAINTY))
     found = [name for name in CURVES if name in names]
     if len(found) != 1:
