@@ -3,8 +3,10 @@
 Two meshes and the order of convergence give the error of the finer one by Richardson's
 extrapolation; three give the order too. As a grid convergence index, the estimate is multiplied by
 a safety factor, larger where the order is assumed: Roache (1994), J. Fluids Eng. 116:405; Celik et
-al. (2008), J. Fluids Eng. 130:078001. Where three results alternate, half their range takes the
-place of the extrapolation: Stern et al. (2001), J. Fluids Eng. 123:793.
+al. (2008), J. Fluids Eng. 130:078001. Where three results alternate (Stern et al. 2001, J. Fluids
+Eng. 123:793), or come no nearer to each other, there is nothing to extrapolate: half their range
+takes its place, times the factor of an assumed order (Eca and Hoekstra 2014, J. Comput. Phys.
+262:104).
 
 Adaptively refined meshes are not geometrically similar and show no order. Their error is assumed to
 decrease with the order of the elements for smooth solutions, which adaptive refinement recovers
@@ -56,7 +58,8 @@ def discretisation_error(
     """Relative L2 error from results (n, 3) on meshes of element `sizes`, coarse to fine.
 
     `weights` (n,): of the points. An observed order outside [1, `formal`], `formal` the order of
-    the element, is clipped to that range; far outside, the larger safety factor applies.
+    the element, is clipped to that range, and counts as assumed if it is well above. If it is well
+    below, or there is none, the estimate is half the range of the last three results.
     """
     w = np.ones(len(results[-1])) if weights is None else weights
     steps = [fine - coarse for coarse, fine in pairwise(results)]
@@ -65,12 +68,14 @@ def discretisation_error(
     ratio = sizes[-2] / sizes[-1]
     if len(results) == 2:
         return ErrorEstimate(SAFETY_ASSUMED * norms[-1] / (ratio**ASSUMED_ORDER - 1.0), None)
-    if _product(steps[-2], steps[-1], w) < 0.0:
-        return ErrorEstimate(SAFETY_ASSUMED * 0.5 * max(norms[-2:]), None)
-    observed = observed_order(norms[-2], norms[-1], sizes[-3:])
-    shown = LEAST_ORDER - 2 * BEYOND if observed is None else observed
-    order = min(max(shown, LEAST_ORDER), formal)
-    safety = SAFETY if abs(shown - order) <= BEYOND else SAFETY_ASSUMED
+    alternate = _product(steps[-2], steps[-1], w) < 0.0
+    observed = None if alternate else observed_order(norms[-2], norms[-1], sizes[-3:])
+    if observed is None or observed < LEAST_ORDER - BEYOND:
+        both = steps[-2] + steps[-1]
+        extent = max(*norms[-2:], math.sqrt(_product(both, both, w) / whole))
+        return ErrorEstimate(SAFETY_ASSUMED * 0.5 * extent, observed)
+    order = min(max(observed, LEAST_ORDER), formal)
+    safety = SAFETY if abs(observed - order) <= BEYOND else SAFETY_ASSUMED
     return ErrorEstimate(safety * norms[-1] / (ratio**order - 1.0), observed)
 
 

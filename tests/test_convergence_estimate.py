@@ -50,12 +50,21 @@ def test_results_that_alternate_show_half_their_range():
     assert found.error > true_error(results)
 
 
-def test_results_that_differ_more_and_more_have_no_order_and_a_large_error():
+def test_results_that_differ_more_and_more_have_no_order_and_show_half_their_range():
     results = [LIMIT, LIMIT + 0.01 * ERROR, LIMIT + 0.05 * ERROR]
     found = discretisation_error(results, (0.4, 0.3, 0.2), 3.0)
-    last = 0.04 * np.linalg.norm(ERROR) / np.linalg.norm(results[-1])
     assert found.observed is None
-    assert found.error == pytest.approx(SAFETY_ASSUMED * last / 0.5)  # order 1, ratio 1.5
+    half = 0.5 * 0.05 * np.linalg.norm(ERROR) / np.linalg.norm(results[-1])
+    assert found.error == pytest.approx(SAFETY_ASSUMED * half)
+
+
+def test_an_order_well_below_the_first_shows_half_the_range_too():
+    sizes = (0.4, 0.3, 0.2)
+    results = sequence(sizes, 0.3)
+    found = discretisation_error(results, sizes, 3.0)
+    assert found.observed == pytest.approx(0.3)
+    half = 0.5 * (0.4**0.3 - 0.2**0.3) * np.linalg.norm(ERROR) / np.linalg.norm(results[-1])
+    assert found.error == pytest.approx(SAFETY_ASSUMED * half)
 
 
 def test_two_meshes_take_the_assumed_order_with_a_larger_factor():

@@ -83,6 +83,27 @@ def test_smallest_and_largest_are_told_by_size_in_matlab_by_place_in_octave():
             assert value == pytest.approx([expected], abs=1e-12)
 
 
+def of_two_sets(defuzzification, one, other):
+    """The answer to two sets on 0 to 10 that fire in full."""
+    x = Variable("x", 0, 1, (FuzzySet("all", "trapmf", (-1, 0, 1, 2)),))
+    rules = tuple(Rule((Term(0, 0),), k) for k in range(2))
+    operators = Operators("min", "max", "prod", "max", defuzzification)
+    y = Variable("y", 0, 10, (FuzzySet("one", *one), FuzzySet("other", *other)))
+    return infer(FuzzySystem((x,), y, rules, operators, "m"), np.array([[0.5]]), "mamdani").value[0]
+
+
+@pytest.mark.parametrize("centre", np.arange(0.53, 4.5, 0.1).round(2))
+def test_two_equal_peaks_are_equal_in_spite_of_rounding(centre):
+    """Or one of them would be chosen by the last digit, and the answer lie half the range off."""
+    peaks = ("gaussmf", (0.7, centre)), ("gaussmf", (0.7, 10 - centre))
+    assert of_two_sets("mom", *peaks) == pytest.approx(5.0, abs=1e-9)
+    nearest = 0.1 * np.round(10 * centre)
+    assert of_two_sets("som", *peaks) == pytest.approx(nearest)
+    assert of_two_sets("lom", *peaks) == pytest.approx(10 - nearest)
+    apart = [("trimf", (c - 0.4, c, c + 0.4)) for c in (centre, 10 - centre)]
+    assert of_two_sets("bisector", *apart) < 5.0
+
+
 @pytest.mark.parametrize("aggregation", ["max", "sum", "probor"])
 def test_the_bisector_halves_the_area_and_others_are_scikit_fuzzys(aggregation):
     for row in X:

@@ -4,9 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fuzzy.systems.sets import Array
 from fuzzy.systems.system import Variable
+
+ROUNDING = 1e-14
+"""Share by which memberships or areas that are equal may differ in floating-point numbers."""
 
 
 class Sampling(NamedTuple):
@@ -82,18 +86,23 @@ def bisector(quadrature: Quadrature, mu: Array) -> Array:
     Octave's toolkit returns the number of the sample instead of the point.
     """
     area = np.cumsum(mu * quadrature.weights, axis=-1)
-    return np.asarray(quadrature.y[(area >= 0.5 * area[..., -1:]).argmax(axis=-1)])
+    return np.asarray(quadrature.y[(area >= (0.5 - ROUNDING) * area[..., -1:]).argmax(axis=-1)])
+
+
+def _largest(mu: Array) -> NDArray[np.bool_]:
+    """Where mu (..., M) is largest: all of a plateau, whose points may differ by rounding."""
+    return np.asarray(mu >= (1.0 - ROUNDING) * mu.max(axis=-1, keepdims=True))
 
 
 def mean_of_maximum(quadrature: Quadrature, mu: Array) -> Array:
     """The mean of the points where mu (..., M) is largest, shape (...)."""
-    largest = mu == mu.max(axis=-1, keepdims=True)
+    largest = _largest(mu)
     return np.asarray((largest @ quadrature.y) / largest.sum(axis=-1))
 
 
 def smallest_of_maximum(y: Array, mu: Array, size: Callable[[Array], Array]) -> Array:
     """The point of smallest size among those y (M,) where mu (..., M) is largest."""
-    largest = mu == mu.max(axis=-1, keepdims=True)
+    largest = _largest(mu)
     return np.asarray(y[np.where(largest, size(y), np.inf).argmin(axis=-1)])
 
 

@@ -49,7 +49,7 @@ def read_obj(data: bytes) -> RawMesh:
     for number, words in _statements(lines):
         keyword = words[0].lower()
         if keyword == "v":
-            positions.append((number, words[1:]))
+            positions.append((number, _position(number, words[1:])))
         elif keyword in _FACES:
             faces.append(_face(number, words[1:], len(positions)))
         elif keyword in _REFUSED:
@@ -83,6 +83,16 @@ def _statements(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
             words = []
     if words:
         raise MeshError(f"line {first}: continued by a backslash, but nothing follows: truncated")
+
+
+def _position(number: int, words: list[str]) -> list[str]:
+    """Three coordinates, then a weight, a colour or both: five numbers are one too few or many."""
+    if len(words) == 5:
+        raise MeshError(
+            f"line {number}: `{' '.join(words)[:60]}` is no position: it has 3 numbers, 4 with a "
+            "weight, 6 with a colour: damaged, export it again"
+        )
+    return words
 
 
 def _face(number: int, corners: list[str], position_count: int) -> list[int]:

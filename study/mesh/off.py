@@ -9,6 +9,8 @@ from study.mesh.raw import Block, RawMesh, by_corner_count, raw_mesh
 from study.mesh.text import NumberedLine, floats, text_lines, unit_note
 
 _KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF")
+_NUMBERS = {"ST": 2, "C": 3, "N": 3}
+"""That each prefix adds to a point, at least: a colour may have an opacity too."""
 
 
 def read_off(data: bytes) -> RawMesh:
@@ -27,13 +29,14 @@ def read_off(data: bytes) -> RawMesh:
     rows = [
         (i, words) for i, line in enumerate(lines, 1) if (words := line.partition("#")[0].split())
     ]
-    rows = _after_keyword(rows)
+    prefixes, rows = _after_keyword(rows)
     points, faces = _counts(rows)
     if len(rows) - 1 != points + faces:
         raise MeshError(
             f"{points} points and {faces} faces are announced, on a line each, but "
             f"{len(rows) - 1} lines found: truncated or damaged, export it again"
         )
+    _refuse_uneven(rows[1 : 1 + points], prefixes)
     places = floats(rows[1 : 1 + points], 3)
     blocks, thin = _polygons(rows[1 + points :])
     notes = [f"{thin} faces of one or two corners, which are points or lines, left out"]
@@ -41,11 +44,14 @@ def read_off(data: bytes) -> RawMesh:
     return raw_mesh(places, blocks, [*unit_note(comments), *(notes if thin else [])])
 
 
-def _after_keyword(rows: list[NumberedLine]) -> list[NumberedLine]:
-    """Rows from the one with the counts on, which may follow the keyword on its line."""
+def _after_keyword(rows: list[NumberedLine]) -> tuple[list[str], list[NumberedLine]]:
+    """Prefixes of the keyword, and the rows from the one with the counts on.
+
+    The counts may follow the keyword on its line.
+    """
     first = rows[0][1] if rows else []
     if first and all(re.fullmatch(r"[0-9]+", word) for word in first):
-        return rows  # the keyword may be missing
+        return [], rows  # the keyword may be missing
     keyword = (
         _KEYWORD.fullmatch(first[0]) or _KEYWORD.fullmatch(first[0].upper()) if first else None
     )
@@ -55,7 +61,23 @@ def _after_keyword(rows: list[NumberedLine]) -> list[NumberedLine]:
         raise MeshError(f"line {rows[0][0]}: `{first[0]}` holds places in more than 3 dimensions")
     if first[1:2] and first[1].upper() == "BINARY":
         raise MeshError(f"line {rows[0][0]}: `OFF BINARY` cannot be read; save it as text")
-    return [(rows[0][0], first[1:]), *rows[1:]] if first[1:] else rows[1:]
+    prefixes = [one for one in keyword.groups() if one]
+    return prefixes, [(rows[0][0], first[1:]), *rows[1:]] if first[1:] else rows[1:]
+
+
+def _refuse_uneven(rows: list[NumberedLine], prefixes: list[str]) -> None:
+    """MeshError for a point with fewer or more numbers than the others, or than are announced.
+
+    With a number missing in front, a colour would stand for a coordinate.
+    """
+    width = max((len(words) for _, words in rows), default=0)
+    least = 3 + sum(_NUMBERS[one] for one in prefixes)
+    for number, words in rows:
+        if not least <= len(words) == width:
+            raise MeshError(
+                f"line {number}: a point of {len(words)} numbers, but {max(least, width)} are due: "
+                "damaged, export it again"
+            )
 
 
 def _counts(rows: list[NumberedLine]) -> tuple[int, int]:
