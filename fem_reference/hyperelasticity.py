@@ -9,8 +9,10 @@ and the area of the undeformed body, so that only the tissue's law and geometry 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
@@ -22,6 +24,11 @@ from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+ENERGY_ORDER = 5
+"""Degree that the quadrature of an energy integrates. That of the mass, 4, has a negative weight at
+the centre of a cell: exact for the polynomials of a linear body, but where that point collapses, an
+energy of finite strain would fall without bound."""
 
 
 def material(tissue: Tissue, law: str | Law, made: Composition | None = None) -> Law:
@@ -107,6 +114,11 @@ def element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
     return found.reshape(-1, 3 * count, 3 * count)
 
 
+def by_positive_weights(nodes: Any) -> Any:
+    """A basis of scikit-fem's with the quadrature of an energy of finite strain."""
+    return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=ENERGY_ORDER)
+
+
 def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticSolid:
     """The body's elements, support and load with a law in place of Hooke's.
 
@@ -117,7 +129,7 @@ def solid(body: Body, tissue: Tissue, law: str | Law = DEFAULT) -> HyperelasticS
             "hyperelasticity is in displacements alone; discretise with element 'p2', which is "
             "good to a Poisson ratio of 0.49"
         )
-    nodes = body.nodes
+    nodes = by_positive_weights(body.nodes)
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     return HyperelasticSolid(

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array, csc_array
 from fem_reference.elasticity import MASS_ORDER, cell_moduli, rows
 from fem_reference.forms import pattern, products
 from fem_reference.grid import mapping
-from fem_reference.hyperelasticity import flat
+from fem_reference.hyperelasticity import by_positive_weights, flat
 from fem_reference.laws import IDENTITY
 from study.problem.heterogeneous import Composition
 from study.problem.tissue import Tissue
@@ -251,6 +251,7 @@ def on_nodes(
             f"tissue.poisson_ratio: {tissue.poisson_ratio:g} is not between 0 and 0.5, where "
             "elements with a pressure of their own are defined at large strain"
         )
+    nodes = by_positive_weights(nodes)
     slopes = np.stack([rows(function[0].grad) for function in nodes.basis], axis=-1)
     unknowns = 3 * nodes.element_dofs.T[..., None] + np.arange(3)
     local = np.asarray(nodes.X)
