@@ -191,7 +191,10 @@ def find_close(
         contact.active[count] = p
         set_give(contact, p, count, dt, u)
         for d in range(3):
-            contact.impulse[count, d] = dt * contact.push[p, d]
+            # Held points, brought to a place and not to a velocity, start from nothing: of what a
+            # solution leaves, a share rho, the next step makes z times as much, and from the last
+            # push z^3 = rho (3 z^2 - 3 z + 1) has roots beyond 1; from nothing z^2 = rho (2 z - 1).
+            contact.impulse[count, d] = 0.0 if contact.held[p] else dt * contact.push[p, d]
         count += 1
     return count
 
