@@ -581,6 +581,28 @@ PREDICTED_HEAD = (
 CONTROL = ("static_20", "remainder_20")
 
 
+TOOLS_HEAD = (
+    *("quantity", "lattices", "error within prediction", "within 1.5 times"),
+    *("error / prediction: median, largest", "from two lattices: within", "largest"),
+)
+
+
+def planned_tools() -> Iterator[tuple[str, str]]:
+    """What a plan foretells under moved tools, and what two lattices without a factor would."""
+    lines, rows = measured("planned_tools"), []
+    yield "planned-tools-scenes", str(len({one["scene"] for one in lines}))
+    for quantity in dict.fromkeys(one["quantity"] for one in lines):
+        ratios, by_two = (
+            [float(one["found"]) / float(one[name]) for one in lines if one["quantity"] == quantity]
+            for name in ("foretold", "by_two")
+        )
+        within = [str(sum(one <= limit for one in ratios)) for limit in (1.0, 1.5)]
+        spread = f"{median(ratios):.2g}, {max(ratios):.2g}"
+        other = [str(sum(one <= 1.0 for one in by_two)), f"{max(by_two):.2g}"]
+        rows.append([quantity, str(len(ratios)), *within, spread, *other])
+    yield "planned-tools", table(TOOLS_HEAD, rows)
+
+
 def planned() -> Iterator[tuple[str, str]]:
     """What a plan predicts at random places of the tool, against the error found there."""
     others = {_at(one): one for one in measured("corrected_places")}
@@ -943,7 +965,7 @@ def figures() -> dict[str, str]:
     fuzzy = (liver_run, virtual_patients)
     lattice = (field_error, real_time, kernels, peers, error_bar, large_strain)
     models = (error_bar_livers, certified, tradeoff, corrected, travelling)
-    foreseen = (under_gravity, graded, planned)
+    foreseen = (under_gravity, graded, planned, planned_tools)
     held = (verification, validation, stability, ranking, organ)
     groups = (*fuzzy, *lattice, *models, *foreseen, run_stages, *held)
     return {name: text for group in groups for name, text in group()}

@@ -202,7 +202,12 @@ def activate_points(
         contact.active[count] = p
         set_effective_mass(contact, p, count, dt, u)
         for d in range(3):
-            contact.impulse[count, d] = dt * contact.body_force[p, d]
+            # The impulse of a bonded point, which is brought to a position and not to a velocity,
+            # starts from zero. The solution leaves a fraction rho of what it should remove. Started
+            # from the last impulse, the remainder grows: z^3 = rho (3 z^2 - 3 z + 1) has roots
+            # beyond 1. Started from zero it decays: z^2 = rho (2 z - 1).
+            started = 0.0 if contact.bonded[p] else dt * contact.body_force[p, d]
+            contact.impulse[count, d] = started
         count += 1
     return count
 

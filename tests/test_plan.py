@@ -244,7 +244,7 @@ WANTS = {
 }
 
 
-PRESSED = ('require.quantities=["peak-force", "history"]', "require.error=99 %")
+PRESSED = ('require.quantities=["peak-force"]',)
 
 
 @pytest.mark.parametrize(
@@ -378,13 +378,25 @@ def moved_look(*quantities):
     return scene, moved_plan.look(scene, problem, measure(scene.require, problem))
 
 
-def test_a_moved_tool_is_planned_by_two_lattices_at_order_one():
+def test_the_error_is_twice_the_largest_difference_of_any_two_lattices():
+    def told(*motions):
+        def apart(one, finer):
+            return abs(one - finer) / finer
+
+        return moved_plan.error_of_finest(motions, apart)
+
+    assert told(6.0, 4.5, 4.0) == pytest.approx(2.0 * 2.0 / 4.0)
+    assert told(4.0, 5.0, 4.0) == pytest.approx(2.0 * 1.0 / 4.0)  # the first and last agree
+    assert told(6.0, 4.0, 5.0) == pytest.approx(2.0 * 2.0 / 4.0)
+
+
+def test_a_moved_tool_is_planned_by_three_lattices_at_order_one():
     scene, seen = moved_look("peak-force")
     found = list(moved_plan.lattices(scene, seen))
-    assert seen.spacing == pytest.approx(0.025)
+    assert seen.spacing == pytest.approx(0.02)
     assert [one.scene.models for one in found] == [("tissue",)] * len(found)
     by_spacing = {one.scene.lattice.spacing: one for one in found}
-    assert by_spacing[0.01].prediction.error == pytest.approx(seen.apart * 10 / 25)
+    assert by_spacing[0.01].prediction.error == pytest.approx(seen.error * 10 / 20)
     assert by_spacing[0.02].step == pytest.approx(2.0 * by_spacing[0.01].step)
     assert by_spacing[0.02].scene.lattice.step_fraction == 0.5
     assert by_spacing[0.01].wall_per_s == pytest.approx(16.0 * by_spacing[0.02].wall_per_s)
@@ -393,13 +405,14 @@ def test_a_moved_tool_is_planned_by_two_lattices_at_order_one():
 
 
 def test_only_what_is_wanted_of_a_moved_tool_counts():
-    force, history = moved_look("peak-force")[1].apart, moved_look("history")[1].apart
+    force, history = moved_look("peak-force")[1].error, moved_look("history")[1].error
     assert force != history
-    assert moved_look("peak-force", "history")[1].apart == max(force, history)
+    assert moved_look("peak-force", "history")[1].error == max(force, history)
 
 
 def test_gravity_and_further_loads_are_planned_likewise():
-    scene = scene_of("gravity.acceleration=9.81 m/s^2", "gravity.towards=inferior", *AT_TOOL)
+    weighed = "gravity.acceleration=9.81 m/s^2", "gravity.towards=inferior"
+    scene = scene_of(*weighed, "lattice.geometry=linear", *AT_TOOL)
     scene = replace(scene, require=Require(error=0.9))
     found = plan(scene)
     assert found.scene.models == ("tissue",)

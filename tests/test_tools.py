@@ -203,6 +203,20 @@ def test_a_bonded_tool_holds_and_pulls():
     assert probe[held] == pytest.approx(-2e-3, rel=1e-2)
 
 
+def test_a_bonded_sphere_is_moved_to_the_end_by_any_step():
+    """Many of its points hang on a node: what a solution leaves does not grow from step to step."""
+    small = "tool.contact=bonded", "tool.radius=12 mm", "lattice.spacing=12 mm"
+    brief = "tool.history.ramp=0.05 s", "time.duration=0.08 s", "time.samples=17"
+    forces = []
+    for fraction in (0.4, 0.2):
+        problem, _, found = run(*small, *brief, f"lattice.step_fraction={fraction}")
+        assert found.trajectory.status == "finished"
+        assert found.overlap < 1e-2 * 4e-3
+        forces.append(along(problem, found))
+    assert forces[1].max() > 0.5
+    assert np.abs(forces[0] - forces[1]).max() < 0.05 * forces[1].max()
+
+
 def test_a_clearance_delays_the_touch(pressed):
     problem, _, found = run("tool.clearance=2 mm", "tool.displacement=6 mm")
     force, gap = along(problem, found), problem.rigid_tools[0].travel(problem.observation.times)

@@ -298,7 +298,7 @@ def test_a_plan_foretells_lattices_and_corrected_ones():
     assert coarser / left == pytest.approx(2.0**1.5)
     assert mesh / finer == pytest.approx(1.0 / 0.75**2)
     assert seen.spacing == 0.01
-    assert left < seen.apart  # which the error of this lattice alone is
+    assert left < seen.error  # which the error of this lattice alone is
     with pytest.raises(ValueError, match=r"require\.error: .* nearest is"):
         plan(replace(wanted, require=replace(wanted.require, error=1e-3)))
 
@@ -308,7 +308,7 @@ def test_what_is_foretold_of_large_displacements_is_what_a_finer_lattice_finds(m
     wanted, seen = looked()
     foretold = _left(wanted, seen, 0.01)
     with monkeypatch.context() as coarser:
-        coarser.setattr(moved, "CORRECTED_LOOK", 1.25)
+        coarser.setattr(moved, "LOOK", 1.25)
         too_little = _left(*looked(), 0.01)
     posed = problem_of(wanted)
     known = model(wanted, "corrected")

@@ -1,18 +1,21 @@
-"""The plan of a scene with moved tools, gravity, weights or several loads: by two quick motions.
+"""The plan of a scene with moved tools, gravity, weights or several loads: by three quick motions.
 
-What a lattice is off by its spacing is told by the motions of two coarse ones, at the order that a
-run assumes too, and so of a tool smaller than their cells rather too much. What springs cannot do
-at any spacing is not looked at. Where corrected lattices follow the scene, as under tools that
-travel, theirs is told by what the two do beyond themselves linear, and by elements on two meshes at
-rest.
+What a lattice is off by its spacing is told by the motions of three coarse ones, at the order that
+a run assumes too, and so of a tool smaller than their cells rather too much. Errors of contact jump
+with how cells lie, so that two lattices agree by chance now and then, and the largest difference of
+any two is taken. What springs cannot do at any spacing is not looked at. Where corrected lattices
+follow the scene, as under tools that travel, theirs is told by what two of these do beyond
+themselves linear, and by elements on two meshes at rest.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,29 +52,34 @@ from study.similarity.fields import norm, relative_l2, relative_l2_of_curves
 
 Floats = NDArray[np.float64]
 
-LOOK, CORRECTED_LOOK = 1.25, 1.0
-"""Spacing of the finer lattice that is looked at, times that of the scene: alone, or corrected.
+LOOK = 1.0
+"""Spacing of the finest lattice that is looked at, times that of the scene.
 
-Of what lattices do beyond themselves linear coarser ones tell too little: on a block under a tool
-of 12 mm those of 12.5 and 25 mm an eighth of what one of 10 mm is off that of 5 mm, those of 10
-and 20 mm two thirds.
+Coarser ones tell too little of what lattices do beyond themselves linear: on a block under a tool
+of 12 mm those of 12.5 and 25 mm an eighth of what one of 10 mm is off that of 5 mm, those of 10 and
+20 mm two thirds.
+"""
+BETWEEN = 1.25
+"""Spacing of the third lattice, times that of the finest.
+
+With the two of a run alone the prediction fell short more often: they may agree by chance.
 """
 PEAK_FORCE, HISTORY = "peak-force", "history"
 
 
 @dataclass(frozen=True)
 class MovedLook:
-    """What two lattices did: of `spacing` [m], and of COARSER times it.
+    """What lattices did: of `spacing` [m], and of COARSER and BETWEEN times it.
 
-    `apart`: largest relative difference of what is wanted. Of the finer: springs, critical step
-    [s], wall [s] of a step and of its set-up, bytes of its arrays, largest strain of a spring.
-    `beyond`: as `apart`, of what they do beyond themselves linear, beside the finer's whole motion;
-    `elements`: coarse and fine ones at rest, `mesh` how far apart. None and none where a corrected
-    lattice does not follow the scene.
+    `error`: of what is wanted, relative, as they tell it of the finest. Of the finest: springs,
+    critical step [s], wall [s] of a step and of its set-up, bytes of its arrays, largest strain of
+    a spring. `beyond`: largest relative difference of what the coarsest and the finest do beyond
+    themselves linear, beside the finest's whole motion; `elements`: coarse and fine ones at rest,
+    `mesh` how far apart. None and none where a corrected lattice does not follow the scene.
     """
 
     spacing: float
-    apart: float
+    error: float
     springs: int
     critical: float
     step_wall: float
@@ -96,21 +104,33 @@ class AtRest:
 
 
 def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
-    """Move two lattices. ValueError where one of them does not reach the end."""
-    spacing = (CORRECTED_LOOK if _is_correctable(scene) else LOOK) * scene.lattice.spacing
-    coarse, _, *before = _run(scene, problem, COARSER * spacing)
-    fine, seen, *last = _run(scene, problem, spacing)
+    """Move three lattices. ValueError where one of them does not reach the end."""
+    spacings = [times * LOOK * scene.lattice.spacing for times in (COARSER, BETWEEN, 1.0)]
+    moved = [_run(scene, problem, one) for one in spacings]
+    runs = [run for run, _ in moved]
     assert scene.require is not None  # noqa: S101 - as something is planned for
-    seen = replace(seen, apart=_apart(problem, scene.require, measure, coarse, fine))
-    if not before or not last:
+    wanted = partial(_apart, problem, scene.require, measure)
+    seen = replace(moved[-1][1], error=error_of_finest(runs, wanted))
+    if not _is_correctable(scene):
         return seen
-    elements = [_at_rest(level, size, one) for level, size, one in meshes(scene, problem)]
+    before, last = (_beyond_linear(scene, problem, spacings[n], runs[n]) for n in (0, -1))
+    elements = [_at_rest(*one) for one in meshes(scene, problem)]
     return replace(
         seen,
-        beyond=_by_motion(measure, plus(before[0], last[0], -1.0), fine.trajectory),
+        beyond=_by_motion(measure, plus(before, last, -1.0), runs[-1].trajectory),
         elements=Look(problem, (), tuple(one.look for one in elements), seen.strain, 0.0),
         mesh=_by_mesh(measure, elements),
     )
+
+
+def error_of_finest(runs: Sequence[Run], apart: Callable[[Run, Run], float]) -> float:
+    """Relative error of the last of several lattices of falling spacing, as all of them tell it.
+
+    At order one two that are COARSER apart differ by as much as the finer is off. Those that lie
+    closer tell of the chance of how cells lie, which nothing makes larger. `apart`: relative
+    difference of a lattice from a finer one.
+    """
+    return CAUTION * max(apart(one, finer) for one, finer in combinations(runs, 2))
 
 
 def _is_correctable(scene: Scene) -> bool:
@@ -120,33 +140,36 @@ def _is_correctable(scene: Scene) -> bool:
     return nonlinear and able.issuperset(scene.features)
 
 
-def _run(
-    scene: Scene, problem: Problem, spacing: float
-) -> tuple[Run, MovedLook] | tuple[Run, MovedLook, Trajectory]:
-    """A motion and what it took; and what of it is beyond itself linear where that is asked for."""
-    tissue = model(scene, "tissue")
-    assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
+def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook]:
+    """A motion and what it took."""
     started = time.perf_counter()
-    chosen = replace(tissue, scene=replace(tissue.scene, lattice=_settings(scene, spacing)))
-    prepared = chosen.prepare(problem)
+    prepared = _lattice(scene, _settings(scene, spacing)).prepare(problem)
     run, springs = prepared.moved(), len(prepared.assembly.springs.weight)
     setup = time.perf_counter() - started - run.wall
     if run.trajectory.status != "finished" or run.inverted_cells:
         raise ValueError(
             f"require: the motion of a lattice of {1e3 * spacing:.3g} mm, by which errors are "
-            "foretold, is lost; reduce tool.displacement or lattice.step_fraction"
+            "predicted, is lost; reduce tool.displacement or lattice.step_fraction"
         )
     net = arrays(prepared.assembly, prepared.springs.material)
     nbytes = sum(part.nbytes for part in net if isinstance(part, np.ndarray))
     step_wall = run.wall / run.steps
     found = (springs, run.smallest_step, step_wall, setup, nbytes, run.largest_strain)
-    seen = MovedLook(spacing, 0.0, *found)
-    if not _is_correctable(scene):
-        return run, seen
-    linear = replace(chosen.scene.lattice, geometry="linear")
-    other = replace(chosen, scene=replace(chosen.scene, lattice=linear)).prepare(problem)
-    below = other.moved(Counts(run.substeps)).trajectory
-    return run, seen, plus(run.trajectory, below, -1.0)
+    return run, MovedLook(spacing, 0.0, *found)
+
+
+def _lattice(scene: Scene, settings: Lattice) -> LatticeModel:
+    """That of the tissue's modulus."""
+    tissue = model(scene, "tissue")
+    assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
+    return replace(tissue, scene=replace(tissue.scene, lattice=settings))
+
+
+def _beyond_linear(scene: Scene, problem: Problem, spacing: float, run: Run) -> Trajectory:
+    """What of a motion of a lattice is beyond itself linear, by the same steps."""
+    settings = replace(_settings(scene, spacing), geometry="linear")
+    linear = _lattice(scene, settings).prepare(problem).moved(Counts(run.substeps))
+    return plus(run.trajectory, linear.trajectory, -1.0)
 
 
 def _settings(scene: Scene, spacing: float) -> Lattice:
@@ -219,7 +242,7 @@ def _by_mesh(measure: Measure, elements: Sequence[AtRest]) -> float:
 
 
 def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
-    """Lattices corrected by elements, with errors and costs foretold; none where they cannot be."""
+    """Lattices corrected by elements, with predicted errors and costs; none where they cannot be used."""
     if seen.beyond is None or seen.elements is None:
         return
     last, base = seen.elements.elements[-1].size, seen.elements.problem.geometry.level(0)
@@ -248,11 +271,11 @@ def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
 
 
 def lattices(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
-    """Lattices of the tissue's modulus by their spacing, with errors and costs foretold."""
+    """Lattices of the tissue's modulus by their spacing, with predicted errors and costs."""
     for times in SPACINGS:
         spacing = times * scene.lattice.spacing
         finer = seen.spacing / spacing
-        error = seen.apart / (COARSER**ORDER - 1.0) / finer**ORDER
+        error = seen.error / finer**ORDER
         chosen = _settings(scene, spacing)
         yield Candidate(
             name=f"lattice of {1e3 * spacing:.3g} mm",
