@@ -1,11 +1,10 @@
-"""Forces of a network over a regular grid, compiled: those of `msm.forces`, a block at a time.
+"""Forces of `msm.forces` over a regular grid, compiled, one vector block at a time.
 
-Each loop takes the nodes or cells of one block at once, whatever the number of lanes. All add to
-the force of a grid, of which integrators set to zero what they have used. Entries beyond the organ
-are touched but have no weight. As in `msm.forces`, a spring pressed to a point gives NaN.
+Each loop iteration processes the nodes or cells of one block. All functions add to the force of a
+grid; integrators reset it to zero after use. Entries outside the organ are read but have no weight.
+As in `msm.forces`, a spring of zero length gives NaN.
 
-What is done for a block is chosen when a kernel is compiled: by the law, by the precision, and by
-whether displacements are small (`linear`).
+The law, the precision and the choice of small displacements (`linear`) are resolved at compilation.
 """
 
 from __future__ import annotations
@@ -93,7 +92,7 @@ def add_spring_forces(law: Any, grid: Grid, linear: Small, u: Floats, force: Flo
 def add_spring_damping(
     law: Any, grid: Grid, linear: Small, beta: float, u: Floats, v: Floats, force: Floats
 ) -> None:
-    """Add a dashpot along each spring, of beta times its stiffness at the present strain."""
+    """Add a dashpot along each spring, of beta times its stiffness at the current strain."""
     lanes, directions = grid.lanes, grid.offset.shape[0]
     none = every(0.0, lanes)
     for b in range(grid.start.shape[0]):
@@ -112,7 +111,7 @@ def add_spring_damping(
 
 
 def pulled(law: Any, grid: Grid, linear: Small, d: int, dx: Any, dy: Any, dz: Any) -> Any:
-    """Force [N/m] over spring vector and weight, and that vector, of ends so far moved apart."""
+    """Spring force over weight and spring vector [N/m], and that vector."""
     raise NotImplementedError(law, grid, linear, d, dx, dy, dz)
 
 
@@ -122,7 +121,7 @@ def _pulled(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any)
 
 
 def _pulled_along(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any) -> Any:  # noqa: ARG001 - numba matches names
-    """Along the springs as they are; `stretched` is their squared length less that at rest."""
+    """Along the deformed springs; `stretched` is the change of their squared length."""
     x, y, z = grid.rest[d, 0], grid.rest[d, 1], grid.rest[d, 2]
     stretched = 2.0 * (x * dx + y * dy + z * dz) + (dx * dx + dy * dy + dz * dz)
     dx, dy, dz = x + dx, y + dy, z + dz
@@ -131,14 +130,14 @@ def _pulled_along(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz
 
 
 def _pulled_at_rest(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any) -> Any:  # noqa: ARG001 - numba matches names
-    """Along the springs at rest."""
+    """Along the undeformed springs."""
     x, y, z = grid.rest[d, 0], grid.rest[d, 1], grid.rest[d, 2]
     strain = (x * dx + y * dy + z * dz) * (grid.per_length[d] * grid.per_length[d])
     return tension(law, strain), x, y, z
 
 
 def resisted(law: Any, grid: Grid, linear: Small, d: int, dx: Any, dy: Any, dz: Any) -> Any:
-    """Slope [N/m] over weight and squared length [m^2], and the spring vector, likewise."""
+    """Spring stiffness over weight and squared length [m^2], and the spring vector."""
     raise NotImplementedError(law, grid, linear, d, dx, dy, dz)
 
 
@@ -160,12 +159,12 @@ def _resisted_at_rest(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any
 
 
 def _displaced(linear: Any) -> bool:
-    """Whether forces follow the displaced nodes, from the compiler's type of `linear`."""
+    """Whether geometric nonlinearity is included, from the numba type of `linear`."""
     return linear is types.none
 
 
 def pull(law: Any, length: float, per_length: float, squared: Any, stretched: Any) -> Any:
-    """T(X) L_0 / L [N/m], from the rest length, the squared length and its growth."""
+    """T(X) L_0 / L [N/m], from rest length, squared length and its change."""
     raise NotImplementedError(law, length, per_length, squared, stretched)
 
 
@@ -311,7 +310,7 @@ def add_volume_damping(
 
 @inner_kernel()
 def add_foundation_forces(grid: Grid, u: Floats, times: float, force: Floats) -> None:
-    """Subtract S u, so many times."""
+    """Subtract `times` S u, with S the foundation."""
     lanes, couplings = grid.lanes, grid.held_offset.shape[0]
     none = every(0.0, lanes)
     for b in range(grid.held_start.shape[0]):
