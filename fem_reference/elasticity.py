@@ -33,9 +33,9 @@ from fem_reference.stiffness import Pressure, Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.problem.contact import ToolPatch
+from study.problem.heterogeneous import Composition, Moduli, barycentric_samples, composition
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition, Moduli, barycentric_samples, composition
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

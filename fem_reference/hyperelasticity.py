@@ -17,8 +17,8 @@ from scipy.sparse import coo_array, csc_array
 from fem_reference.elasticity import Body, Booleans, cell_moduli, decoupled, rows
 from fem_reference.elements import ELEMENTS
 from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
+from study.problem.heterogeneous import Composition
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

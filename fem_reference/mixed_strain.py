@@ -24,8 +24,8 @@ from fem_reference.forms import pattern, products
 from fem_reference.grid import mapping
 from fem_reference.hyperelasticity import flat
 from fem_reference.laws import IDENTITY
+from study.problem.heterogeneous import Composition
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

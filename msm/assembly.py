@@ -26,10 +26,10 @@ from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
 from study.organ.occupancy import SolidShape
 from study.problem.contact import Load, ToolPatch, Weight
+from study.problem.heterogeneous import Composition
 from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

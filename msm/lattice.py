@@ -13,8 +13,8 @@ from scipy.spatial import KDTree
 
 from msm.kinematics import inverted_cells
 from study.organ.occupancy import SolidShape
+from study.problem.heterogeneous import Composition, composition
 from study.problem.tissue import Tissue
-from study.problem.varied import Composition, composition
 
 if TYPE_CHECKING:
     from msm.graded import GradedLattice

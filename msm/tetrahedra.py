@@ -28,9 +28,9 @@ from study.mesh.locate import locate
 from study.mesh.quadrature import SurfaceRule
 from study.mesh.tetrahedra import EDGES, edges, mean_edge, volumes
 from study.problem.contact import ToolPatch
+from study.problem.heterogeneous import of_tetrahedra
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.problem.varied import of_tetrahedra
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

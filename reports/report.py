@@ -34,9 +34,9 @@ from study.folders import FolderError, check_file, tell, write_bytes
 from study.progress import Progress, Silent
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
-from study.stages.flat import Arrays
-from study.stages.lanes import Job, available, lanes
-from study.stages.once import kept, made_once
+from study.stages.cached_arrays import cached_arrays, kept
+from study.stages.job_pool import Job, available, job_pool
+from study.stages.serialisation import Arrays
 from study.stages.threads import allowed
 from study.sweep.program import everything
 
@@ -135,7 +135,7 @@ def _organ(seen: Views, pictures: Pictures) -> Arrays:
     if pictures.pixels is None:  # VTK may be mended
         return make()
     name, *given = _named(seen)
-    return made_once(name, make, *given, modules=(__name__,))
+    return cached_arrays(name, make, *given, modules=(__name__,))
 
 
 @contextmanager
@@ -179,7 +179,7 @@ def _kept_plots(results: Results) -> Figures:
         }
 
     given = results, _more_fonts(), everything("reports")
-    found = made_once("plots", make, *given, modules=(__name__,))
+    found = cached_arrays("plots", make, *given, modules=(__name__,))
     figures: Figures = {"motion": []}  # of a motion without a finite sample
     for name, svg in found.items():
         figures.setdefault(name.partition("/")[0], []).append(svg.tobytes())
@@ -190,7 +190,7 @@ def _plots(results: Results) -> Figures:
     """All plots but pictures of the organ, drawn in two processes where there are processors."""
     drawings = _drawings(results)
     canvas.load()
-    with lanes(min(PROCESSES, allowed(available())), Silent()) as side_by_side:
+    with job_pool(min(PROCESSES, allowed(available())), Silent()) as side_by_side:
         for number, draw in enumerate(drawings):
             side_by_side.start(Job(str(number), partial(_drawn, draw)))
         found = side_by_side.results()

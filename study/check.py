@@ -29,10 +29,10 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
     scene = read_suited(name, overrides)
     refuse_unwritable(out or default_folder(name))
     lines = [scene.title or name, f"models: {', '.join(scene.models)}"]
-    from study.run.ready import ReadyPoint, ready
+    from study.run.preparation import PreparedPointScene, prepare_scene
 
-    given = ready(scene)
-    if isinstance(given, ReadyPoint):
+    given = prepare_scene(scene)
+    if isinstance(given, PreparedPointScene):
         return [*lines, f"one control mass point of {given.problem.mass:.4g} kg"]
     from study.run.dimensionless import dimensionless
 
@@ -46,7 +46,7 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
 def describe_mesh(
     path: Path, unit: str | None, axes: str | None = None, pieces: str = "one"
 ) -> list[str]:
-    """Lines on a mesh file: what it holds, what was repaired, its quality."""
+    """Lines on a mesh file: its content, the repairs made, and its quality."""
     from study.mesh.axes import axes_note
     from study.mesh.load import load_mesh
 

@@ -59,7 +59,7 @@ def _cell(value: str | float) -> str:
 
 
 def cohort_lines(study: CohortStudy) -> Iterator[str]:
-    """A line per contender over all patients, then what the comparisons come to."""
+    """A line per contender over all patients, then the comparisons in sentences."""
     by_group = {(row.contender, row.readings): row for row in study.rows if row.aetiology == "all"}
     (every, *_) = study.rows
     yield f"{every.patients} virtual patients; rms and width over the true stiffness, by readings"

@@ -1,6 +1,6 @@
-"""What differs between two results folders, for `compare`: numbers, rows, arrays, scene, origin.
+"""Differences between two results folders, for `compare`: numbers, rows, arrays, scene, provenance.
 
-Wall times are left out, for they differ from run to run.
+Wall times are omitted, since they vary from run to run.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Row = (
 )
 Flat = dict[str, object]
 Series = dict[str, dict[str, float]]
-"""Numbers by the name of their series, and in it by their place."""
+"""Numbers by the name of their series and their place in it."""
 
 WALL = "wall_s"
 ONLY = "only in the {}"
@@ -53,16 +53,16 @@ WORDS = (
     *("schema_version", "provenance", "title", "assumptions", "notes", "warnings"),
     *("stages", "workers"),
 )
-"""Of results.json, told elsewhere, or no numbers of the study."""
+"""Entries of results.json that are compared elsewhere, or that are no numbers of the study."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """How far a quantity is apart in two folders.
+    """The difference of a quantity in two folders.
 
     `largest`: absolute, in the quantity's unit; `relative`: to the largest absolute value of its
-    series, infinite where a number stands in one folder only; `where`: of the largest relative one;
-    `count` of `total` numbers that differ at all.
+    series, infinite where a number exists in one folder only; `where`: place of the largest
+    relative one; `count` of `total` numbers that differ at all.
     """
 
     quantity: str
@@ -76,7 +76,7 @@ class Difference:
 def differences(first: Results, second: Results) -> list[Difference]:
     """Quantities that differ, by table and column, array and number of results.json.
 
-    A series is a model's curve at a control point, an array, or a single number elsewhere.
+    A series is a model's curve at a control point, an array, or otherwise a single number.
     """
     found = [
         *_tables("curves.csv", first.curves, second.curves, 2),
@@ -98,7 +98,7 @@ def differences(first: Results, second: Results) -> list[Difference]:
 
 
 def other_words(first: Results, second: Results) -> list[str]:
-    """Lines on what differs in the scene and in what made the results."""
+    """Lines on differences in the scene and in the provenance of the results."""
     scenes = [_flat(resolved(one.scene)) for one in (first, second)]
     origins = [_flat(asdict(one.record.provenance)) for one in (first, second)]
     return [*_changes("scene", *scenes), *_changes("made by", *origins)]
@@ -129,7 +129,7 @@ def _columns(rows: Sequence[Row], keys: int) -> dict[str, Series]:
 
 
 def _compared(quantity: str, first: Series, second: Series) -> Difference:
-    """The largest difference of all series of a quantity."""
+    """The largest difference over all series of a quantity."""
     apart: list[tuple[float, float, str]] = []
     total = 0
     for name in dict.fromkeys([*first, *second]):
@@ -178,7 +178,7 @@ def _arrays(file: str, first: Arrays, second: Arrays) -> Iterator[Difference]:
 def _array(
     quantity: str, first: NDArray[np.generic] | None, second: NDArray[np.generic] | None
 ) -> Difference:
-    """Texts differ or not; numbers by how much, relative to the largest; NaN is the same as NaN."""
+    """Texts are equal or not; numbers differ relative to the largest; NaN equals NaN."""
     total = max(0 if array is None else array.size for array in (first, second))
     if first is None or second is None or first.shape != second.shape:
         return _whole(quantity, total, _how(first, second))
@@ -213,7 +213,7 @@ def _how(first: NDArray[np.generic] | None, second: NDArray[np.generic] | None) 
 
 
 def _whole(quantity: str, count: int, where: str) -> Difference:
-    """One that no tolerance covers."""
+    """A difference that no tolerance covers."""
     return Difference(
         quantity=quantity,
         largest=math.inf,
@@ -249,8 +249,8 @@ def _record(first: Results, second: Results) -> Iterator[Difference]:
 def _numbers(results: Results) -> Flat:
     plain = asdict(results.record)
     plain["models"] = {model["name"]: model for model in plain["models"]}
-    told = {key: value for key, value in plain.items() if key not in WORDS}
-    return {key: value for key, value in _flat(told).items() if not key.endswith(WALL)}
+    compared = {key: value for key, value in plain.items() if key not in WORDS}
+    return {key: value for key, value in _flat(compared).items() if not key.endswith(WALL)}
 
 
 def _flat(table: object, before: str = "") -> Flat:

@@ -1,4 +1,4 @@
-"""Rests along a path of growing load, by increments that follow how easily each is found."""
+"""Equilibria along a path of increasing load, by increments that adapt to the iterations needed."""
 
 from __future__ import annotations
 
@@ -8,30 +8,29 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 
 class Rest(Protocol):
-    """Where a search for a rest ended."""
+    """The result of a search for an equilibrium."""
 
     @property
     def factor(self) -> float:
-        """Multiple of what is asked for."""
+        """Load factor, relative to the full load."""
 
     @property
     def residuals(self) -> tuple[float, ...]:
-        """Before each iteration and after the last."""
+        """Residuals before each iteration and after the last."""
 
     @property
     def failure(self) -> str:
-        """Why it is none; empty if it is one."""
+        """Why it is no equilibrium; empty if it is one."""
 
 
 R = TypeVar("R", bound=Rest)
 
 
 class Increments(NamedTuple):
-    """How a path is divided.
+    """How a load path is divided.
 
-    `easy`: after as few iterations the next increment is twice as large; `smallest`: share of the
-    target below which an increment that fails is not halved again; `unit`: what a factor
-    multiplies, in words.
+    `easy`: number of iterations up to which the next increment is doubled; `smallest`: share of the
+    target below which a failed increment is not halved again; `unit`: name of the loaded quantity.
     """
 
     easy: int
@@ -41,10 +40,11 @@ class Increments(NamedTuple):
 
 @dataclass(frozen=True)
 class Followed(Generic[R]):
-    """Rests at the factors asked for, as far as they were reached.
+    """Equilibria at the requested load factors, as far as they were reached.
 
-    `iterations`: spent on each since the one before; `reached`: factor of the last rest found,
-    which need not be one asked for; `failure` says why the path ends there, empty if it does not.
+    `iterations`: spent on each since the one before; `reached`: factor of the last equilibrium
+    found, which need not be a requested one; `failure`: why the path ends there, empty if it is
+    complete.
     """
 
     rests: tuple[R, ...]
@@ -56,7 +56,7 @@ class Followed(Generic[R]):
 def follow(
     start: R, factors: Iterable[float], rest: Callable[[R, float], R], by: Increments
 ) -> Followed[R]:
-    """Rests at the factors in the order given; `rest` looks for one, starting from another."""
+    """Equilibria at the factors in the given order; `rest` searches for one from another."""
     at, rests, spent = start, list[R](), list[int]()
     for factor in factors:
         at, iterations, failure = _move_up(at, factor, rest, by)
@@ -70,9 +70,9 @@ def follow(
 def _move_up(
     start: R, target: float, rest: Callable[[R, float], R], by: Increments
 ) -> tuple[R, int, str]:
-    """The rest at a target, or the last before it, the iterations spent, and why it ended there.
+    """The equilibrium at a target or the last one before it, the iterations, and the failure.
 
-    First the whole way is tried; an increment at which no rest is found is halved.
+    First the whole increment is tried; an increment without an equilibrium is halved.
     """
     at, increment, iterations = start, target - start.factor, 0
     while at.factor != target:

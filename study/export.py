@@ -1,4 +1,4 @@
-"""The problem of a scene in the files of another code, for `export`."""
+"""The problem of a scene as files for another code, for `export`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from study.organ.geometry import Level
 from study.problem.contact import Load
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
-from study.problem.way import Turn
+from study.problem.tool_travel import StationFactor
 from study.progress import Progress
 from study.results import folder as results
 from study.run.suiting import read_suited
@@ -50,11 +50,11 @@ MESHES = {
 LATTICE = "lattice"
 FORMATS = ("calculix", "vtu", LATTICE, *MESHES)
 HELD = frozenset({"several-loads", "travelling-loads", "gravity", "weights"})
-"""What nodal forces and a field of gravity say of a scene beside its first load."""
+"""Features beside the first load that nodal forces and a gravity field can express."""
 MARK = "README.txt"
 VTU = "problem.vtu"
 ALPHA = -0.05
-"""Of HHT: CalculiX's own default."""
+"""Parameter of HHT: CalculiX's own default."""
 # Also what CalculiX leaves beside its decks.
 FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     f"{deck}.{end}"
@@ -65,12 +65,12 @@ FILES |= {calculix.WEIGHTS, calculix.HISTORIES}
 FILES |= {file for file, _ in MESHES.values()} | handover.FILES
 FURTHER_LOAD = re.compile(r"load\.\d+\.inp")
 FRAMES = 4
-"""Times, equally spaced, at which the motion of all nodes is compared."""
+"""Number of equally spaced times at which the motion of all nodes is compared."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRequest:
-    """What was asked: a scene or results folder, the format, the folder to write, overrides."""
+    """The request: a scene or results folder, the format, the folder to write, overrides."""
 
     target: str
     to: str
@@ -80,7 +80,7 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class _Target:
-    """The scene, the folder to write if none is given, and of results elements and curves."""
+    """The scene, the default folder, and the elements and curves of existing results."""
 
     scene: Scene
     folder: Path
@@ -89,7 +89,7 @@ class _Target:
 
 
 def export(request: ExportRequest, progress: Progress) -> Path:
-    """Write the problem; the folder. ValueError for a target or format that will not do."""
+    """Write the problem; returns the folder. ValueError for an unsuitable target or format."""
     if request.to not in FORMATS:
         raise ValueError(f"--to {request.to}: use one of {', '.join(FORMATS)}")
     target = _target(request)
@@ -108,7 +108,7 @@ def export(request: ExportRequest, progress: Progress) -> Path:
 
 
 def _refuse_unheld(to: str, scene: Scene) -> None:
-    """ValueError for what a format of one tissue, foundation and nodal forces has no place for."""
+    """Raise ValueError for features that a format cannot express."""
     unheld = [name for name in scene.features if name not in HELD]
     if unheld and to not in (*MESHES, LATTICE):
         what = " and ".join(FEATURES[name] for name in unheld)
@@ -157,7 +157,9 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
         folder,
         {
             VTU: vtu.text(given, displacement),
-            MARK: _about_vtu(scene, given) + _burdened(problem, given) + _noted(scene, problem),
+            MARK: _about_vtu(scene, given)
+            + _external_loads_note(problem, given)
+            + _noted(scene, problem),
         },
     )
 
@@ -181,7 +183,7 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
         pairs = zip(moved, own_moved, strict=True)
         differences = (at_rest, max(_difference(u, v) for (_, u), (_, v) in pairs))
         about = _about_calculix(scene, given, motion, differences)
-    about += _burdened(problem, given, merged=given.is_merged) + _noted(scene, problem)
+    about += _external_loads_note(problem, given, merged=given.is_merged) + _noted(scene, problem)
     _write(folder, files | {MARK: about})
 
 
@@ -199,7 +201,7 @@ WRITERS = {"vtu": _write_vtu, "calculix": _write_calculix, LATTICE: _write_latti
 
 
 def _check_memory(level: Level, scene: Scene) -> None:
-    """Steps in time factor the matrix, here and in CalculiX."""
+    """Time steps factorise the matrix, here and in CalculiX."""
     element = chosen_element(scene.reference.element, scene.tissue.highest_poisson_ratio)
     count = unknowns(level.mesh, element)
     wanted, limit = needed(count, element, stepping=True), SHARE * available()
@@ -213,7 +215,7 @@ def _check_memory(level: Level, scene: Scene) -> None:
 def _discretised(
     target: _Target, progress: Progress, *, steps: bool = False
 ) -> tuple[Body, Problem]:
-    """The body and its problem; ValueError before it is assembled, for `steps` in time too."""
+    """The body and its problem; ValueError before assembly, with `steps` for time steps too."""
     with progress.stage("organ"):
         problem = problem_of(target.scene)
         prepared = reference_of(target.scene).prepare(problem)
@@ -250,14 +252,14 @@ def motion_of(scene: Scene, problem: Problem) -> Transient:
 
 
 def frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
-    """Times [s] that CalculiX prints of a motion, and the unknowns then."""
+    """Times [s] at which CalculiX prints a motion, and the unknowns at these times."""
     system = Oscillator(body.mass, body.stiffness, body.loads, motion.damping)
     steps = hht(system, motion.factor, motion.step, motion.count, motion.alpha)
     return _kept(steps, motion)
 
 
 def _own_frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
-    """The same times in the reference's own steps, mass and quadrature."""
+    """The same times with the reference's own steps, mass and quadrature."""
     system = Oscillator(body.mass, body.stiffness, body.loads, motion.damping)
     return _kept(march(system, motion.factor, motion.step, motion.count), motion)
 
@@ -353,8 +355,8 @@ displacement differs by {at_rest:.1e}, relative L2 over the nodes.
 """
 
 
-def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
-    """What acts beside the first load, and in which parts of the files; nothing where nothing.
+def _external_loads_note(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
+    """What acts beside the first load, and in which files; empty if nothing does.
 
     `merged`: whether the files have all loads as one.
     """
@@ -384,7 +386,7 @@ def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) ->
 
 def _of_load(load: Load) -> str:
     """Whose it is."""
-    travels = isinstance(load.factor, Turn)
+    travels = isinstance(load.factor, StationFactor)
     return f"of {load.tool.name}" + (" at a station of its path" if travels else "")
 
 
@@ -416,7 +418,7 @@ and then has the same tetrahedra again, also where a mesher that is not reproduc
 
 
 def _noted(scene: Scene, problem: Problem) -> str:
-    """What was found, repaired or chosen of the organ, each once."""
+    """What was found, repaired or chosen for the organ, without repetition."""
     notes = dict.fromkeys((*scene.remarks, *problem.notes))
     return "".join(["\nNotes on the organ:\n", *(f"- {note}\n" for note in notes)]) if notes else ""
 

@@ -1,7 +1,7 @@
-"""Folders and files that are written aside and moved into place at once.
+"""Folders and files that are written under a temporary name and moved into place at once.
 
 A folder is claimed by a lock for as long as it is being written. What a killed program left beside
-it is told and removed by the next one that claims it.
+it is reported and removed by the next one that claims it.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from pathlib import Path
 from study import lock
 
 Foreign = Callable[[set[str]], str | None]
-"""Of the names in a folder, one that it must not lose, if there is any."""
+"""Given the names in a folder, one that must not be lost, or None."""
 
 OLD, NEW = "old", "new"
-"""In the folder aside: what is replaced, and what replaces it."""
+"""In the temporary folder: the content that is replaced, and the one that replaces it."""
 OF_THE_MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
-"""Errors for which another place or name is no remedy."""
+"""Errors that another place or name does not remedy."""
 
 NO_PLACE = (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError)
-"""Errors of writing a file for which another place is the remedy."""
+"""Errors of writing a file that another place remedies."""
 
 
 class FolderError(ValueError):
-    """A place that cannot be written or must not be replaced; the message says what to do."""
+    """A place that cannot be written or must not be replaced; the message states the remedy."""
 
 
 @contextmanager
 def replacing(folder: Path, foreign: Foreign, writer: str) -> Iterator[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
-    FolderError before the block if `folder` holds what no `writer` wrote, cannot be written, or is
-    being written by another. What somebody puts there meanwhile stays. After a failure nothing new
-    is left. An OSError of the block names `folder`.
+    FolderError before the block if `folder` holds content that no `writer` wrote, cannot be
+    written, or is being written by another process. Files that somebody puts there meanwhile are
+    preserved. A failure leaves nothing new. An OSError of the block names `folder`.
     """
     _check_name(folder, "--out")
     shown, folder = folder, folder.resolve()
@@ -62,10 +62,10 @@ def replacing(folder: Path, foreign: Foreign, writer: str) -> Iterator[Path]:
 
 @contextmanager
 def claimed(folder: Path) -> Iterator[None]:
-    """Keep others from writing a folder, which need not be there, while the block runs.
+    """Keep other processes from writing a folder, which need not exist, while the block runs.
 
-    FolderError if another does, or if there cannot be such a folder. Folders above it are made, and
-    removed if they are empty in the end.
+    FolderError if another process writes it, or if it cannot exist. Parent folders are created, and
+    removed again if they stay empty.
     """
     _check_name(folder, "--out")
     shown, folder = folder, folder.resolve()
@@ -86,7 +86,7 @@ def claimed(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def naming(shown: Path, aside: Path | None = None) -> Iterator[None]:
-    """Let an OSError of the block that names no file, or one in the folder aside, name `shown`."""
+    """Let an OSError of the block name `shown` if it names no file, or only a temporary one."""
     try:
         yield
     except OSError as error:
@@ -97,7 +97,7 @@ def naming(shown: Path, aside: Path | None = None) -> Iterator[None]:
 
 @contextmanager
 def making(folder: Path) -> Iterator[None]:
-    """A folder to write files into in the block; a failure removes it, unless it was there."""
+    """A folder to write files into in the block; a failure removes it, unless it existed before."""
     found = folder.exists()
     try:
         with naming(folder):
@@ -123,7 +123,7 @@ def check_file(path: Path, flag: str = "--out") -> None:
 
 
 def check_folder(folder: Path, flag: str = "--out") -> None:
-    """Refuse a folder that could not be made or written. FolderError names the flag."""
+    """Refuse a folder that could not be created or written. FolderError names the flag."""
     _check_name(folder, flag)
     above = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
     if not above.is_dir():
@@ -132,9 +132,9 @@ def check_folder(folder: Path, flag: str = "--out") -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file aside and move it into place. OSError that names it, and no half a file.
+    """Write a file under a temporary name and move it into place; OSError names it.
 
-    What is no file, such as /dev/stdout, is written as it is.
+    Nothing is half written. What is no regular file, such as /dev/stdout, is written directly.
     """
     path = path.resolve()
     with naming(path):
@@ -158,12 +158,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def tell(text: str) -> None:
-    """Tell a person what was done to a folder."""
+    """Print a message on a folder to stderr."""
     print(f"liver-study: {text}", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 
 def refusal(path: Path, error: OSError) -> Exception:
-    """What to raise where a place cannot be written before anything is computed."""
+    """The exception for a place that cannot be written, before anything is computed."""
     if error.errno in OF_THE_MACHINE:
         return error
     return FolderError(f"{path}: cannot be written ({error.strerror}); choose another folder")
@@ -173,7 +173,7 @@ def refusal(path: Path, error: OSError) -> Exception:
 
 
 def _bring_back(old: Path, folder: Path, foreign: Foreign) -> None:
-    """Move what no writer wrote from the folder that was replaced into the new one."""
+    """Move what no writer wrote from the replaced folder into the new one."""
     present = {path.name for path in old.iterdir()} if old.is_dir() else set[str]()
     while (found := foreign(present)) in present:
         present.discard(str(found))
@@ -183,7 +183,7 @@ def _bring_back(old: Path, folder: Path, foreign: Foreign) -> None:
 
 
 def refuse_unwritable(folder: Path, foreign: Foreign, writer: str) -> None:
-    """FolderError if `replacing` would refuse the folder; nothing is left behind."""
+    """Raise FolderError if `replacing` would refuse the folder; nothing is left behind."""
     check_folder(folder)
     _check(folder.resolve(), foreign, writer)
 
@@ -214,7 +214,7 @@ def _check_access(place: Path, wanted: int, flag: str) -> None:
 
 
 def _check_name(path: Path, flag: str) -> None:
-    """A name may be too long, or none at all."""
+    """A name may be too long, or empty."""
     try:
         path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -226,7 +226,7 @@ def _check_name(path: Path, flag: str) -> None:
 
 @contextmanager
 def _parents(folder: Path) -> Iterator[None]:
-    """The folders above one; those that had to be made are removed unless something is in them."""
+    """Create the parent folders; those created are removed again if they stay empty."""
     missing = [path for path in folder.parents if not path.exists()]
     try:
         try:
@@ -250,7 +250,7 @@ def _aside(folder: Path) -> Path:
 
 
 def _clear(folder: Path) -> None:
-    """Remove the folders aside of programs that were killed: who holds the lock has none yet."""
+    """Remove temporary folders of killed programs: the holder of the lock has none yet."""
     pattern = re.compile(rf"\.{re.escape(folder.name)}\.[a-z0-9_]{{8}}")
     for path in sorted(folder.parent.iterdir()):
         if pattern.fullmatch(path.name) and path.is_dir() and _is_aside(path):
@@ -263,7 +263,7 @@ def _is_aside(path: Path) -> bool:
 
 
 def _settle(aside: Path, folder: Path) -> None:
-    """Remove a folder aside; if it was left amid the move into place, end that first."""
+    """Remove a temporary folder; complete a move into place that was interrupted."""
     if (aside / OLD).exists() and (aside / NEW).exists() and not folder.exists():
         (aside / NEW).replace(folder)
     shutil.rmtree(aside, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""One program at a time: a lock that the system drops when its holder ends, however it ends."""
+"""A file lock for one process at a time, which the system releases when its holder ends."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ else:
     import fcntl
 
 FAR = 1 << 30
-"""Byte that is locked on Windows, beyond what is written: a locked one cannot be read."""
+"""Offset of the byte locked on Windows, beyond the content: a locked byte cannot be read."""
 UNKNOWN = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
-"""What a file system answers that knows no locks."""
+"""Errors of file systems without locks."""
 
 
 class HeldError(ValueError):
-    """Another process holds the lock; the text is its number, empty if that is not known."""
+    """Another process holds the lock; the text is its process id, empty if unknown."""
 
 
 @contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, which is there only meanwhile.
+    """Hold the lock of a file, which exists only meanwhile.
 
-    HeldError if another process, or this one, holds it; OSError if the file cannot be made. A
-    process that dies leaves the file behind, not the lock. A file system without locks grants all.
+    HeldError if another process, or this one, holds it; OSError if the file cannot be created. A
+    process that dies leaves the file behind, but not the lock. On a file system without locks every
+    process gets the lock.
     """
     descriptor = _taken(path)
     try:
@@ -44,9 +45,9 @@ def held(path: Path) -> Iterator[None]:
 
 
 def _taken(path: Path) -> int:
-    """Descriptor of the locked file that is at the path.
+    """Descriptor of the locked file at the path.
 
-    Whoever held it before may have removed the file that was opened here.
+    The previous holder may have removed the file between opening and locking it.
     """
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
@@ -62,7 +63,7 @@ def _taken(path: Path) -> int:
 
 
 def _lock(descriptor: int) -> None:
-    """Lock an open file. BlockingIOError if another has."""
+    """Lock an open file. BlockingIOError if another process has locked it."""
     try:
         if sys.platform == "win32":
             os.lseek(descriptor, FAR, os.SEEK_SET)

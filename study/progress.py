@@ -1,4 +1,4 @@
-"""Progress of a study: a bar per stage on a terminal, plain lines elsewhere; always on stderr."""
+"""Progress of a study on stderr: a bar per stage on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Advance = Callable[[float], None]
 
 
 class Progress(Protocol):
-    """Tells a person what is being done."""
+    """Reports what is being done."""
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Advance]:
-        """One stage; the function it gives takes the share done, from 0 to 1."""
+        """One stage; it yields a function that takes the completed share, from 0 to 1."""
 
 
 class Silent:
-    """Says nothing."""
+    """Reports nothing."""
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Advance]:  # noqa: ARG002 - the name is for those that speak

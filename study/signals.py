@@ -1,4 +1,4 @@
-"""Signals that ask the program to stop, and how it answers: it unwinds, and says so once."""
+"""Signals that ask the program to stop: it unwinds, and reports so once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import NoReturn
 Handler = Callable[[int, FrameType | None], object]
 
 EXIT_MACHINE = 3
-"""Exit code of what the machine or a person ended: no disk, no memory, a signal."""
+"""Exit code when the machine or a person ends the program: no disk, no memory, a signal."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # not every system has them all
 
 _asked: list[int] = []
@@ -23,9 +23,10 @@ class Stopped(KeyboardInterrupt):
 
 
 def listen(handler: Handler) -> None:
-    """Let a handler answer the signals that ask to stop, but for those that are ignored.
+    """Install a handler for the signals that ask to stop, except for those that are ignored.
 
-    A shell lets its background jobs ignore SIGINT, and nohup SIGHUP: so does the program.
+    A shell lets its background jobs ignore SIGINT, and nohup ignores SIGHUP; the program follows
+    them.
     """
     for number in numbers():
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -38,18 +39,21 @@ def numbers() -> list[int]:
 
 
 def leave_at_once(number: int, _: FrameType | None) -> NoReturn:
-    """Answer before anything was done, where an exception would end amid the imports."""
-    _say(f"liver-study: {told(number)} before it began; there is nothing to --resume, start again")
+    """Exit before anything was done, where an exception would surface within the imports."""
+    _say(
+        f"liver-study: {message_for(number)} before it began; there is nothing to --resume, "
+        "start again"
+    )
     os._exit(EXIT_MACHINE)
 
 
 def stop(number: int, _: FrameType | None) -> NoReturn:
-    """Answer by Stopped, so that half-written folders are removed; to a second signal, at once."""
+    """Raise Stopped, so that half-written folders are removed; exit at once at a second signal."""
     if _asked:
         _say("liver-study: stopped at once; the next run removes what is half-written")
         os._exit(EXIT_MACHINE)
     ask_to_stop(number)
-    raise Stopped(told(number))
+    raise Stopped(message_for(number))
 
 
 def ask_to_stop(number: int) -> None:
@@ -68,16 +72,16 @@ def asked() -> bool:
 def stop_if_asked() -> None:
     """Raise Stopped if the program was asked to stop."""
     if _asked:
-        raise Stopped(told(_asked[0]))
+        raise Stopped(message_for(_asked[0]))
 
 
-def told(number: int) -> str:
-    """How a person is told of a signal."""
+def message_for(number: int) -> str:
+    """The message for a signal."""
     return "interrupted" if number == signal.SIGINT else f"stopped by {signal.Signals(number).name}"
 
 
 def keep_quiet() -> None:
-    """Let Python not print a Stopped that it swallows: the next stage makes up for it."""
+    """Suppress Python's message on a Stopped that it swallows: the next stage raises it again."""
     shown = sys.unraisablehook
 
     def hook(unraisable: sys.UnraisableHookArgs) -> None:
@@ -88,7 +92,7 @@ def keep_quiet() -> None:
 
 
 def _say(text: str) -> None:
-    """Past Python's own streams, which may be amid a line."""
+    """Write to the descriptor itself, since Python's streams may be in the middle of a line."""
     try:
         os.write(2, f"{text}\n".encode())
     except OSError:  # nobody listens

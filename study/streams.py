@@ -1,4 +1,4 @@
-"""Standard streams that outlive their readers: closed ones are opened, broken ones fall silent."""
+"""Standard streams that survive their readers: closed ones are opened, broken ones fall silent."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 class _Output(io.FileIO):
-    """Standard output. Who reads it may leave, as `head` does: the rest is for nobody.
+    """Standard output. Its reader may leave, as `head` does; the rest is then discarded.
 
-    Another fault is raised, once: Python tries again at its end.
+    Another error is raised once, since Python flushes again at exit.
     """
 
     lost = False
@@ -34,7 +34,7 @@ class _Output(io.FileIO):
 
 
 class _Messages(io.FileIO):
-    """Standard error. What cannot be said there cannot be said: the work goes on."""
+    """Standard error. A message that cannot be written is dropped, and the work continues."""
 
     def write(self, data: ReadableBuffer, /) -> int:
         """See io.RawIOBase."""
@@ -45,10 +45,10 @@ class _Messages(io.FileIO):
 
 
 def prepare() -> None:
-    """Make stdout and stderr such that writing to them costs no results.
+    """Make stdout and stderr safe, so that a write to them cannot cost results.
 
-    A stream that was closed leads nowhere; else the next file to be opened would take its number,
-    and what is printed would end up in it. A full disk below stdout is still an error.
+    A closed stream is opened to the null device; otherwise the next opened file would take its
+    number and receive the output. A full disk below stdout is still an error.
     """
     if os.name != "posix":
         return

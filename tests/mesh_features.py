@@ -42,9 +42,9 @@ def page(listed: Iterable[Feature]) -> str:
     """The page of the formats: a table each, in the order of the list."""
     parts = [
         "# Mesh formats\n",
-        "What a file may have besides the plain mesh, and what becomes of it. What is ignored "
-        "changes neither\nnodes nor elements; what would change them and is not read is refused, "
-        "with its name and its line.\nEvery row is a test.\n",
+        "What a mesh file may contain besides nodes and elements, and how it is treated. Content "
+        "that is\n*ignored* changes neither nodes nor elements. Content that would change them but "
+        "is not supported is\n*refused*, with its name and line. Every row is a test.\n",
     ]
     for name, group in groupby(listed, key=lambda feature: feature.format):
         parts += [f"## {name}\n", "| in the file | treatment |", "|---|---|"]

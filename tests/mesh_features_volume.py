@@ -163,28 +163,28 @@ _REFUSED = {
     ),
     "a node given twice": (after("*NODE", "27, 0., 0., 0."), "line 31: node 27"),
     "an element given twice": (at_end("1, 1, 2, 5, 14"), "line 80: element 1 is given a second"),
-    "an element with a node that is missing": (at_end("49, 1, 2, 5, 99"), "line 80: element 49"),
+    "an element with a missing node": (at_end("49, 1, 2, 5, 99"), "line 80: element 49"),
     "an element with too few or too many nodes": (
         at_end("49, 1, 2, 5"),
         "line 80: element 49 has 3 nodes, C3D4 needs 4",
     ),
     "node numbers that are not positive": (after("*NODE", "0, 1., 1., 1."), "line 4: 0 is no node"),
-    "a last line that is not ended": (str.rstrip, "line 79 is the last one and not ended"),
+    "an unterminated last line": (str.rstrip, "line 79 is the last one and not ended"),
     "several instances with a body": (
         part(*_INSTANCE, *_END, "*Instance, name=B, part=Organ", "1.", *_END),
         "2 bodies: instance ORGAN-1 (line 82), instance B (line 84)",
     ),
-    "an instance of a part that is missing": (
+    "an instance of a missing part": (
         part("*Instance, name=B, part=Bone", *_END),
         "line 82: there is no part BONE",
     ),
     "parts without any instance": (part(), "line 2: part ORGAN has no *INSTANCE"),
-    "a part that is not ended": (swap("*NODE", "*PART, NAME=P\n*NODE"), "no *END PART"),
+    "an unterminated part": (swap("*NODE", "*PART, NAME=P\n*NODE"), "no *END PART"),
 }
 
 _READ = {
     "nodes, linear tetrahedra": str,
-    "names of hybrid and other elements (`C3D4H`)": swap("C3D4", "C3D4H"),
+    "hybrid and other variants of an element (`C3D4H`)": swap("C3D4", "C3D4H"),
     "lower case, blanks, quoted names": both(
         swap("*NODE", "*node , nset = all"),
         swap("*ELEMENT, TYPE=C3D4", ' *Element,  type = c3d4 ,elset="my set, a"'),
@@ -199,15 +199,15 @@ _READ = {
         every(r"^(20, \d+, )", r"*ELEMENT, TYPE=C3D4H\n\1"),
         lambda text: "*ELEMENT" + text.partition("*ELEMENT")[2] + text.partition("*ELEMENT")[0],
     ),
-    "keyword lines that go on after a comma": swap("*ELEMENT, ", "*ELEMENT, ELSET=A,\n** a\n"),
-    "elements in several lines, each ending with a comma": every(
+    "keyword lines continued after a comma": swap("*ELEMENT, ", "*ELEMENT, ELSET=A,\n** a\n"),
+    "elements on several lines, each ending with a comma": every(
         r"^(\d+, \d+, \d+,) (\d+, \d+)$", r"\1\n\2"
     ),
     "commas at the end of complete lines": every(r"^(\d.*)$", r"\1,"),
-    "Fortran's exponents (`6.D-2`)": every(r"0\.06\b", "6.D-2"),
-    "components of normals behind the coordinates": after("*NODE", "28, 0., 0., 0., 0., 0., 1."),
-    "numbers in any order and with gaps": renumbered,
-    "lines ended by CR LF": swap("\n", "\r\n", -1),
+    "Fortran exponents (`6.D-2`)": every(r"0\.06\b", "6.D-2"),
+    "normals after the coordinates": after("*NODE", "28, 0., 0., 0., 0., 0., 1."),
+    "node and element numbers in any order, with gaps": renumbered,
+    "CR LF line ends": swap("\n", "\r\n", -1),
     "a part and its instance": part(*_INSTANCE, *_END),
     "an instance with translation and rotation": part(
         *_INSTANCE, "1., 2.", "1., 2., 0., 1., 2., 1., 30.", *_END
@@ -240,7 +240,7 @@ _IGNORED = {
         "*RESTART, WRITE", "*END STEP",
     ),
     "`*PARAMETER`, used elsewhere": at_end("*PARAMETER", "E = 3000.", "*ELASTIC", "<E>, 0.45"),
-    "a last line that is not ended, of another keyword": lambda text: text + "*PREPRINT, ECHO=NO",
+    "an unterminated last line, of another keyword": lambda text: text + "*PREPRINT, ECHO=NO",
     "trusses, springs, masses, connectors": at_end(
         "*ELEMENT, TYPE=T3D2", "60, 1, 2", "*ELEMENT, TYPE=MASS, ELSET=M", "61, 1",
         "*ELEMENT, TYPE=SPRINGA", "62, 1, 2"
@@ -256,7 +256,7 @@ _NOTED = {
         at_end("*ELEMENT, TYPE=S3R", *_SKIN.split("\n")),
         "12 triangles beside the tetrahedra not used",
     ),
-    "a node's missing coordinates: zero": (
+    "missing coordinates of a node: taken as zero": (
         swap("\n1, 0.0, 0.0, 0.0", "\n1"),
         "1 nodes lack coordinates",
     ),
@@ -354,7 +354,7 @@ OTHER_SECTIONS = {
     b"60 1 2 3 4 5 6 7 8 9\n$EndElementData\n",
     "ElementNodeData": b'$ElementNodeData\n1\n"s"\n0\n3\n0\n1\n1\n60 4 1 2 3 4\n'
     b"$EndElementNodeData\n",
-    "a section of a name unknown": b"$Whatever\n$Nod\n$EndWhatever\n",
+    "a section with an unknown name": b"$Whatever\n$Nod\n$EndWhatever\n",
     "binary ElementData": b'$ElementData\n1\n"E"\n1\n0\n3\n0\n1\n2\n'
     + np.array([(60, 0.5), (61, 1e9)], "<i4,<f8").tobytes()
     + b"\n$EndElementData\n",
@@ -429,7 +429,7 @@ _GMSH = [
         "1 hexahedron cells beside 48 tetrahedra",
     ),
     _gmsh(
-        "an element type that is not known", "refused",
+        "an unknown element type", "refused",
         lambda: gmsh_bytes("2").replace(b"1 15 2 0 1 1", b"1 99 2 0 1 1"),
         "line 36: Gmsh element type 99",
     ),
@@ -438,7 +438,7 @@ _GMSH = [
         "a second section $Nodes",
     ),
     _gmsh(
-        "a section that is not ended", "refused",
+        "an unterminated section", "refused",
         lambda: numbered_4(True) + b"$NodeData\n1\n", "section $NodeData ... $EndNodeData",
     ),
     _gmsh(
@@ -447,20 +447,20 @@ _GMSH = [
         "$ParametricNodes is not read",
     ),
     _gmsh(
-        "a node that is missing", "refused",
+        "a missing node", "refused",
         lambda: gmsh_bytes("2").replace(b" 4 2 7 1 1 ", b" 4 2 7 1 99 "), "node number 99",
     ),
     _gmsh(
-        "other numbers than announced", "refused",
+        "a count other than announced", "refused",
         lambda: numbered_4(True).replace(b"\n3 1 4 48\n", b"\n3 1 4 47\n"), "expected $EndElements",
     ),
     _gmsh(
-        "other totals than announced", "refused",
+        "a total other than announced", "refused",
         lambda: numbered_4(True).replace(b"$Nodes\n2 27 ", b"$Nodes\n2 28 "),
         "section $Nodes announces 28 rows but has 27",
     ),
     _gmsh(
-        "formats 3 and others", "refused",
+        "format 3 and others", "refused",
         lambda: gmsh_bytes("2").replace(b"2.2 0 8", b"3 0 8"), "Gmsh format 3",
     ),
 ]  # fmt: skip
@@ -564,13 +564,13 @@ _MEDIT = [
         for order in "<>"
     ),
     _medit("keywords in any case", "read", lambda text: text.upper()),
-    _medit("counts behind their keyword, blank lines", "read",
+    _medit("counts on the line of their keyword, blank lines", "read",
            every(r"^(Vertices|Tetrahedra|Dimension)\s+(\d+)$", r"\n\n \1 \2\n")),
-    _medit("the dimension in a line of its own", "read", swap("Dimension 3", "Dimension\n3")),
+    _medit("the dimension on its own line", "read", swap("Dimension 3", "Dimension\n3")),
     _medit("comments (`#`)", "read",
            both(swap("Vertices\n", "# Tetrahedra 9\nVertices # v\n#\n"), every("5$", "5 # 5"))),
-    _medit("Fortran's exponents (`6.D-2`)", "read", every(r"0\.06\b", "6.D-2")),
-    _medit("lines ended by CR LF", "read", swap("\n", "\r\n", -1)),
+    _medit("Fortran exponents (`6.D-2`)", "read", every(r"0\.06\b", "6.D-2")),
+    _medit("CR LF line ends", "read", swap("\n", "\r\n", -1)),
     *(_medit(name, "ignored", edit) for name, edit in MEDIT_IGNORED.items()),
     _meditb("binary: every section that holds no cells", "ignored",
             medit_binary(2, more={13: b"\1\0\0\0\1\0\0\0", 62: b"abc", 60: b"", 81: b"text"})),
@@ -587,14 +587,14 @@ _MEDIT = [
            "line 82: Heptahedra is not known"),
     _meditb("binary: an unknown keyword", "refused", medit_binary(2, more={500: b""}),
             "keyword 500 at byte 796 is not known"),
-    _medit("another order of nodes (`TetrahedraP2Ordering`)", "refused",
+    _medit("another node order (`TetrahedraP2Ordering`)", "refused",
            before_end("TetrahedraP1Ordering", "4", "1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"),
            "line 82: TETRAHEDRAP1ORDERING"),
-    _meditb("binary: another order of nodes", "refused", medit_binary(2, more={133: b""}),
+    _meditb("binary: another node order", "refused", medit_binary(2, more={133: b""}),
             "keyword 133 at byte 796"),
-    _medit("other numbers than announced", "refused", swap("Tetrahedra\n48", "Tetrahedra\n49"),
+    _medit("a count other than announced", "refused", swap("Tetrahedra\n48", "Tetrahedra\n49"),
            "line 32: TETRAHEDRA announces 49"),
-    _medit("a node that is missing", "refused", before_end("Tetrahedra 1", "1 2 5 99 0"),
+    _medit("a missing node", "refused", before_end("Tetrahedra 1", "1 2 5 99 0"),
            "use node numbers outside 0 to 26"),
     _medit("`Vertices` twice", "refused", before_end("Vertices", "1", "0 0 0 0"),
            "line 82: Vertices a second time"),

@@ -8,7 +8,7 @@ import pytest
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from reports import budget as printed
-from study.models.estimates import FuzzySide
+from study.models.estimates import FuzzyResults
 from study.run import budget as causes
 from study.run import study
 from study.scene.file import read_scene
@@ -34,7 +34,7 @@ def budget(*changes, factor=1.0):
     modulus = factor * scene.tissue.youngs_modulus
     made = StiffnessEstimate("mamdani", modulus, None, 0.0, (), "")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "run_fuzzy", lambda _: FuzzySide({"mamdani": made}))
+        patch.setattr(study, "run_fuzzy", lambda _: FuzzyResults({"mamdani": made}))
         patch.setattr(study, "estimates", lambda _: {"mamdani": made})
         return study.run_study(scene)
 

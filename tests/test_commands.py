@@ -272,7 +272,7 @@ def test_an_interrupted_run_leaves_nothing_behind(number, workers, tmp_path):
     said = process.communicate(timeout=60)[1]
     assert process.returncode == EXIT_MACHINE
     assert next(line for line in said.splitlines() if "liver-study" in line).startswith(
-        f"liver-study: {signals.told(number)}"
+        f"liver-study: {signals.message_for(number)}"
     )
     assert is_gone(process.pid)
     assert not [path for path in tmp_path.iterdir() if path.name != ".out.state"]

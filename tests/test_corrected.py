@@ -10,12 +10,12 @@ from fem_reference.subspace import Subspace, SubspaceMotion
 from msm import model as msm
 from msm.model import Automatic, Counts
 from study.models import corrected
-from study.models.keeping import Keeping
-from study.models.lattice import asked_step
+from study.models.coupled_stepper import Frame
+from study.models.lattice import requested_step
 from study.models.model import SILENT, Watch
+from study.models.persistence import Persistence
 from study.models.remainder import FINER, ORDER, PreparedRemainder, remainder_errors
 from study.models.table import kind, model
-from study.models.together import Frame
 from study.problem.contact import Load
 from study.problem.damping import RayleighDamping
 from study.problem.trajectory import Trajectory
@@ -23,7 +23,7 @@ from study.progress import Silent
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
-from study.tradeoff.lineup import configurations
+from study.tradeoff.contenders import configurations
 from tests.conftest import SMALL
 
 BRIEF = (
@@ -180,7 +180,7 @@ def test_several_loads_are_followed_as_a_fine_lattice_follows_them(two):
     elements = two.fine.solved_on(None, Silent()).found.trajectory.displacement
     finer = beside(0.3, 0.3)
     fine = finer.model.coarse.varied(spacing=0.005).prepare(finer.problem)
-    step = asked_step(fine.model.lattice)
+    step = requested_step(fine.model.lattice)
     truth = elements + PreparedRemainder(fine, 20).run(step).trajectory.displacement
     assert apart(elements, truth) > 0.02
     assert apart(found, truth) < 0.5 * apart(elements, truth)
@@ -218,6 +218,61 @@ def test_it_is_stepped_under_several_loads_as_it_is_run(two):
     mesh, seen = two.problem.geometry.mesh.points, two.problem.geometry.surface.points
     used = [int(abs(mesh - point).sum(axis=1).argmin()) for point in seen]
     assert apart(stepper.displacement()[used], found.surface_field[1]) < 0.02
+
+
+# --- gravity and weights --------------------------------------------------------------------------
+
+LEVEL = ("gravity.acceleration=0.05 m/s^2", "gravity.towards=right", "tool.force=0.5 mN")
+"""So little that all is linear, across the block."""
+HUNG = 'weight=[{mass="30 g", radius="10 mm", place={side="superior", at=[0.8, 0.5]}}]'
+
+
+def beside_elements(*overrides):
+    """The sum, and its elements by themselves, as displacement [m] (samples, probes, 3)."""
+    one = prepared(FEW, *overrides)
+    return (found.simulate().trajectory.displacement for found in (one, one.fine))
+
+
+@pytest.mark.parametrize("more", [(), (HUNG,)])
+def test_little_gravity_moves_it_as_the_elements_from_the_sag_on(more):
+    """The sag of both lattices cancels, and so does what weights do to the motion."""
+    own, linear = beside_elements(*LEVEL, *more)
+    assert size(linear[0]) > 0.3 * size(linear[-1])
+    assert apart(own[0], linear[0]) < 5e-3
+    assert apart(own - own[0], linear - linear[0]) < 5e-3
+
+
+def test_a_shape_given_loaded_starts_where_it_is_and_is_moved_by_its_prestress_too():
+    given = "tool.force=1 mN", "gravity.towards=inferior", "gravity.given=loaded"
+    own, linear = beside_elements(*given, "gravity.acceleration=9.81 m/s^2")
+    assert not own[0].any()
+    prestressed = apart(own, linear)  # the load is small, and what it meets is not
+    own, linear = beside_elements(*given, "gravity.acceleration=0.05 m/s^2")
+    assert prestressed > 2e-3 > 2.0 * apart(own, linear)
+
+
+def test_under_gravity_it_is_nearer_to_fine_lattice_and_elements_than_either_part():
+    heavy = FEW, "gravity.acceleration=9.81 m/s^2", "gravity.towards=right", "tool.force=0.5 N"
+    one, finer = prepared(*heavy), prepared(*heavy, spacing=0.005)
+    truth = finer.simulate().trajectory.displacement
+    own, linear, coarse = (
+        part.simulate().trajectory.displacement for part in (one, one.fine, one.coarse)
+    )
+    assert apart(own, truth) < 0.5 * apart(linear, truth)
+    assert apart(own, truth) < 0.2 * apart(coarse, truth)
+
+
+def test_it_is_stepped_from_its_sag_as_it_is_run():
+    heavy = "gravity.acceleration=9.81 m/s^2", "gravity.towards=right", "tool.force=0.3 N"
+    one = prepared(FEW, *heavy, HUNG, "lattice.time_step=0.5 ms")
+    found, stepper = one.simulate().trajectory, one.stepper()
+    mesh, seen = one.problem.geometry.mesh.points, one.problem.geometry.surface.points
+    used = [int(abs(mesh - point).sum(axis=1).argmin()) for point in seen]
+    for _ in range(2):
+        stepper.restart()
+        assert apart(stepper.displacement()[used], found.surface_field[0]) > 0.01
+        stepper.take_steps(600)
+        assert apart(stepper.displacement()[used], found.surface_field[1]) < 1e-5
 
 
 # --- what goes wrong -----------------------------------------------------------------------------
@@ -337,7 +392,7 @@ def test_the_report_prints_each_error_by_itself(results):
 
 def test_its_fields_are_kept(tmp_path):
     one = prepared(FEW, "tool.force=0.2 N")
-    ran = one.run(Watch(SILENT.progress, Keeping(tmp_path, fields=tmp_path)))
+    ran = one.run(Watch(SILENT.progress, Persistence(tmp_path, fields=tmp_path)))
     assert (tmp_path / "corrected.vtkhdf").stat().st_size > 0
     assert not any("fields" in note.lower() for note in ran.notes)
 

@@ -11,7 +11,12 @@ from scipy.spatial import ConvexHull
 from reports.cut_figure import cut_figure, section
 from study.mesh.cut import cut
 from study.organ.block import block_of_cells
-from study.run.watched import kept, thinned, to_watch, watched
+from study.run.visual_output import (
+    visual_arrays,
+    visual_output,
+    with_end_fields_only,
+    with_visual_output,
+)
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.report_samples import results_of
@@ -72,7 +77,7 @@ def test_a_plane_beside_the_body_gives_nothing(mesh):
 
 
 def test_what_holds_and_loads_a_block_is_its_lower_face_and_the_disc_of_the_tool(problem):
-    seen, surface = watched(problem), problem.geometry.surface
+    seen, surface = visual_output(problem), problem.geometry.surface
     corners = surface.points[surface.triangles]
     areas = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -83,15 +88,15 @@ def test_what_holds_and_loads_a_block_is_its_lower_face_and_the_disc_of_the_tool
 
 
 def test_the_peak_comes_first_the_end_last_and_the_film_in_order(problem):
-    seen = watched(problem)
+    seen = visual_output(problem)
     assert (seen.samples[0], seen.samples[-1]) == problem.observation.frames
     assert len(set(seen.samples)) == len(seen.samples) == 9
     assert {0, 40, 70} < set(seen.samples)  # at rest, where the load stops rising, and falls
-    asked = to_watch(problem, seen).observation
+    asked = with_visual_output(problem, seen).observation
     assert asked.frames == seen.samples
     count = len(asked.surface_points)
     field = np.arange(len(seen.samples))[:, None, None] * np.ones((1, count, 3))
-    found = kept(seen, "toy", field)
+    found = visual_arrays(seen, "toy", field)
     assert found["toy"][:, 0, 0].tolist() == [0.0, 8.0]
     assert found["cut.toy"].shape == (2, len(seen.points), 3)
     in_order = np.array(seen.samples)[found["film.toy"][:, 0, 0].astype(int)]
@@ -102,11 +107,11 @@ def test_a_run_that_is_thinned_keeps_the_peak_and_the_end(problem):
     from study.models.model import ModelRun
     from study.problem.trajectory import empty_trajectory
 
-    asked = to_watch(problem, watched(problem)).observation
+    asked = with_visual_output(problem, visual_output(problem)).observation
     one = empty_trajectory(asked)
     one.volume_field[:] = np.arange(len(asked.frames))[:, None, None]
     run = ModelRun(one, results_of().model("basafa"), bounds=(one, one), halved=one)
-    found = thinned(run)
+    found = with_end_fields_only(run)
     for trajectory in (found.trajectory, *found.bounds, found.halved):
         assert trajectory.volume_field[:, 0, 0].tolist() == [0.0, 8.0]
         assert len(trajectory.surface_field) == len(asked.frames)

@@ -106,7 +106,7 @@ def test_a_signal_amid_the_imports_is_a_message(word, number, tmp_path):
     done = tripped(word, number, *shlex.split(PAPER), cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     (line,) = done.stderr.splitlines()
-    assert line.startswith(f"liver-study: {signals.told(number)}")
+    assert line.startswith(f"liver-study: {signals.message_for(number)}")
     assert not list(tmp_path.iterdir())
 
 

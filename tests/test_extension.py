@@ -1,11 +1,14 @@
-"""One file and one line add a model, an integrator, a spring law and a similarity measure.
+"""One file and one line add a model, an integrator, a law, a measure, a scene or a stability case.
 
-Each is written as a user would, into a file of its own, and entered into its table; then one scene
-names them all, and every study takes them up.
+Each is written as a user would, into a file of its own, and entered into its table. Then one scene
+names them all, and every study takes them up. A column of the results is one field of its row, and
+a section of the report one entry of its document.
 """
 
 import importlib
 import sys
+from dataclasses import fields, replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -14,18 +17,20 @@ from msm.integrators import INTEGRATORS
 from msm.laws import LAWS
 from reports.content import document
 from reports.report import make_report
-from study.known.stability.cases import own_scene
+from study.known import suite
+from study.known.request import tried
+from study.known.stability.cases import user_scene
 from study.models.table import MODELS
 from study.progress import Silent
-from study.results import Results
+from study.results import Results, ResultsError, manifest, tables
 from study.results.folder import write
 from study.run.study import run_study
-from study.scene.file import read_scene
+from study.scene.file import read_scene, write_scene
 from study.similarity.score import MEASURES
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import study as tradeoff
-from study.tradeoff.lineup import configurations
+from study.tradeoff.contenders import configurations
 from study.tradeoff.problem import sampled
 from tests.conftest import SMALL
 
@@ -150,6 +155,26 @@ def score(candidate, reference):
 
 TOY = Measure("toy-peak", "max(0, 1 - |max|c| / max|r| - 1|)", score)
 '''
+FAMILY = '''
+"""Cubes of numbers, one of which is expected wrong."""
+
+from study.known.case import Family
+from study.known.finding import value
+
+FAMILY = Family("toy", __name__, quick=True)
+
+
+def cases():
+    yield FAMILY.case("cube of 2", "cube", {"x": 2.0, "expected": 8.0}, 1e-12)
+    yield FAMILY.case("wrong cube", "cube", {"x": 2.0, "expected": 9.0}, 1e-12)
+    yield FAMILY.case("no cube", "cube", {"x": -1.0, "expected": 0.0}, "must be positive")
+
+
+def cube(x, expected):
+    if x < 0.0:
+        raise ValueError("x: must be positive")
+    return value(expected, x**3)
+'''
 SCENE = (
     *SMALL,
     'models=["fem", "msm", "toy"]',
@@ -163,9 +188,10 @@ SCENE = (
 
 @pytest.fixture(scope="module")
 def toys(tmp_path_factory):
-    """The four files, each entered by one line into its table."""
+    """The five files, each entered by one line into its table."""
     folder = tmp_path_factory.mktemp("toys")
     sources = {"model": MODEL, "integrator": INTEGRATOR, "law": LAW, "measure": MEASURE}
+    sources |= {"family": FAMILY}
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         modules = {}
@@ -177,14 +203,19 @@ def toys(tmp_path_factory):
         patch.setitem(LAWS, "toy", modules["law"].TOY)
         measures = (*MEASURES["displacement"], modules["measure"].TOY)
         patch.setitem(MEASURES, "displacement", measures)
+        patch.setattr(suite, "FAMILIES", (*suite.FAMILIES, "toy_family"))
         yield
     for name in sources:
         del sys.modules[f"toy_{name}"]
 
 
 @pytest.fixture(scope="module")
-def scene(toys):  # noqa: ARG001 - with the tables as they are then
-    return read_scene("block", SCENE)
+def scene(toys, tmp_path_factory):  # noqa: ARG001 - with the tables as they are then
+    """A scene in a file of its own, read by its path."""
+    path = tmp_path_factory.mktemp("scene") / "toy.toml"
+    named = replace(read_scene("block", SCENE), title="A scene of toys")
+    path.write_text(write_scene(named))
+    return read_scene(str(path))
 
 
 @pytest.fixture(scope="module")
@@ -203,6 +234,7 @@ def test_a_toy_model_and_measure_are_in_the_tables(folder):
 
 def test_they_are_in_the_pdf(folder):
     make_report(folder)
+    assert Results.load(folder).record.title == "A scene of toys"
     assert (folder / "report.pdf").stat().st_size > 10_000
     text = str(document(Results.load(folder)))
     assert "Toy without inertia" in text
@@ -235,15 +267,55 @@ def test_the_toy_model_is_timed_by_the_tradeoff(scene, tmp_path):
     chosen = configurations(given, ["toy"])
     assert [one.contender for one in chosen] == ["toy"]
     assert "toy" in {one.contender for one in configurations(given)}
-    found = tradeoff.study(given, chosen, Store(tmp_path / "runs"), How(), 1, Silent())
+    found = tradeoff.study(given, chosen, Store(tmp_path / "runs"), Backend(), 1, Silent())
     (entry,) = found.entries
     assert entry.errors.status == "resolved"
     assert entry.cost.timing.step[1] > 0.0
 
 
 def test_the_toy_model_is_tried_by_the_stability_study(scene):
-    cases = [case for case in own_scene.cases(scene) if case.name.startswith("toy")]
-    assert len(cases) == len(own_scene.LOADS)
-    finding = own_scene.moves(**cases[0].arguments)
+    cases = [case for case in user_scene.cases(scene) if case.name.startswith("toy")]
+    assert len(cases) == len(user_scene.LOADS)
+    finding = user_scene.moves(**cases[0].arguments)
     assert finding.ending == "value"
     assert finding.difference <= cases[0].tolerance
+
+
+def test_the_toy_family_is_run_with_those_of_the_program(scene):
+    cases = [case for case in suite.stability_cases(scene, quick=True) if case.family == "toy"]
+    assert [case.name for case in cases] == ["cube of 2", "wrong cube", "no cube"]
+    assert [tried(case, Silent()).passed for case in cases] == [True, False, True]
+
+
+class Wider(NamedTuple):
+    """A difference of the field, with a column that the program does not know."""
+
+    model: str
+    reference: str
+    quantity: str
+    value: float
+    toy_m: float | None
+
+
+@pytest.mark.usefixtures("toys")
+def test_a_column_of_the_results_is_one_field_of_its_row(folder, tmp_path):
+    results = Results.load(folder)
+    (known,) = (table for table in tables.TABLES if table.file == "errors.csv")
+    others = tuple(table for table in tables.TABLES if table is not known)
+    rows = [Wider(*row, None if k % 2 else 0.5) for k, row in enumerate(results.field_differences)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("study.results.folder.TABLES", (*others, known._replace(kind=Wider)))
+        write(replace(results, field_differences=tuple(rows)), tmp_path)
+        assert (
+            (tmp_path / "errors.csv").read_text().startswith("model,reference,quantity,value,toy_m")
+        )
+        assert Results.load(tmp_path).field_differences == tuple(rows)
+    with pytest.raises(ResultsError, match=r"errors\.csv, line 1: columns .*toy_m, not"):
+        Results.load(tmp_path)
+
+
+@pytest.mark.parametrize("table", tables.TABLES, ids=lambda table: table.file)
+def test_every_table_is_summed_up_and_held_by_the_results(table):
+    assert table.file in manifest.DATA
+    assert (table.file in manifest.ALWAYS) is not table.of_tools
+    assert table.attribute in {field.name for field in fields(Results)}

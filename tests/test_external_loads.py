@@ -11,7 +11,7 @@ from msm import dead_load
 from msm.assembly import Assembly, with_external_loads
 from msm.integrators import INTEGRATORS
 from msm.stepper import LatticeStepper
-from study.models.lattice import asked_step
+from study.models.lattice import requested_step
 from study.models.table import model
 from study.problem.contact import Load
 from study.scene.file import read_scene
@@ -40,7 +40,7 @@ def prepared(*overrides):
 
 def moved(*overrides):
     made = prepared(*overrides)
-    return made, made._march(asked_step(made.model.lattice))
+    return made, made._integrate(requested_step(made.model.lattice))
 
 
 @pytest.mark.parametrize("geometry", ["linear", "nonlinear"])
@@ -149,8 +149,8 @@ def test_every_integrator_takes_a_second_load_as_if_it_were_the_first(integrator
     half = replace(problem.tool, force=0.5 * problem.tool.force)
     shared = replace(problem, tool=half, loads=(Load(half, problem.factor),))
     whole, parts = (model(scene, "tissue").prepare(one) for one in (problem, shared))
-    step = asked_step(scene.lattice)
-    one, other = (each._march(step).trajectory.displacement for each in (whole, parts))
+    step = requested_step(scene.lattice)
+    one, other = (each._integrate(step).trajectory.displacement for each in (whole, parts))
     assert np.abs(one).max() > 1e-6
     assert other == pytest.approx(one, rel=1e-9, abs=1e-9 * np.abs(one).max())
 

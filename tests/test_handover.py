@@ -22,7 +22,7 @@ from study.handover.sofa import PLUGINS
 from study.handover.write import ARRAYS
 from study.progress import Silent
 from study.results.folder import write
-from study.run.ready import ready
+from study.run.preparation import prepare_scene
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 
@@ -145,7 +145,7 @@ def test_results_are_exported_with_their_own_curves_and_those_of_another_run_ref
 
 
 def test_a_force_that_the_stepper_does_not_know_is_refused():
-    given = ready(scene('models=["basafa"]'))
+    given = prepare_scene(scene('models=["basafa"]'))
     one = given.models["basafa"]
     found = lattices(scene('models=["basafa"]'), Silent())
     net, law = arrays(one.assembly, one.springs.material), one.springs.material.law

@@ -9,13 +9,13 @@ import pytest
 
 from msm.integrators import INTEGRATORS
 from study.annotation.choice import Choice
-from study.known.stability.cases import own_scene
+from study.known.stability.cases import user_scene
 from study.models import tissue
 from study.models.estimates import estimates
 from study.models.finite_elements import PreparedElements
-from study.models.keeping import Keeping
 from study.models.lattice import LatticeModel
 from study.models.model import SILENT, ModelKind, Watch
+from study.models.persistence import Persistence
 from study.models.table import MODELS, kind, model, models_of, references
 from study.problem.history import HISTORIES
 from study.run import study as running
@@ -24,11 +24,11 @@ from study.scene import Patient, Scene
 from study.scene.file import SceneError, read_scene, resolved, validate
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import recommend
 from study.tradeoff import study as study_module
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.contenders import Configuration
 from study.tradeoff.problem import sampled
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import Timing
@@ -230,7 +230,7 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
     settings = {"spacing": spacing, "volume_term": True, "step_fraction": 0.8}
     chosen = Configuration("volume-springs", settings)
     judge, (outcome,) = study_module.judged(
-        sampled(scene), [chosen], Store(tmp_path / "runs"), How()
+        sampled(scene), [chosen], Store(tmp_path / "runs"), Backend()
     )
     known, measured = judge.reference, judge.errors(chosen, outcome)
     assert measured.status == "resolved"
@@ -266,7 +266,7 @@ WAVE = ('tool.history={kind="sinusoid", frequency="1 Hz"}', "time.duration=2 s")
 
 def test_a_model_that_keeps_no_fields_says_so_where_they_are_wanted(small_scene, tmp_path):
     ready = model(small_scene, "superposition").prepare(problem_of(small_scene))
-    wanted = Watch(SILENT.progress, Keeping(tmp_path, fields=tmp_path))
+    wanted = Watch(SILENT.progress, Persistence(tmp_path, fields=tmp_path))
     (note,) = ready.run(wanted).notes
     assert "superposition" in note
     assert not ready.run(SILENT).notes
@@ -313,7 +313,7 @@ STIFFER = "lattice.law={strain=[-0.5, 0, 0.5], relative_tension=[-2, 0, 2]}"
 def own(function, *overrides, **more):
     """What a case of the scene with these overrides finds."""
     scene = read_scene("block", (*SHORT, *overrides))
-    return getattr(own_scene, function)("tissue", resolved(scene), None, **more)
+    return getattr(user_scene, function)("tissue", resolved(scene), None, **more)
 
 
 def test_the_critical_step_that_is_tried_is_that_of_the_scene_s_law_and_integrator():
@@ -326,14 +326,14 @@ def test_the_critical_step_that_is_tried_is_that_of_the_scene_s_law_and_integrat
     assert stiffer.predicted == pytest.approx(plain.predicted / 2.0, rel=0.01)
     assert other.predicted == pytest.approx(plain.predicted * np.sqrt(2.0), rel=0.01)
     for found in (plain, stiffer, other):
-        assert found.difference < own_scene.MEASURED
+        assert found.difference < user_scene.MEASURED
 
 
 def test_the_motion_that_is_tried_is_that_of_the_scene_s_law_geometry_and_integrator():
     def moved(*words):
         found = own("moves", "tool.force=0.2 N", *words, times=1.0)
         assert found.ending == "value"
-        assert found.difference < own_scene.FINER
+        assert found.difference < user_scene.FINER
         return found.measured
 
     plain = moved()
@@ -345,13 +345,13 @@ def test_the_motion_that_is_tried_is_that_of_the_scene_s_law_geometry_and_integr
 
 def test_models_of_a_scene_are_tried_but_the_reference_and_those_of_estimates(small_scene):
     every = dataclasses.replace(small_scene, models=tuple(MODELS))
-    assert own_scene.tried(every) == [
+    assert user_scene.tried(every) == [
         *("tissue", "hyperelastic", "basafa", "region", "superposition", "corrected")
     ]
     lattices = {
-        name for name in own_scene.tried(every) if isinstance(model(every, name), LatticeModel)
+        name for name in user_scene.tried(every) if isinstance(model(every, name), LatticeModel)
     }
-    cases = [case.name for case in own_scene.cases(every)]
+    cases = [case.name for case in user_scene.cases(every)]
     rests = {name for name in cases if name.endswith("rest under its load")}
     assert rests == {f"{name}, rest under its load" for name in lattices}
 

@@ -21,7 +21,7 @@ from study.scene.file import read_scene
 from study.similarity import batch
 from study.similarity.iso18571 import rate
 from study.similarity.score import scores
-from study.sweep.tally import Tally
+from study.sweep.status import SweepStatus
 
 H0 = 5.5e-3
 TIMES = np.linspace(0.0, 3.0, 301)
@@ -223,7 +223,7 @@ def test_draws_lie_in_the_ranges_that_are_printed():
 
 def test_finished_blocks_are_not_drawn_again(tmp_path):
     asked = request.RobustnessRequest(size=2, out=tmp_path / "found")
-    told: list[Tally] = []
+    told: list[SweepStatus] = []
     first = request.study(asked, told.append)
     tables = {name: (asked.folder / name).read_bytes() for name in request.FILES}
     assert request.study(asked, told.append) == first

@@ -26,7 +26,7 @@ from study import folders
 from study.commands.report import report as report_command
 from study.results.folder import Results, ResultsError, write
 from study.results.records import SCHEMA_VERSION
-from study.stages.lanes import available, lanes
+from study.stages.job_pool import available, job_pool
 from study.stages.threads import threads
 from tests.report_samples import (
     FUZZY,
@@ -66,10 +66,10 @@ def test_plots_take_no_more_processors_than_a_run_may_use(monkeypatch):
 
     def counted(count, progress):
         counts.append(count)
-        return lanes(1, progress)
+        return job_pool(1, progress)
 
     monkeypatch.setattr(report, "available", lambda: 2)
-    monkeypatch.setattr(report, "lanes", counted)
+    monkeypatch.setattr(report, "job_pool", counted)
     monkeypatch.setattr(report, "_drawings", lambda _: [])
     for count in (1, 2):
         with threads(count):

@@ -11,7 +11,7 @@ from reports import renders, report
 from reports.camera import Camera, facing_tool
 from reports.field_figures import field_figures, job, views
 from reports.renders import FLAT, Job, Pictures, render
-from study.stages.once import keeping_in
+from study.stages.cached_arrays import using_store
 from study.stages.store import Store
 from tests.report_samples import POINTS, results_of, whole
 
@@ -166,7 +166,7 @@ def test_what_was_drawn_before_is_drawn_again_only_of_other_results(tmp_path, mo
 
     monkeypatch.setattr(report, "render", rendered)
     monkeypatch.setattr(report, "_plots", plots)
-    with keeping_in(Store(tmp_path)):
+    with using_store(Store(tmp_path)):
         first = report.draw(results)
         assert sorted(drawn) == ["organ", "plots"]
         again = report.draw(replace(results, record=replace(results.record, title="another")))
@@ -175,6 +175,6 @@ def test_what_was_drawn_before_is_drawn_again_only_of_other_results(tmp_path, mo
         moved = {**results.fields, "points": 1.01 * results.fields["points"]}
         report.draw(replace(results, fields=moved))
         assert len(drawn) == 4
-    with keeping_in(Store(tmp_path), readable=False):
+    with using_store(Store(tmp_path), readable=False):
         assert report.draw(results) == first
         assert len(drawn) == 6

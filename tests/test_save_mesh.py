@@ -8,7 +8,7 @@ import pytest
 from study.commands.run import run
 from study.mesh.load import load_mesh
 from study.run import study
-from study.run.stages import Means
+from study.run.stages import RunOptions
 from study.scene.file import read_scene
 from study.scene.problem import geometry_of
 
@@ -44,11 +44,11 @@ def test_the_mesh_of_a_run_is_kept_to_the_bit_and_read_again(tmp_path):
 
 def test_a_mesh_that_a_mesher_makes_otherwise_each_time_is_not_passed_off(tmp_path, monkeypatch):
     scene = read_scene("block", SMALL)
-    posing = "study.run.posed.Posing.mesh"
+    builder = "study.run.problem_record.ProblemBuilder.mesh"
     made = iter(["first", "first", "other", "other"])
-    monkeypatch.setattr(posing, property(lambda _: next(made, "other")))
+    monkeypatch.setattr(builder, property(lambda _: next(made, "other")))
     with pytest.raises(ValueError, match="--save-mesh: the mesher made another mesh"):
-        study.run_study(scene, means=Means(mesh=tmp_path / "mesh.msh"))
+        study.run_study(scene, options=RunOptions(mesh=tmp_path / "mesh.msh"))
     assert not (tmp_path / "mesh.msh").exists()
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.models.lattice import asked_step
+from study.models.lattice import requested_step
 from study.models.spacing_error import force_differences, spacing_errors
 from study.models.table import model
 from study.scene.file import read_scene
@@ -39,7 +39,7 @@ def moved(problem):
     def at(spacing):
         scene = read_scene("block", (*PRESSED, f"lattice.spacing={spacing} mm"))
         prepared = model(scene, "tissue").prepare(problem)
-        return prepared._march(asked_step(scene.lattice)).trajectory
+        return prepared._integrate(requested_step(scene.lattice)).trajectory
 
     return {spacing: at(spacing) for spacing in (20, 10, 5)}
 

@@ -30,16 +30,16 @@ from study.models.tissue import of_modulus
 from study.problem.trajectory import Trajectory
 from study.progress import Silent
 from study.results.records import Check, ModelRecord
-from study.run.moving import AT_REST, ORGAN, Moving
-from study.run.stages import ALONE, Means, Stages
+from study.run.organ_stages import AT_REST, ORGAN, OrganStages
+from study.run.stages import SERIAL, RunOptions, Stages
 from study.run.study import FUZZY, SIMILARITY, fuzzy_stage, run_study
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.stages import fingerprint
 from study.stages import store as stores
 from study.stages.fingerprint import key
-from study.stages.flat import flattened, restored
-from study.stages.lanes import Job, lanes
+from study.stages.job_pool import Job, job_pool
+from study.stages.serialisation import flattened, restored
 from study.stages.store import Store, shown_size, user_store
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -374,17 +374,17 @@ def test_another_process_finds_the_same_keys():
     assert done.stdout.strip() == eval(THINGS)  # noqa: S307 - our own
 
 
-def moving(scene, means=ALONE):
-    side = lanes(1, Silent()).__enter__()
-    stages = Stages(means, side, Silent())
-    return Moving(scene, estimates(scene), None, stages, SILENT)
+def organ_stages(scene, options=SERIAL):
+    side = job_pool(1, Silent()).__enter__()
+    stages = Stages(options, side, Silent())
+    return OrganStages(scene, estimates(scene), None, stages, SILENT)
 
 
 def all_stages(scene, found=None):
     """Every stage of a scene on a mesh of one name, so that only the scene makes a difference."""
-    found = found or moving(scene)
+    found = found or organ_stages(scene)
     wanted = (one.stage for one in found.all_stages("mesh"))
-    return {one.name: one for one in (found.posed(), fuzzy_stage(scene, None), *wanted)}
+    return {one.name: one for one in (found.problem_record(), fuzzy_stage(scene, None), *wanted)}
 
 
 def keys(scene):
@@ -535,24 +535,24 @@ def check_sound(name, every):
     [("msm-sugeno", "step_fraction"), ("fem", "force"), ("basafa", "k1"), (FUZZY, "hcv")],
 )
 def test_a_key_that_leaves_out_what_a_stage_depends_on_is_caught(monkeypatch, name, field):
-    told = fingerprint._fields
+    store_summary = fingerprint._fields
     monkeypatch.setattr(
         fingerprint,
         "_fields",
-        lambda thing, modules: (one for one in told(thing, modules) if one[0] != field),
+        lambda thing, modules: (one for one in store_summary(thing, modules) if one[0] != field),
     )
     with pytest.raises(AssertionError, match=name):
         check_sound(name, variants(field))
 
 
-def results_of(scene, means=ALONE):
-    return run_study(scene, SILENT, means)
+def results_of(scene, options=SERIAL):
+    return run_study(scene, SILENT, options)
 
 
 def test_kept_and_computed_results_are_the_same_bit_by_bit(store):
-    means = Means(store)
+    options = RunOptions(store)
     scene = tiny(FEWER)
-    alone, first, again = (results_of(scene, one) for one in (ALONE, means, means))
+    alone, first, again = (results_of(scene, one) for one in (SERIAL, options, options))
     assert same(alone, first)
     assert same(alone, again)
     assert {one.name for one in again.record.stages} == {*keys(scene), SIMILARITY}
@@ -560,11 +560,11 @@ def test_kept_and_computed_results_are_the_same_bit_by_bit(store):
     walls = [{one.name: one.wall_s for one in run.record.stages} for run in (first, again)]
     assert walls[0] == walls[1]
     other = tiny(FEWER, "patient.hcv=14 kPa", "title=Other")
-    mixed = results_of(other, means)
+    mixed = results_of(other, options)
     assert same(mixed, results_of(other))
     computed = {one.name for one in mixed.record.stages if not one.kept}
     assert computed == {FUZZY, "msm-sugeno", SIMILARITY}
-    afresh = results_of(scene, Means(store, fresh=True))
+    afresh = results_of(scene, RunOptions(store, fresh=True))
     assert not any(one.kept for one in afresh.record.stages)
 
 
@@ -574,7 +574,7 @@ def test_a_store_that_cannot_be_written_costs_no_results(store, monkeypatch, cap
 
     scene = tiny('models=["basafa"]')
     monkeypatch.setattr(stores, "_write", full)
-    assert same(results_of(scene, Means(store)), results_of(scene))
+    assert same(results_of(scene, RunOptions(store)), results_of(scene))
     assert "basafa: not kept for the next run" in capsys.readouterr().err
     assert not list(store.folder.iterdir())
 
@@ -584,15 +584,15 @@ def test_a_store_that_cannot_be_written_costs_no_results(store, monkeypatch, cap
 
 def test_side_by_side_is_the_same_bit_by_bit(store):
     scene = tiny(FEWER)
-    both = results_of(scene, Means(store, workers=2))
-    again = results_of(scene, Means(store))
+    both = results_of(scene, RunOptions(store, workers=2))
+    again = results_of(scene, RunOptions(store))
     assert same(both, results_of(scene))
     assert same(both, again)
     assert all(one.kept for one in again.record.stages)
 
 
 def run_jobs(count, *jobs, progress=None):
-    with lanes(count, progress or Silent()) as side:
+    with job_pool(count, progress or Silent()) as side:
         for job in jobs:
             side.start(job)
         return side.results()
@@ -626,7 +626,7 @@ def test_results_come_in_the_order_of_the_jobs(count):
 
 
 def test_what_was_built_after_a_process_was_forked_is_known_to_the_next():
-    with lanes(2, Silent()) as side:
+    with job_pool(2, Silent()) as side:
         side.start(job("a", os.getpid))
         built = [1]
         side.start(job("b", lambda: (os.getpid(), *built)))
@@ -700,27 +700,27 @@ class Told:
 
 
 def test_stages_of_several_processes_are_told_to_one(monkeypatch):
-    monkeypatch.setattr("study.stages.lanes.PAUSE", 0.0)
+    monkeypatch.setattr("study.stages.job_pool.PROGRESS_INTERVAL", 0.0)
 
     def work(progress):
         with progress.stage("within") as advance:
             time.sleep(0.01)
             advance(0.5)
 
-    told = Told()
-    run_jobs(2, Job("a", work), Job("b", work), progress=told)
+    store_summary = Told()
+    run_jobs(2, Job("a", work), Job("b", work), progress=store_summary)
     for note in (("begin", "within"), ("share", "within", 0.5), ("end", "within")):
-        assert told.notes.count(note) == 2
+        assert store_summary.notes.count(note) == 2
 
 
 PARENT = """
 import os, sys, time
 from study.progress import Silent
-from study.stages.lanes import Job, lanes
+from study.stages.job_pool import Job, job_pool
 def work(_):
     print(os.getpid(), flush=True)
     time.sleep(60)
-with lanes(2, Silent()) as side:
+with job_pool(2, Silent()) as side:
     side.start(Job("a", work))
     side.start(Job("b", work))
     side.results()

@@ -13,7 +13,7 @@ from study.mesh.axes import to_scene
 from study.mesh.save import save
 from study.mesh.tetrahedra import boundary, volumes
 from study.organ.block import block_mesh
-from study.problem.varied import VariedTissue, barycentric_samples, of_tetrahedra
+from study.problem.heterogeneous import HeterogeneousTissue, barycentric_samples, of_tetrahedra
 from study.results.provenance import organ_sha256
 from study.scene.file import read_scene, resolved, validate, write_scene
 from study.scene.problem import problem_of
@@ -58,7 +58,7 @@ def halves(points):
 def test_voxels_lie_where_their_affine_says(tmp_path, mirrored):
     path = image(tmp_path / "map.nii.gz", halves, mirrored=mirrored)
     problem = problem_of(scene_of(path))
-    assert isinstance(problem.tissue, VariedTissue)
+    assert isinstance(problem.tissue, HeterogeneousTissue)
     at = np.array([[0.01, 0.02, 0.015], [0.05, 0.02, 0.015], [0.5, 0.0, 0.0]])
     found = problem.tissue.mapped(at)
     assert found[:2] == pytest.approx([5e3, 20e3])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,8 @@ from study.scene.problem import problem_of
 from tests.mesh_samples import write_tetrahedra
 
 COARSE = ("reference.element_size=30 mm", 'models=["fem"]')
+
+BLUNT = {key: power for key, power in POWERS.items() if key != "tool.displacement"}
 
 
 def value(scene, key):
@@ -48,7 +52,7 @@ def test_a_liver_of_another_size_has_the_strains_of_the_first(liver_of, litres):
     plain = read_scene("liver")
     scene = patient(liver_of(litres))
     size = np.cbrt(litres / 1.5)
-    for key, power in POWERS.items():
+    for key, power in BLUNT.items():
         found = value(scene, key) / value(plain, key)
         if key == "tool.force":
             assert 0.6 * size**power < found <= 1.03 * size**power
@@ -77,7 +81,7 @@ def test_what_is_stated_stays(liver_of):
     (remark,) = scene.remarks
     assert "support.depth" in remark
     assert "tool" not in remark
-    everything = [f"{key}={value(read_scene('liver'), key)!r}" for key in POWERS]
+    everything = [f"{key}={value(read_scene('liver'), key)!r}" for key in BLUNT]
     assert patient(liver_of(0.6), *everything).remarks == ()
 
 
@@ -103,6 +107,21 @@ def test_a_scene_of_ones_own_is_suited_where_it_asks_for_it(liver_of, tmp_path):
         read_suited(str(path), ())
     with pytest.raises(SceneError, match=r"organ\.suit: has no effect without organ\.mesh"):
         read_scene("liver", ('organ.suit=["tool.radius"]',))
+
+
+def test_a_tool_that_is_moved_has_a_displacement_suited_and_no_force(liver_of, tmp_path):
+    given = (f"organ.mesh={liver_of(0.6)}", "organ.unit=mm", *COARSE)
+    scene, plain = read_suited("press", given), read_scene("press")
+    size = np.cbrt(0.6 / 1.5)
+    assert scene.tool.displacement == pytest.approx(size * plain.tool.displacement, rel=0.06)
+    assert scene.tool.radius == pytest.approx(size * plain.tool.radius, rel=0.06)
+    assert scene.tool.force == plain.tool.force
+    assert "tool.force" not in scene.remarks[0]
+    text = write_scene(replace(plain, organ=replace(scene.organ, suit=("tool.force",))))
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=r"organ\.suit: tool\.force has no effect in this scene"):
+        read_scene(str(path))
 
 
 def test_every_command_says_it_once(liver_of, tmp_path):

@@ -18,16 +18,16 @@ from study.sweep.attempt import attempt
 from study.sweep.imports import reached
 from study.sweep.plan import plan
 from study.sweep.program import ROOT, program
-from study.sweep.runner import How, run
+from study.sweep.runner import Backend, run
+from study.sweep.status import StatusLines, SweepStatus, duration, on_stderr
 from study.sweep.store import Store
-from study.sweep.tally import Tally, TallyLines, duration, on_stderr
 from study.sweep.task import Task
 
 FUNCTIONS = "tests.sweep_tasks"
 DRIVER = """
 import sys
 from pathlib import Path
-from study.sweep.runner import How, run
+from study.sweep.runner import Backend, run
 from study.sweep.store import Store
 from study.sweep.task import Task
 
@@ -36,7 +36,7 @@ tasks = [
     Task("tests.sweep_tasks:square", {"x": x, "log": log, "seconds": 0.03}) for x in range(200)
 ]
 if __name__ == "__main__":
-    outcomes = run(tasks, Store(Path(folder)), How(int(workers)))
+    outcomes = run(tasks, Store(Path(folder)), Backend(int(workers)))
     print(sum(outcome.status == "done" for outcome in outcomes))
 """
 """A sweep of 200 runs, started as a program so that it can be killed."""
@@ -329,18 +329,20 @@ def test_progress_counts_stored_done_and_failed_and_says_how_long_it_takes(store
     run(squares(2), store)
     told = []
     run([*squares(4), task("fail", x=1)], store, progress=told.append)
-    assert [tally[:4] for tally in told] == [
+    assert [status[:4] for status in told] == [
         (5, 2, 0, 0), (5, 2, 1, 0), (5, 2, 2, 0), (5, 2, 2, 1),
     ]  # fmt: skip
     assert told[0].seconds_left is None
     assert told[-1].seconds_left == 0.0
-    assert str(Tally(100, 20, 38, 2, 120.0)) == "60 of 100, 20 from before, 2 failed, 2 min left"
+    assert (
+        str(SweepStatus(100, 20, 38, 2, 120.0)) == "60 of 100, 20 from before, 2 failed, 2 min left"
+    )
     assert [duration(s) for s in (8.4, 150, 9000)] == ["8 s", "2 min", "2.5 h"]
 
 
 def test_lines_are_sparse_where_stderr_is_no_terminal(store, capsys):
     with on_stderr("squares") as tell:
-        assert isinstance(tell, TallyLines)
+        assert isinstance(tell, StatusLines)
         run(squares(50), store, progress=tell)
     assert capsys.readouterr().err.splitlines() == ["squares: 0 of 50", "squares: 50 of 50"]
 
@@ -354,14 +356,14 @@ def test_lines_are_sparse_where_stderr_is_no_terminal(store, capsys):
 )
 def test_a_place_that_cannot_be_meant_is_refused(how, message):
     with pytest.raises(ValueError, match=message):
-        How(**how)
+        Backend(**how)
 
 
 def test_without_the_package_for_workers_the_extra_to_install_is_named(store, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "study.sweep.workers", raising=False)
     with pytest.raises(ValueError, match=r'pip install -e "\.\[workers\]"'):
-        run(squares(1), store, How(workers=1))
+        run(squares(1), store, Backend(workers=1))
     assert run(squares(1), store)[0].status == "done"
 
 
@@ -371,7 +373,7 @@ def test_workers_answer_as_this_process_does_and_a_crash_stays_with_its_task(sto
     deadly = [task("die", x=7, log=str(log)), task("leave", x=0)]
     tasks = [*harmless[:3], deadly[0], *harmless[3:5], deadly[1], *harmless[5:], task("threads")]
     before = dict(os.environ)
-    outcomes = {o.task.key: o for o in run(tasks, store, How(workers=2))}
+    outcomes = {o.task.key: o for o in run(tasks, store, Backend(workers=2))}
     assert dict(os.environ) == before
     here = run(harmless, Store(tmp_path / "here"))
     assert without_wall(outcomes[t.key] for t in harmless) == without_wall(here)
@@ -387,7 +389,7 @@ def test_on_a_scheduler_that_would_retry_a_crash_there_is_one_attempt_too(store,
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50
     ) as cluster:
-        how = How(scheduler=cluster.scheduler_address)
+        how = Backend(scheduler=cluster.scheduler_address)
         crashed, done = run([task("die", x=7, log=str(log)), *squares(1)], store, how)
         assert (crashed.status, done.status) == ("crashed", "done")
         assert len(begun(log)) == 1
@@ -397,7 +399,7 @@ def test_on_a_scheduler_that_would_retry_a_crash_there_is_one_attempt_too(store,
         with pytest.raises(ValueError, match="start the workers from this checkout"):
             run(squares(3), store, how)
         cluster.scale(0)
-        monkeypatch.setattr(workers, "PATIENCE", 0.2)
+        monkeypatch.setattr(workers, "NO_WORKER_TIMEOUT", 0.2)
         with pytest.raises(ValueError, match="no workers"):
             run(squares(3), store, how)
 
@@ -406,10 +408,10 @@ def test_a_scheduler_that_does_not_answer_is_told_with_how_to_start_one(store, m
     pytest.importorskip("distributed")
     from study.sweep import workers
 
-    monkeypatch.setattr(workers, "ANSWER", 0.2)
+    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 0.2)
     for address in ("tcp://127.0.0.1:9", "nonsense://host"):
         with pytest.raises(ValueError, match="start one with `dask scheduler`"):
-            run(squares(1), store, How(scheduler=address))
+            run(squares(1), store, Backend(scheduler=address))
 
 
 # Interruptions

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.models.lattice import asked_step
+from study.models.lattice import requested_step
 from study.models.table import model
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -35,7 +35,7 @@ def posed(*overrides, loads=()):
 
 def run(*overrides):
     problem, prepared = posed(*overrides)
-    return problem, prepared, prepared._march(asked_step(prepared.model.lattice))
+    return problem, prepared, prepared._integrate(requested_step(prepared.model.lattice))
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def test_friction_is_coulombs_where_it_slides_and_less_where_it_sticks(friction)
     scene = read_scene("block", (*kept, path, place, f"tool.friction={friction}"))
     problem = problem_of(replace(scene, tool=replace(scene.tool, shape="plate")))
     prepared = model(scene, "tissue").prepare(problem)
-    found = prepared._march(asked_step(prepared.model.lattice))
+    found = prepared._integrate(requested_step(prepared.model.lattice))
     tool = problem.rigid_tools[0]
     force = -found.trajectory.tool_force[:, 0]
     pressing = force @ tool.axis
@@ -222,7 +222,7 @@ def test_a_tool_over_a_surface_that_is_not_square_to_it_starts_outside():
 def test_an_integrator_that_cannot_stop_at_tools_says_so(integrator):
     _, prepared = posed(f"lattice.integrator={integrator}")
     with pytest.raises(ValueError, match=r"lattice\.integrator to symplectic-euler"):
-        prepared._march(asked_step(prepared.model.lattice))
+        prepared._integrate(requested_step(prepared.model.lattice))
 
 
 def test_a_tool_through_the_body_ends_as_divergence():
@@ -238,7 +238,7 @@ def test_a_run_goes_on_to_the_same_bits(tmp_path):
 
     _, prepared = posed()
     given = (prepared.assembly, prepared.springs.material, prepared.problem.factor)
-    given += (prepared.problem.observation, asked_step(prepared.model.lattice))
+    given += (prepared.problem.observation, requested_step(prepared.model.lattice))
     whole = run_lattice(*given)
 
     class Stopped(Exception):  # noqa: N818 - no error

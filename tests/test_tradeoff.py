@@ -15,23 +15,23 @@ from study.models import lattice
 from study.models.model import Stepper
 from study.problem.damping import RayleighDamping
 from study.progress import Silent
-from study.run import stated as stated_module
-from study.run.stated import arguments
+from study.run import scene_problem as scene_problem_module
+from study.run.scene_problem import scene_arguments
 from study.scene.file import read_scene
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import recommend as advice
 from study.tradeoff import study as study_module
 from study.tradeoff import table
+from study.tradeoff.contenders import CONTENDERS, Configuration, configurations
 from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.geometry import with_large_displacements
-from study.tradeoff.lineup import CONTENDERS, Configuration, configurations
+from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import SAMPLING, plain, sampled
 from study.tradeoff.rates import Frame, frame
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import FEWEST, Timing, in_turns
 
@@ -58,12 +58,14 @@ CHOSEN = [*VOLUME, LINEAR, RITZ, TOO_LONG, NO_MESH]
 def found(tmp_path_factory):
     scene = sampled(read_scene("block", SMALL))
     store = Store(tmp_path_factory.mktemp("runs"))
-    return study_module.study(scene, CHOSEN, store, How(), 2, Silent())
+    return study_module.study(scene, CHOSEN, store, Backend(), 2, Silent())
 
 
 @pytest.fixture(scope="module")
-def stated():
-    return stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+def scene_problem():
+    return scene_problem_module.scene_problem(
+        **scene_arguments(sampled(read_scene("block", SMALL)))
+    )
 
 
 def rows_of(entries, folder):
@@ -205,7 +207,7 @@ def test_a_slower_kernel_costs_in_proportion_and_loses_its_place_on_the_front(tm
     assert [row["pareto"] for row in slower] == [True, True]
 
 
-def test_a_setup_is_that_of_a_lattice_of_its_own(stated, monkeypatch):
+def test_a_setup_is_that_of_a_lattice_of_its_own(scene_problem, monkeypatch):
     """One on the same lattice would take what another had assembled, and seem to cost nothing."""
     built, genuine = [], lattice.msm.assemble
 
@@ -215,7 +217,7 @@ def test_a_setup_is_that_of_a_lattice_of_its_own(stated, monkeypatch):
 
     monkeypatch.setattr(lattice.msm, "assemble", counting)
     same = [VOLUME[0], Configuration("step-sizes", {**VOLUME[0].settings, "step_fraction": 0.4})]
-    study_module.costs(stated, same, [1e-3, 1e-3], 1, Silent())
+    study_module.costs(scene_problem, same, [1e-3, 1e-3], 1, Silent())
     assert len(built) == 2 * len(same)  # of each contender one to warm up
 
 
@@ -259,14 +261,14 @@ def observed(**values):
 
 
 @pytest.mark.parametrize(("away", "status"), [(0.019, "not resolved"), (0.021, "resolved")])
-def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, stated):
-    seen = stated.problem.observation
+def test_an_error_below_that_of_the_reference_is_not_resolved(away, status, scene_problem):
+    seen = scene_problem.problem.observation
     field = np.ones((len(seen.volume_points), 3))
     curves = np.ones((len(seen.times), len(seen.probes), 3))
-    known = Truth(field, curves, 0.02, np.full(len(seen.probes), 0.02))
+    known = ReferenceSolution(field, curves, 0.02, np.full(len(seen.probes), 0.02))
     value = observed(field=plain((1 + away) * field), curves=plain((1 + away) * curves))
     task = Task("study.tradeoff.observation:observe", {})
-    found = errors(Outcome(task, "done", value, "", 0.0), known, stated)
+    found = errors(Outcome(task, "done", value, "", 0.0), known, scene_problem)
     assert found.status == status
     expected = pytest.approx(away) if status == "resolved" else None
     assert (found.field, found.tool, found.worst) == (expected,) * 3
@@ -284,51 +286,51 @@ def test_cells_turned_inside_out_and_steps_beyond_the_limit_leave_no_error(
     assert (found.status, found.field) == (status, None)
 
 
-def test_control_points_have_one_order_here_and_in_a_run(stated):
-    given = arguments(sampled(read_scene("block", SMALL)))
-    there = stated_module.stated(**json.loads(json.dumps(given, sort_keys=True)))
+def test_control_points_have_one_order_here_and_in_a_run(scene_problem):
+    given = scene_arguments(sampled(read_scene("block", SMALL)))
+    there = scene_problem_module.scene_problem(**json.loads(json.dumps(given, sort_keys=True)))
     assert list(read_scene("block").control_points) == ["tool", "corner"]
-    assert there.problem.probes == stated.problem.probes == ("corner", "tool")
-    assert stated.problem.probes[stated.problem.tool_probe] == "tool"
+    assert there.problem.probes == scene_problem.problem.probes == ("corner", "tool")
+    assert scene_problem.problem.probes[scene_problem.problem.tool_probe] == "tool"
 
 
-def stepped(stated, configuration, seconds):
+def stepped(scene_problem, configuration, seconds):
     """Displacement of the nodes after a time, as the timing steps to it."""
-    ready = configuration.model(stated.scene).prepare(stated.problem).stepper()
+    ready = configuration.model(scene_problem.scene).prepare(scene_problem.problem).stepper()
     for _ in range(round(seconds / ready.step)):
         ready.take_step()
     return ready.displacement()
 
 
-def ran(stated, configuration, seconds):
+def ran(scene_problem, configuration, seconds):
     """Displacement of the control points after a time, as the errors have it."""
-    found = configuration.model(stated.scene).prepare(stated.problem).simulate()
+    found = configuration.model(scene_problem.scene).prepare(scene_problem.problem).simulate()
     return found.trajectory.displacement[round(seconds / SAMPLING)]
 
 
-def test_what_is_timed_is_the_lattice_whose_error_is_measured(stated):
+def test_what_is_timed_is_the_lattice_whose_error_is_measured(scene_problem):
     settings = {"spacing": 0.01, "volume_term": True, "step_rate": 2000.0}
     one = Configuration("step-sizes", settings)
-    net = one.model(stated.scene).prepare(stated.problem).assembly.lattice
-    at_probes = net.interpolation(stated.problem.observation.probes)[0]
-    expected = ran(stated, one, 0.2)
-    found = at_probes @ stepped(stated, one, 0.2)
+    net = one.model(scene_problem.scene).prepare(scene_problem.problem).assembly.lattice
+    at_probes = net.interpolation(scene_problem.problem.observation.probes)[0]
+    expected = ran(scene_problem, one, 0.2)
+    found = at_probes @ stepped(scene_problem, one, 0.2)
     scale = np.abs(expected).max()
     # The same steps, but their times are summed otherwise.
     assert np.abs(found - expected).max() < 1e-9 * scale
-    late = at_probes @ stepped(stated, one, 0.2 + 0.0005)
+    late = at_probes @ stepped(scene_problem, one, 0.2 + 0.0005)
     assert np.abs(late - expected).max() > 1e-4 * scale
 
 
 @pytest.mark.parametrize("one", [LINEAR, RITZ], ids=lambda one: one.contender)
-def test_what_is_timed_are_the_elements_whose_error_is_measured(one, stated):
-    prepared = one.model(stated.scene).prepare(stated.problem)
+def test_what_is_timed_are_the_elements_whose_error_is_measured(one, scene_problem):
+    prepared = one.model(scene_problem.scene).prepare(scene_problem.problem)
     body = prepared.body() if one is LINEAR else prepared.body
-    at_probes = evaluation(body, stated.problem.observation.probes)
-    expected = ran(stated, one, 0.2)
+    at_probes = evaluation(body, scene_problem.problem.observation.probes)
+    expected = ran(scene_problem, one, 0.2)
     scale = np.abs(expected).max()
-    assert np.abs(at_probes @ stepped(stated, one, 0.2) - expected).max() < 1e-9 * scale
-    late = at_probes @ stepped(stated, one, 0.2 + 1 / 60)
+    assert np.abs(at_probes @ stepped(scene_problem, one, 0.2) - expected).max() < 1e-9 * scale
+    late = at_probes @ stepped(scene_problem, one, 0.2 + 1 / 60)
     assert np.abs(late - expected).max() > 1e-3 * scale
 
 
@@ -345,10 +347,10 @@ def test_a_mesh_that_changed_since_the_runs_were_planned_is_refused(tmp_path):
     mesh.write_text("solid a")
     scene = read_scene("block")
     scene = replace(scene, organ=replace(scene.organ, mesh=str(mesh)))
-    given = arguments(scene)
+    given = scene_arguments(scene)
     mesh.write_text("solid b")
     with pytest.raises(ValueError, match="has changed"):
-        stated_module.stated(**given)
+        scene_problem_module.scene_problem(**given)
 
 
 def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():
@@ -422,7 +424,9 @@ def test_a_recommended_scene_says_its_precision():
 
 def test_what_single_precision_adds_is_the_change_of_the_field():
     """Of runs in double and in single; where one is missing single precision is not offered."""
-    given = stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    given = scene_problem_module.scene_problem(
+        **scene_arguments(sampled(read_scene("block", SMALL)))
+    )
     count = len(given.problem.volume_rule.weights)
     task = Task("study.tradeoff.observation:observe", {})
     double, single = (
@@ -474,7 +478,7 @@ def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
-    assert "this place of the load only" in said
+    assert "this place of the load, or its way, only" in said
     assert "MB kept while it steps" in said
     scene = read_scene(str(tmp_path / "block-10percent.toml"))
     assert scene.models[-1] in {"superposition", "corrected", "region"}
@@ -536,7 +540,9 @@ def test_what_follows_one_place_is_a_configuration_of_a_contender():
 
 
 def test_large_displacements_are_what_a_correction_adds():
-    given = stated_module.stated(**arguments(sampled(read_scene("block", SMALL))))
+    given = scene_problem_module.scene_problem(
+        **scene_arguments(sampled(read_scene("block", SMALL)))
+    )
     count = len(given.problem.volume_rule.weights)
     samples, probes = len(given.problem.observation.times), len(given.problem.probes)
     task = Task("study.tradeoff.observation:observe", {})
@@ -545,7 +551,9 @@ def test_large_displacements_are_what_a_correction_adds():
         values = [x] * (3 * count), [x] * (3 * samples * probes)
         return Outcome(task, "done", vars(Observed(None, 0, None, 1e-3, *values)), "", 0.0)
 
-    known = Truth(np.ones((count, 3)), np.ones((samples, probes, 3)), 0.01, np.full(probes, 0.02))
+    known = ReferenceSolution(
+        np.ones((count, 3)), np.ones((samples, probes, 3)), 0.01, np.full(probes, 0.02)
+    )
     found = with_large_displacements(known, run(2.0), run(2.2), run(2.25), given)
     np.testing.assert_allclose(found.field, 1.25)
     np.testing.assert_allclose(found.curves, 1.25)

@@ -10,20 +10,20 @@ import pytest
 
 from study.commands import EXIT_BAD_INPUT
 from study.progress import Silent
-from study.run.stated import arguments, stated
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.scene.file import read_scene
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff import study as study_module
 from study.tradeoff import table
+from study.tradeoff.comparison import FINEST, is_finest, lattices, truth_of
+from study.tradeoff.contenders import Configuration, configurations
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.judge import FINEST, is_finest, lattices, truth_of
-from study.tradeoff.lineup import Configuration, configurations
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import plain, sampled
 from study.tradeoff.recommend import Candidate, Promise, Recommended, _promises, lines
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import Timing
 from tests.test_tradeoff import command  # noqa: F401 - a fixture
@@ -61,7 +61,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def given(scene):
-    return stated(**arguments(scene))
+    return scene_problem(**scene_arguments(scene))
 
 
 def test_samples_show_the_force_and_frames_divide_them(scene):
@@ -131,7 +131,7 @@ def test_a_configuration_is_judged_by_the_force(given, away, status):
 def found(scene, tmp_path_factory):
     chosen = [of(2.0), of(1.5), of(1.0), of(FINEST)]
     store = Store(tmp_path_factory.mktemp("runs"))
-    return study_module.study(scene, chosen, store, How(), 1, Silent())
+    return study_module.study(scene, chosen, store, Backend(), 1, Silent())
 
 
 def test_force_errors_fall_with_the_spacing_and_stand_in_the_table(found, scene, tmp_path):
@@ -147,18 +147,18 @@ def test_force_errors_fall_with_the_spacing_and_stand_in_the_table(found, scene,
     assert float(rows[0]["force_error"]) == pytest.approx(coarse.errors.force, rel=1e-3)
     assert float(rows[0]["force_error_bar"]) == pytest.approx(coarse.force_bar, rel=1e-3)
     assert '"reference": null' in (tmp_path / "out" / study_module.RECORD).read_text()
-    assert "finest lattice of the same springs, 10 mm" in found.judge.words
+    assert "finest lattice of the same springs, 10 mm" in found.comparison.words
 
 
 def test_a_promise_is_what_a_run_was_off_the_finest_by_and_the_finest_itself(found):
-    (truth,) = found.judge.finest.values()
+    (truth,) = found.comparison.finest.values()
     tried = [of(2.0), of(1.0), of(FINEST)]
-    outcomes = [run_of(found.judge.given, 1.0) for _ in tried]
+    outcomes = [run_of(found.comparison.given, 1.0) for _ in tried]
     exact = replace(truth, force=np.reshape(outcomes[0].value["force"], truth.force.shape))
-    judge = replace(found.judge, finest={("tissue", False): exact})
-    outcomes[0] = run_of(found.judge.given, 1.3)
-    outcomes[1] = run_of(found.judge.given, 1.0, field=None, ended_at_s=0.1)
-    promises = _promises(judge, tried, outcomes, [])
+    comparison = replace(found.comparison, finest={("tissue", False): exact})
+    outcomes[0] = run_of(found.comparison.given, 1.3)
+    outcomes[1] = run_of(found.comparison.given, 1.0, field=None, ended_at_s=0.1)
+    promises = _promises(comparison, tried, outcomes, [])
     assert list(promises) == [2.0 * SPACING, FINEST * SPACING]
     assert promises[2.0 * SPACING].error == pytest.approx(0.3)
     assert promises[2.0 * SPACING].bar == truth.force_bar > 0.0
@@ -183,12 +183,12 @@ def test_the_reference_judges_where_the_scene_names_it(given):
     exact = truth_of([run_of(given, 1.0)] * 2, given)
     truth = replace(exact, force_errors=np.array([0.03]), peak_errors=np.array([0.03]))
     finest = truth_of([run_of(given, 1.1)] * 2, given)
-    judge = study_module.Judge(given, truth, None, {("tissue", False): finest})
-    found = judge.errors(of(1.0), run_of(given, 1.2))
+    comparison = study_module.Comparison(given, truth, None, {("tissue", False): finest})
+    found = comparison.errors(of(1.0), run_of(given, 1.2))
     assert found.force == pytest.approx(0.2)
     assert found.discretisation == pytest.approx(0.1 / 1.1)
-    assert isinstance(judge.truth(of(1.0)), Truth)
-    assert judge.words == "the scene's finite elements"
+    assert isinstance(comparison.truth(of(1.0)), ReferenceSolution)
+    assert comparison.words == "the scene's finite elements"
 
 
 def test_what_is_recommended_says_what_its_errors_are_of_and_against():
@@ -241,13 +241,13 @@ def test_several_loads_and_gravity_are_judged_by_the_reference(tmp_path):
         "volume-springs", {"spacing": 0.01, "volume_term": True, "step_fraction": 0.8}
     )
     store = Store(tmp_path / "runs")
-    found = study_module.study(scene, [elements, springs], store, How(), 1, Silent())
+    found = study_module.study(scene, [elements, springs], store, Backend(), 1, Silent())
     assert [one.errors.status for one in found.entries] == ["resolved"] * 2
     assert [one.errors.of_force for one in found.entries] == [False] * 2
-    assert found.judge.reference is not None
+    assert found.comparison.reference is not None
     assert "superposition" not in {one.contender for one in configurations(scene)}
-    prepared = elements.model(scene).prepare(found.judge.given.problem)
-    stepper, seen = prepared.stepper(), found.judge.given.problem.observation
+    prepared = elements.model(scene).prepare(found.comparison.given.problem)
+    stepper, seen = prepared.stepper(), found.comparison.given.problem.observation
     start = prepared.simulate().trajectory.displacement[0]
     from fem_reference.observation import evaluation
 

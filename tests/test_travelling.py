@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fem_reference.model import start_of
+from fem_reference.observation import at_points, evaluation
 from fem_reference.subspace import ritz_subspace
 from reports import field_figures
 from reports.page import data as page_data
@@ -14,15 +16,14 @@ from reports.renders import FLAT
 from study.models.table import model
 from study.plan import moved
 from study.plan.plan import measure, plan
-from study.problem import way
-from study.problem.way import Turn, stations, turns
+from study.problem import tool_travel
+from study.problem.tool_travel import StationFactor, station_loads, stations
 from study.progress import Silent
 from study.results.folder import read, write
-from study.robustness import organ_request
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
-from study.tradeoff.lineup import contenders_of
+from study.tradeoff.contenders import contenders_of
 from tests.benchmarks import travelling
 from tests.benchmarks.corrected_places import TOLERANCE
 
@@ -71,7 +72,8 @@ def moments(corners, times, distance):
     at = np.linspace(times[0], times[-1], 101)
     own = np.interp(at, times, marks)
     histories = [
-        one for _, one in turns(found, found.away, times, marks, np.ones_like, 1e-6 * distance)
+        one
+        for _, one in station_loads(found, found.away, times, marks, np.ones_like, 1e-6 * distance)
     ]
     shares = np.column_stack([one.share(at) for one in histories])
     return [np.abs(shares @ found.marks**k - own**k).max() / marks[-1] ** k for k in range(4)]
@@ -83,7 +85,7 @@ def test_force_centre_and_two_more_moments_are_the_tools_own():
 
 
 def test_hats_would_be_off_by_a_quarter_of_the_distance_squared(monkeypatch):
-    monkeypatch.setattr("study.problem.way.DEGREE", 1)
+    monkeypatch.setattr("study.problem.tool_travel.DEGREE", 1)
     found = moments(np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]), np.array([0.0, 0.7]), 0.006)
     assert max(found[:2]) < 1e-12
     assert found[2] == pytest.approx(0.25 * 0.2**2, rel=0.02)
@@ -101,7 +103,7 @@ def test_there_and_back_takes_each_station_once():
     out = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.0, 0.0]])
     found, marks = stations(out, 0.005)
     times = np.array([0.0, 1.0, 2.0])
-    both = list(turns(found, found.away, times, marks, np.ones_like, 1e-9))
+    both = list(station_loads(found, found.away, times, marks, np.ones_like, 1e-9))
     assert len(both) == 5
     for _, one in both:
         np.testing.assert_allclose(one.share(np.array([0.3])), one.share(np.array([1.7])))
@@ -195,7 +197,7 @@ def test_rest_is_told_where_the_tool_is_at_the_peak(scene, problem):
     """One tool in full, not all of its stations."""
     body = model(scene, "fem").prepare(problem).body()
     last, turn = loads_of(problem)[-1]
-    assert isinstance(turn, Turn)
+    assert isinstance(turn, StationFactor)
     np.testing.assert_allclose(problem.full, [0.0] * len(problem.loads) + [1.0], atol=1e-12)
     single = replace(problem, tool=last, factor=turn.history, loads=())
     alone = model(scene, "fem").prepare(single).body()
@@ -326,9 +328,23 @@ def _left(wanted, seen, spacing):
 
 
 def test_no_corrected_lattice_is_foretold_of_what_it_cannot_follow():
-    wanted, seen = looked("gravity.acceleration=9.81 m/s^2")
+    wanted, seen = looked("lattice.geometry=linear")
     assert seen.beyond is None
     assert not list(moved.corrected(wanted, seen))
+
+
+def test_what_is_foretold_of_elements_is_of_their_sag_too():
+    sagging = "gravity.acceleration=9.81 m/s^2", "gravity.towards=right"
+    wanted, seen = looked(*sagging)
+    assert list(moved.corrected(wanted, seen))
+    body = model(wanted, "fem").prepare(problem_of(wanted)).body()
+    finest = seen.elements.elements[-1]
+    assert finest.unknowns >= body.unknowns
+    sag = evaluation(body, seen.elements.problem.observation.probes)
+    _, light = looked()
+    added = finest.rest.probes - light.elements.elements[-1].rest.probes
+    known = at_points(sag, start_of(body))
+    assert np.linalg.norm(added - known) < 0.1 * np.linalg.norm(known)
 
 
 def test_rest_is_refused_of_a_tool_that_travels():
@@ -343,11 +359,11 @@ def test_the_sentence_on_stations_is_what_was_measured():
     """The table is committed; `tests.benchmarks.travelling` writes it."""
     with travelling.STATIONS.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    used = [one for one in rows if float(one["apart"]) == way.APART]
+    used = [one for one in rows if float(one["apart"]) == tool_travel.APART]
     assert len(used) == 2
     for one in used:
-        assert float(one["spline"]) < way.MEASURED
-        assert float(one["hat"]) > 3.0 * way.MEASURED  # which is why they are not hats
+        assert float(one["spline"]) < tool_travel.MEASURED
+        assert float(one["hat"]) > 3.0 * tool_travel.MEASURED  # which is why they are not hats
 
 
 def test_on_the_liver_small_strain_is_met_by_coarse_corrected_lattices():
@@ -369,8 +385,3 @@ def test_contenders_are_those_that_follow(scene):
     found = contenders_of(scene)
     assert {"corrected", "corrected-graded", "region", "finite-elements", "springs"} <= set(found)
     assert "superposition" not in found
-
-
-def test_draws_of_a_patient_refuse_a_tool_that_travels(scene):
-    with pytest.raises(ValueError, match=r"robustness: .* travels; leave out its path"):
-        organ_request._refuse_moved(scene)

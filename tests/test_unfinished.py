@@ -15,7 +15,7 @@ from study.models.lattice import PreparedLattice
 from study.problem.unfinished import UnfinishedError
 from study.results.content import check
 from study.results.folder import read, write
-from study.run.stages import Means
+from study.run.stages import RunOptions
 from study.run.study import run_study
 from study.scene.file import read_scene
 from study.stages.store import Store
@@ -56,8 +56,8 @@ def found(tmp_path_factory):
     store.prepare()
     with pytest.MonkeyPatch.context() as patch:
         planted(patch, LOST, UnfinishedError(WHY, REMEDY))
-        lost = run_study(scene, means=Means(store))
-    return lost, run_study(scene, means=Means(store))
+        lost = run_study(scene, options=RunOptions(store))
+    return lost, run_study(scene, options=RunOptions(store))
 
 
 def test_the_others_go_on_and_it_has_a_reason_and_no_score(found):
@@ -107,7 +107,7 @@ def test_a_reference_that_is_not_finished_leaves_no_score_against_it(monkeypatch
 
 
 def test_a_model_that_takes_too_long_is_stopped_and_says_how_far_it_was():
-    results = run_study(read_scene("block", (*SCENE, BRIEF)), means=Means(minutes=1e-9))
+    results = run_study(read_scene("block", (*SCENE, BRIEF)), options=RunOptions(minutes=1e-9))
     for model in results.record.models:
         assert model.status == "not finished"
         assert f"done of the stage '{model.name}" in model.reason
@@ -116,7 +116,7 @@ def test_a_model_that_takes_too_long_is_stopped_and_says_how_far_it_was():
 
 
 def test_time_enough_changes_nothing(found):
-    timed = run_study(read_scene("block", (*SCENE, BRIEF)), means=Means(minutes=60.0))
+    timed = run_study(read_scene("block", (*SCENE, BRIEF)), options=RunOptions(minutes=60.0))
     curve = [row for row in found[1].curves if row.model == "reading"]
     assert list(timed.curves) == curve
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from study.run.ready import QUIET
+from study.run.preparation import QUIET
 from study.validation import cantilever, cube, cylinders, table
-from study.validation.answers import KINDS
 from study.validation.bodies import BEAM_DENSITY, GRAVITY, beam, cylinder
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Compression, beads, beam_markers, compressions
+from study.validation.predictions import KINDS
 from study.validation.registration import registered
 from study.validation.request import ValidationRequest, all_answered
-from study.validation.rows import Comparison, own_error
 
 
 def test_a_rigid_motion_is_taken_away_and_nothing_else(rng):

@@ -1,1 +1,1 @@
-"""What annotates the fields of a scene: a number with unit and range, a choice from a table."""
+"""Annotations of the fields of a scene: a number with unit and range, a choice from a table."""

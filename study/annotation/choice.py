@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 class Choice:
     """Annotation of a text field: its value is a key of a table, given as "module:NAME".
 
-    As an annotation `Annotated[str, Choice("msm.integrators:INTEGRATORS")]` it makes pydantic take
-    the keys of that table and nothing else. The table is imported when a value is read, so that a
-    scene can be declared without what computes it, and an entry added to the table is a choice.
-    Names that are `usual` are taken without importing it, for tables that take long to load.
+    As an annotation `Annotated[str, Choice("msm.integrators:INTEGRATORS")]` it makes pydantic
+    accept the keys of that table and nothing else. The table is imported when a value is read, so
+    that a scene can be declared without importing the models, and a new entry of the table is a
+    choice. Names that are `usual` are accepted without importing it, for tables that take long to
+    load.
     """
 
     table: str
@@ -31,7 +32,7 @@ class Choice:
         return tuple(found)
 
     def read(self, value: object) -> str:
-        """The value if it is a key of the table; ValueError with the keys there are."""
+        """The value if it is a key of the table; ValueError with the existing keys."""
         if isinstance(value, str) and value in self.usual:
             return value
         names = self.names()

@@ -32,9 +32,9 @@ USUAL = {
     "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3},
     "byte": {"MB": 1e6, "GB": 1e9, "byte": 1.0},
 }
-"""Units that are suggested, and their sizes in the SI unit, by the SI unit.
+"""Units that are suggested, with their sizes in the SI unit, by the SI unit.
 
-pint knows these too; to load it takes longer than all else about a scene, and few scenes need more.
+pint knows these too, but takes longer to load than everything else about a scene.
 """
 FRAMES = {"Hz": ("fps", "FPS")}
 """Frames per second, which pint takes for feet."""
@@ -64,14 +64,14 @@ class Quantity:
         return number
 
     def _meant(self, number: float) -> str:
-        """For a bare number out of range: the first usual unit in which it would be in it."""
+        """For a bare number out of range: the first usual unit that would bring it into range."""
         for unit in USUAL.get(self.unit, ()):
             if unit != self.unit and self.low <= number * _factor(unit, self.unit, "") <= self.high:
                 return f', did you mean "{number:g} {unit}"?'
         return ""
 
     def text(self, value: float) -> str:
-        """The value as text that `read` takes back unchanged."""
+        """The value as text that `read` restores exactly."""
         return f"{value!r} {self.unit}".strip()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
@@ -116,7 +116,7 @@ def _parsed(text: str, unit: str) -> float:
 
 
 def _factor(name: str, unit: str, example: str) -> float:
-    """Size of a unit in the SI unit. ValueError for one that is unknown or of another dimension."""
+    """Size of a unit in the SI unit. ValueError for an unknown unit or another dimension."""
     if name == unit:  # as in every scene that a run has written
         return 1.0
     known = USUAL.get(unit, {}).get(name)
@@ -143,7 +143,7 @@ def _factor_of_pint(name: str, unit: str, example: str) -> float:
 
 
 def _near(name: str, unit: str) -> str:
-    """The usual unit that a name is nearest to, first whatever the case, or nothing."""
+    """The most similar usual unit, ignoring case first, or an empty text."""
     usual = tuple(USUAL.get(unit, ()))
     same = [one for one in usual if one.lower() == name.lower()]
     near = same or difflib.get_close_matches(name, usual, n=1)

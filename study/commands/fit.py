@@ -46,7 +46,7 @@ def fit(
     from study.progress import on_stderr
     from study.scene.file import read_scene
     from study.validation import fit_table, fitting
-    from study.validation.own_data import read_curve
+    from study.validation.user_data import read_curve
 
     if out is not None:
         refuse_unwritable(out, lambda _: None, "fit")

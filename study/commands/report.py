@@ -50,10 +50,10 @@ def report(
         return
     if out is not None:
         raise ValueError("--out: is for a bundle; the reports of a folder are made in it")
-    from study.stages.once import keeping_in
+    from study.stages.cached_arrays import using_store
     from study.stages.store import user_store
 
-    with keeping_in(user_store(), readable=not fresh):
+    with using_store(user_store(), readable=not fresh):
         made = _of_folder(target, html=html)
     print("\n".join(str(path) for path in made))
 

@@ -103,7 +103,7 @@ def _of_point(asked: RobustnessRequest, *, dry: bool) -> None:
     from reports.ranking_study import sentences
     from reports.ranking_study_figure import write_figures
     from study.robustness import request
-    from study.sweep.tally import on_stderr
+    from study.sweep.status import on_stderr
 
     if dry:
         print(request.planned(asked))
@@ -118,7 +118,7 @@ def _of_organ(asked: OrganRequest, *, dry: bool) -> None:
     from reports.organ_ranking import sentences
     from reports.organ_ranking_figure import write_figures
     from study.robustness import organ_request
-    from study.sweep.tally import on_stderr
+    from study.sweep.status import on_stderr
 
     if dry:
         print(organ_request.planned(asked))

@@ -156,25 +156,29 @@ class _How:
 def _results(scene: Scene, how: _How, store: Store | None) -> Results:
     """Results that the folder has, or that are written into it, once a person is told of them."""
     from study.progress import on_stderr
-    from study.run import unchanged
+    from study.run import up_to_date
 
     key = (
         ""
         if store is None
-        else unchanged.run_key(scene, how.folder, fields=how.fields, mesh=how.mesh)
+        else up_to_date.run_key(scene, how.folder, fields=how.fields, mesh=how.mesh)
     )
-    left = None if store is None or how.fresh else unchanged.left_by(store, key, how.folder, scene)
-    if left is not None:
-        tell(f"nothing to compute: {how.folder} holds this run, of {left.at}; or give --fresh")
+    earlier = (
+        None
+        if store is None or how.fresh
+        else up_to_date.up_to_date_run(store, key, how.folder, scene)
+    )
+    if earlier is not None:
+        tell(f"nothing to compute: {how.folder} holds this run, of {earlier.at}; or give --fresh")
     with on_stderr() as progress:
-        results = _computed(scene, how, store, progress) if left is None else left.results
-        report = how.report and not (left and left.has_report)
-        page = how.page and not (left and left.has_page)
+        results = _computed(scene, how, store, progress) if earlier is None else earlier.results
+        report = how.report and not (earlier and earlier.has_report)
+        page = how.page and not (earlier and earlier.has_page)
         failure = _report_failure(_Wanted(report, page), how, store, progress)
     # What is not finished is sought anew by the next run.
     whole = all(model.status != "not finished" for model in results.record.models)
-    if store is not None and whole and (left is None or report or page):
-        unchanged.note(store, key, how.folder)
+    if store is not None and whole and (earlier is None or report or page):
+        up_to_date.record_run(store, key, how.folder)
     _print_summary(results, how.folder)
     if failure is not None:
         reason = str(failure) or type(failure).__name__
@@ -196,13 +200,13 @@ class _Wanted:
 
 
 def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
-    from study.models.keeping import Keeping
     from study.models.model import Watch
+    from study.models.persistence import Persistence
     from study.results import manifest
     from study.results.folder import continuing, replacing, told_to_start_again, write
-    from study.run.stages import Means, told
+    from study.run.stages import RunOptions, store_summary
     from study.run.study import run_study
-    from study.stages.lanes import available
+    from study.stages.job_pool import available
 
     with (
         told_to_start_again(),
@@ -210,13 +214,13 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
         continuing(how.folder, scene, resume=how.resume) as state,
     ):
         mesh = partial / manifest.MESH if how.mesh else None
-        means = Means(store, how.fresh, how.workers or available(), mesh, how.minutes)
-        keeping = Keeping(state, how.resume, partial if how.fields else None)
-        results = run_study(scene, Watch(progress, keeping), means)
+        options = RunOptions(store, how.fresh, how.workers or available(), mesh, how.minutes)
+        persistence = Persistence(state, how.resume, partial if how.fields else None)
+        results = run_study(scene, Watch(progress, persistence), options)
         with progress.stage("results"):
             write(results, partial)
     if store is not None:
-        tell(told(results.record.stages, store))
+        tell(store_summary(results.record.stages, store))
     return results
 
 
@@ -225,8 +229,8 @@ def _report_failure(
 ) -> Exception | KeyboardInterrupt | None:
     """Make the reports; neither a fault in them nor a signal must cost a finished run."""
     from study.folders import claimed
-    from study.stages.lanes import available
-    from study.stages.once import keeping_in
+    from study.stages.cached_arrays import using_store
+    from study.stages.job_pool import available
     from study.stages.threads import threads
 
     if not (wanted.report or wanted.page):
@@ -235,7 +239,7 @@ def _report_failure(
         with (
             progress.stage("report"),
             claimed(how.folder),
-            keeping_in(store, readable=not how.fresh),
+            using_store(store, readable=not how.fresh),
             threads(how.workers or available()),
         ):
             from study.commands.report import make

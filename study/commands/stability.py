@@ -31,7 +31,7 @@ def stability(
     """
     from study.known import request as asked
     from study.known import table
-    from study.sweep.tally import on_stderr
+    from study.sweep.status import on_stderr
 
     request = asked.StabilityRequest(
         scene=scene,

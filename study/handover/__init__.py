@@ -1,1 +1,1 @@
-"""A scene's lattices for a program of one's own: arrays, a stepper in NumPy, scenes for SOFA."""
+"""A scene's lattices for the user's own program: arrays, a stepper in NumPy, scenes for SOFA."""

@@ -1,4 +1,4 @@
-"""The lattices of a scene as arrays, with the curves of their runs to compare with."""
+"""The lattices of a scene as arrays, with the curves of their runs for comparison."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from study.problem.problem import Problem
 from study.progress import Progress
 from study.results import Results
 from study.results.arrays import Arrays
-from study.run.ready import ReadyPoint, ready
+from study.run.preparation import PreparedPointScene, prepare_scene
 from study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -26,9 +26,9 @@ Floats = NDArray[np.float64]
 STEPPED = "symplectic-euler"
 LAWS_STEPPED = ("hooke", "basafa")
 DIGITS = 1e-9
-"""By how much of its largest value a curve of this run may differ from the stored one."""
+"""Largest difference of a curve of this run from the stored one, over its largest value."""
 WAVE = 0.02
-"""Of the shortest spring: a displacement that strains all springs and cells."""
+"""Amplitude over the shortest spring of a displacement that strains all springs and cells."""
 # As msm.lattice has them: x is the highest bit, z the lowest.
 CORNERS = np.array([[(c >> 2) & 1, (c >> 1) & 1, c & 1] for c in range(8)])
 
@@ -43,9 +43,9 @@ class LawConstants:
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """A lattice model: its own arrays, law, Young's modulus [Pa] at small strain, stiffness there.
+    """A lattice model: its own arrays, its law, and Young's modulus [Pa] at small strain.
 
-    `initial_stiffness` [N/m] of a spring of relative stiffness 1.
+    `initial_stiffness` [N/m]: at rest, of a spring of relative stiffness 1.
     """
 
     name: str
@@ -58,7 +58,7 @@ class ExportedModel:
 
 @dataclass(frozen=True)
 class ExportedLattices:
-    """The lattice that the models of a scene share, in arrays, and the models."""
+    """The arrays of the lattice that the models of a scene share, and the models."""
 
     title: str
     problem: Problem
@@ -69,12 +69,12 @@ class ExportedLattices:
 def lattices(scene: Scene, progress: Progress) -> ExportedLattices:
     """Arrays of all lattices of a scene, each run once more.
 
-    ValueError naming the key of what the exported stepper cannot follow, or for a scene without a
-    lattice.
+    ValueError naming the key of what the exported stepper does not support, or for a scene without
+    a lattice.
     """
     _refuse(scene)
-    found = ready(scene, progress)
-    if isinstance(found, ReadyPoint):
+    found = prepare_scene(scene, progress)
+    if isinstance(found, PreparedPointScene):
         raise ValueError(  # noqa: TRY004 - a scene's choice, reported as such
             "organ.shape: a point has no lattice; use liver, block or a mesh"
         )
@@ -89,7 +89,7 @@ def lattices(scene: Scene, progress: Progress) -> ExportedLattices:
 
 
 def check_forces(net: Network, law: Law, shared: Arrays, model: ExportedModel) -> None:
-    """ValueError unless the exported stepper has the forces of the run on a wavy displacement."""
+    """Raise ValueError unless the exported stepper has the run's forces on a wavy displacement."""
     waves = np.sin(7.0 * np.arange(net.load.size)).reshape(net.load.shape)
     u = WAVE * net.length.min() * waves
     force = np.empty_like(u)
@@ -105,7 +105,7 @@ def check_forces(net: Network, law: Law, shared: Arrays, model: ExportedModel) -
 
 
 def _refuse(scene: Scene) -> None:
-    """What the stepper of the export does not follow, by the key that would have to change."""
+    """Raise for what the exported stepper does not support, naming the key to change."""
     lattice = scene.lattice
     for is_asked, message in (
         (bool(scene.features), f"it has {', '.join(scene.features)}; leave these out"),
@@ -188,7 +188,7 @@ def _constants(law: Law) -> dict[str, float]:
 
 
 def _factors(problem: Problem, substeps: NDArray[np.int64]) -> Floats:
-    """Share of the load at every step of a run, where its integrator takes it."""
+    """Share of the load at every step of a run, at the times at which its integrator needs it."""
     (at,) = INTEGRATORS[STEPPED].at
     times = problem.observation.times
     interval = float(times[1] - times[0])
@@ -205,7 +205,7 @@ def _factors(problem: Problem, substeps: NDArray[np.int64]) -> Floats:
 
 
 def check_curves(found: ExportedLattices, results: Results) -> None:
-    """ValueError unless each model moves as its results say, up to their printed digits."""
+    """Raise ValueError unless each model moves as in its results, up to their printed digits."""
     for model in found.models:
         stored = np.stack(
             [results.curve(model.name, probe).displacement for probe in found.problem.probes], 1

@@ -1,8 +1,8 @@
-"""Scenes for SOFA of an exported lattice, and of tetrahedra with its modulus.
+"""Scenes for SOFA: an exported lattice, and tetrahedra with its modulus.
 
-Components and their fields are those that SOFA documents (its sources and generated pages, 2024);
-the scenes were not run, for SOFA is no package of PyPI. What they do otherwise than the run stands
-in each as a comment.
+Components and their fields are those that SOFA documents (its sources and generated pages, 2024).
+The scenes were not run, since SOFA is not a package of PyPI. Each states in a comment how it
+differs from the run.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def lattice_scene(found: ExportedLattices, model: ExportedModel) -> str:
 
 
 def _left_out(model: ExportedModel) -> str:
-    """What of the lattice SOFA's springs have no counterpart of."""
+    """Parts of the lattice for which SOFA's springs have no counterpart."""
     parts = []
     if model.law.name != "hooke":
         parts.append("Springs are linear, of the law's stiffness at rest. ")
@@ -115,7 +115,7 @@ def tetrahedra_scene(found: ExportedLattices, model: ExportedModel) -> str:
 
 
 def _on_mesh(problem: Problem) -> tuple[TetrahedralMesh, Floats, Floats]:
-    """The mesh, stiffness [N/m] that holds each vertex, and load [N] on it."""
+    """The mesh, stiffness [N/m] of the support at each vertex, and load [N] on it."""
     mesh = problem.geometry.mesh
     where = (problem.surface_rule, problem.tissue.density, problem.foundation, problem.tool)
     assembly = tetrahedra.assemble(mesh, *where)
@@ -149,7 +149,7 @@ def _scene(title: str, name: str, step: float, parts: Sequence[Part], about: str
 
 
 def _plain(text: str) -> str:
-    """Text that ends no comment."""
+    """Text that cannot end a comment."""
     return text.replace("--", "- -")
 
 

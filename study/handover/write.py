@@ -1,4 +1,4 @@
-"""The files of exported lattices: arrays, what they are, a stepper, scenes for SOFA."""
+"""The files of exported lattices: arrays, their description, a stepper, scenes for SOFA."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ARRAYS = {
         "curve": "(samples, p) [m] displacement of the run along the push",
     },
 }
-"""What the arrays of each file are."""
+"""Description of the arrays of each file."""
 
 
 def write(found: ExportedLattices, folder: Path) -> None:
@@ -77,7 +77,7 @@ def _record(found: ExportedLattices) -> dict[str, object]:
 
 
 def about(found: ExportedLattices) -> str:
-    """What stands in the folder, for a person."""
+    """Description of the folder for a reader."""
     shared = found.shared
     names = ", ".join(model.name for model in found.models)
     return f"""\

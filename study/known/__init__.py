@@ -1,1 +1,1 @@
-"""Cases whose answers are known beforehand: verification and stability."""
+"""Cases with known answers: verification and stability."""

@@ -1,8 +1,8 @@
-"""What a case with a known answer is, and the verdict on what it found.
+"""A case with a known answer, and the verdict on its findings.
 
-The verdict is given here and not by the case: the ending has to be the one expected, a refusal has
-to name what is wrong, and every other ending has to come with a difference within its tolerance. A
-number without anything to hold it to cannot pass.
+The verdict is given here and not by the case: the ending has to be the expected one, a refusal has
+to name what is wrong, and every other ending needs a difference within its tolerance. A number
+without a criterion cannot pass.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from study.known.finding import Ending, Finding
 from study.sweep.task import Task
 
 SECONDS = 90.0
-"""Compiling a kernel at its first use takes half a minute on a busy machine."""
+"""Default time limit; compiling a kernel at its first use takes half a minute on a busy machine."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A function of plain arguments, and how it is expected to end.
+    """A function of plain arguments, and its expected ending.
 
-    `function`: module:name, gives a `Finding` or several, or raises ValueError, which is a refusal.
-    It is held to one criterion: the `tolerance` of a difference; a pattern that the message of a
-    refusal `says`; or the `source` of exact solutions, whose findings state a limit each.
-    `seconds`: after which the case counts as hanging. `quick`: whether it belongs to the subset
-    that is run in half a minute.
+    `function`: "module:name"; it returns a `Finding` or several, or raises ValueError, which is a
+    refusal. It has one criterion: the `tolerance` of a difference; a pattern `says` that the
+    message of a refusal must match; or the `source` of exact solutions, whose findings each state a
+    limit. `seconds`: time limit after which the case counts as hanging. `quick`: whether it belongs
+    to the subset that is run in half a minute.
     """
 
     family: str
@@ -70,7 +70,7 @@ class Case:
         return self.source or f"{self.expected}, within {self.tolerance:g}"
 
     def judge(self, finding: Finding) -> bool | None:
-        """Whether a finding is as expected; None where nothing is judged."""
+        """Whether a finding is as expected; None where there is no criterion."""
         if finding.ending != self.expected:
             return False
         if self.says:
@@ -83,7 +83,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Family:
-    """The cases of one module, which holds their functions; `quick` if all of them are."""
+    """The cases of one module, which contains their functions; `quick` if all of them are."""
 
     name: str
     module: str
@@ -99,7 +99,7 @@ class Family:
         expected: Ending = "value",
         quick: bool = False,
     ) -> Case:
-        """A case held to a tolerance or, if the criterion is what a refusal says, refused at once.
+        """A case with a tolerance, or with a pattern if it is to be refused.
 
         `function`: its name in the module.
         """
@@ -117,7 +117,7 @@ class Family:
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """A case with what it found, each beside whether it is as expected, in so many seconds."""
+    """A case with its findings, each beside whether it is as expected, and its time [s]."""
 
     case: Case
     findings: tuple[Finding, ...]
@@ -125,15 +125,15 @@ class CaseVerdict:
 
     @property
     def judged(self) -> list[tuple[Finding, bool | None]]:
-        """Each finding, and whether it is as expected; None where nothing is judged."""
+        """Each finding, and whether it is as expected; None where there is no criterion."""
         return [(finding, self.case.judge(finding)) for finding in self.findings]
 
     @property
     def finding(self) -> Finding:
-        """The finding of a case that makes one."""
+        """The finding of a case that has one."""
         return self.findings[0]
 
     @property
     def passed(self) -> bool:
-        """Whether anything was found, and nothing that is not as expected."""
+        """Whether there are findings, and all of them are as expected."""
         return bool(self.findings) and all(passed is not False for _, passed in self.judged)

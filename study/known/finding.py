@@ -1,4 +1,4 @@
-"""What a case found: how it ended, and a figure beside the one known beforehand."""
+"""The finding of a case: how it ended, and a figure beside the one known beforehand."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Ending = Literal["value", "bounded", "diverged", "refused", "error"]
 
 @dataclass(frozen=True)
 class Finding:
-    """How a case ended, with what was predicted and what was measured.
+    """How a case ended, with the predicted and the measured number.
 
-    `ending`: a `value` came out, a motion stayed `bounded` or `diverged`, bad input was `refused`;
-    an `error` is none of these. `difference` of the two numbers, which are none where a whole field
-    is compared: relative, or as the function that made the finding says. A case of several findings
-    tells each `quantity`, and the `limit` of its difference; none where a shortcoming is shown and
-    nothing is judged. `order`: observed from the last two meshes or steps.
+    `ending`: a `value` was computed, a motion stayed `bounded` or `diverged`, bad input was
+    `refused`; an `error` is none of these. `difference` of the two numbers, which are None where a
+    whole field is compared: relative, or as the function that made the finding states. A case with
+    several findings gives each a `quantity`, and the `limit` of its difference, None where a
+    shortcoming is shown without a criterion. `order`: observed from the last two meshes or steps.
     """
 
     ending: Ending
@@ -37,7 +37,7 @@ class Finding:
 def value(
     predicted: float, measured: float, message: str = "", ending: Ending = "value"
 ) -> Finding:
-    """A number beside the one it should be; relative to it, or to 1 where it is zero."""
+    """A number beside its exact value; the difference is relative, or absolute where that is 0."""
     size = abs(predicted) if predicted else 1.0
     return Finding(ending, predicted, measured, abs(measured - predicted) / size, message)
 
@@ -45,7 +45,7 @@ def value(
 def beside(
     expected: NDArray[np.float64], found: NDArray[np.float64], ending: Ending = "value"
 ) -> Finding:
-    """A field beside the one it should be: their norms, and that of their difference over it."""
+    """A field beside the exact one: their norms, and the norm of their difference over it."""
     size = float(np.linalg.norm(expected))
     apart = float(np.linalg.norm(found - expected) / size)
     return Finding(ending, size, float(np.linalg.norm(found)), apart, "norm of all values")
@@ -54,7 +54,7 @@ def beside(
 def at_most(
     bound: float, measured: float, message: str = "", ending: Ending = "bounded"
 ) -> Finding:
-    """A number beside a positive bound on it; the difference is by how much it goes beyond."""
+    """A number beside a positive bound; the difference is by how much it exceeds the bound."""
     excess = max(0.0, measured / bound - 1.0) if math.isfinite(measured) else math.inf
     return Finding(ending, bound, measured, excess, message)
 
@@ -62,14 +62,14 @@ def at_most(
 def error_of(
     quantity: str, error: float, limit: float | None = None, order: float | None = None
 ) -> Finding:
-    """The error of a quantity without a number of its own, such as a field, and its limit."""
+    """The error of a quantity that is not a single number, such as a field, and its limit."""
     return Finding("value", difference=error, quantity=quantity, limit=limit, order=order)
 
 
 def number_of(
     quantity: str, exact: float, ours: float, limit: float, order: float | None = None
 ) -> Finding:
-    """A quantity beside its exact value, not zero, with the limit of its relative error."""
+    """A quantity beside its exact, nonzero value, with the limit of its relative error."""
     error = abs(ours / exact - 1.0)
     return Finding("value", exact, ours, error, quantity=quantity, limit=limit, order=order)
 
@@ -82,7 +82,7 @@ def observed_order(errors: list[float], ratio: float = 2.0) -> float:
 def convergence(
     quantity: str, errors: list[float], order: float, tolerance: float, limit: float
 ) -> Iterator[Finding]:
-    """The error at the finest spacing, each half of the one before, and how the order came out.
+    """The error at the finest spacing, each half of the one before, and the observed order.
 
     The difference of an order is absolute.
     """

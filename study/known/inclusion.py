@@ -1,11 +1,11 @@
-"""A ball in a large body under uniform strain far away, in closed form.
+"""A ball in an infinite body under uniform remote strain, in closed form.
 
-The strain inside is uniform, and the body around moves as if the ball had grown by a uniform
-strain of its own: Eshelby (1957), Proc. R. Soc. A 241:376. Of a ball, the spherical part of the
-strain far away is divided by 1 + a (K'/K - 1), the rest by 1 + b (mu'/mu - 1), with
-a = (1 + nu) / (3 (1 - nu)), b = 2 (4 - 5 nu) / (15 (1 - nu)), K' and mu' those of the ball. The
-displacement around follows from the harmonic and the biharmonic potential of the ball: Mura (1987),
-Micromechanics of Defects in Solids, section 11.
+The strain inside is uniform, and the body around moves as if the ball had expanded by a uniform
+eigenstrain: Eshelby (1957), Proc. R. Soc. A 241:376. For a ball, the spherical part of the remote
+strain is divided by 1 + a (K'/K - 1), the deviator by 1 + b (mu'/mu - 1), with a = (1 + nu) / (3 (1
+- nu)), b = 2 (4 - 5 nu) / (15 (1 - nu)), and K' and mu' those of the ball. The displacement around
+follows from the harmonic and the biharmonic potential of the ball: Mura (1987), Micromechanics of
+Defects in Solids, section 11.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
 IDENTITY = np.eye(3)
 STRAIN = np.array([[0.01, 0.004, 0.0], [0.004, -0.006, 0.002], [0.0, 0.002, 0.003]])
-"""A strain far away that has all parts."""
+"""A remote strain with all components."""
 
 
 @dataclass(frozen=True, eq=False)
 class BallInclusion:
-    """A ball of a `radius` [m] about the origin, of tissue `inside` another one, `around` it.
+    """A ball of a `radius` [m] about the origin, of tissue `inside` another, `around` it.
 
-    `strain` (3, 3): far away.
+    `strain` (3, 3): the remote strain.
     """
 
     radius: float
@@ -39,12 +39,12 @@ class BallInclusion:
 
     @classmethod
     def stiffer(cls, radius: float, times: float, around: Tissue, strain: Floats) -> BallInclusion:
-        """A ball of so many times the modulus of the tissue around, of its Poisson ratio."""
+        """A ball with `times` the modulus of the surrounding tissue, and its Poisson ratio."""
         inside = replace(around, youngs_modulus=times * around.youngs_modulus)
         return cls(radius, inside, around, strain)
 
     @property
-    def tissue(self) -> VariedTissue:
+    def tissue(self) -> HeterogeneousTissue:
         """The body with the ball in it."""
         distance = Ellipsoid(np.zeros(3), np.full(3, self.radius))
         ball = Region(
@@ -54,7 +54,7 @@ class BallInclusion:
             poisson_ratio=self.inside.poisson_ratio,
         )
         around = self.around
-        return VariedTissue(
+        return HeterogeneousTissue(
             youngs_modulus=around.youngs_modulus,
             poisson_ratio=around.poisson_ratio,
             density=around.density,
@@ -62,9 +62,9 @@ class BallInclusion:
         )
 
     def off(self, found: Floats, points: Floats) -> float:
-        """Error of a displacement [m] (n, 3) at points, over what the ball adds there.
+        """Error of a displacement [m] (n, 3) at points, over the displacement that the ball adds.
 
-        Over the whole displacement if the ball adds nothing.
+        Over the whole displacement if the ball adds none.
         """
         exact = self.displacement(points)
         added = exact - points @ self.strain
@@ -85,7 +85,7 @@ class BallInclusion:
         )
 
     def displacement(self, points: Floats) -> Floats:
-        """Displacement [m] (n, 3) at points [m] (n, 3), where the ball's centre rests."""
+        """Displacement [m] (n, 3) at points [m] (n, 3), with the ball's centre at rest."""
         r = np.linalg.norm(points, axis=1)
         inside = r <= self.radius
         outside = np.where(inside, self.radius, r)[:, None]
@@ -93,7 +93,7 @@ class BallInclusion:
         return np.asarray(np.where(inside[:, None], points @ self.inner_strain, around))
 
     def _beyond(self, x: Floats, r: Floats) -> Floats:
-        """What the ball adds around it, by the eigenstrain e of a ball of the tissue around.
+        """Displacement that the ball adds around it, from the eigenstrain e of the ball.
 
         8 pi (1 - nu) u_i = psi,ijk e_jk - 2 nu e_kk phi,i - 4 (1 - nu) e_ik phi,k.
         """
@@ -109,7 +109,7 @@ class BallInclusion:
 
     @property
     def _eigenstrain(self) -> Floats:
-        """Strain (3, 3) free of stress, of tissue as around, that would stress the ball alike."""
+        """Eigenstrain (3, 3) of the equivalent homogeneous inclusion."""
         inner = self.inner_strain
         bulk, shear = (1.0 - one for one in self._contrast)
         mean = np.trace(inner) / 3.0 * IDENTITY
@@ -117,7 +117,7 @@ class BallInclusion:
 
     @property
     def _contrast(self) -> tuple[float, float]:
-        """Bulk and shear modulus of the ball over those around."""
+        """Bulk and shear modulus of the ball over those of the surrounding tissue."""
         inside, around = _moduli(self.inside), _moduli(self.around)
         return inside[0] / around[0], inside[1] / around[1]
 

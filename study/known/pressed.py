@@ -1,7 +1,7 @@
-"""Blocks on a foundation under a tool, and a column of them whose displacement is linear.
+"""Blocks and columns on a foundation under a tool; the displacement of a column is linear.
 
 Under a uniform pressure p the base of a column sinks by p / k on a foundation of k [Pa/m] (Winkler,
-1867), and above it the strain is p over the modulus: Young's if the sides are free and nu = 0,
+1867). Above it the strain is p over Young's modulus if the sides are free and nu = 0, or over
 lambda + 2 mu between smooth walls.
 """
 
@@ -28,7 +28,7 @@ FOUNDATION = 5e5
 PRESSURE = 200.0
 """Pressure on the column [Pa]."""
 WIDE = 1e6
-"""Radius [m] of a tool whose pressure is uniform over a column, to rounding."""
+"""Radius [m] of a tool whose pressure on a column is uniform up to rounding."""
 
 
 def on_base(
@@ -39,7 +39,7 @@ def on_base(
 
 
 def block(tissue: Tissue, element: str, cell: float) -> Body:
-    """A block of 6 x 5 x 4 cm in cells [m], under a tool of 0.1 N in the middle of its top."""
+    """A block of 6 x 5 x 4 cm in cells [m], under a tool of 0.1 N at the centre of its top."""
     tool = ToolPatch(np.array([0.03, 0.025, 0.04]), DOWN, 0.02, 0.1)
     return on_base(block_mesh(BLOCK, cell), tissue, element, 1e6, tool)
 
@@ -58,17 +58,17 @@ def column(
 
 
 def walls(points: Floats) -> NDArray[np.bool_]:
-    """Which displacements (nodes, 3) smooth walls round a column hold, at its nodes [m]."""
+    """Which displacements (nodes, 3) at nodes [m] are fixed by smooth walls around a column."""
     side = (points < 1e-9) | (points > points.max(axis=0) - 1e-9)
     return np.asarray(side & [True, True, False])
 
 
 def between_walls(body: Body) -> Floats:
-    """Displacement [m] (nodes, 3) of a column between smooth walls, by factors."""
+    """Displacement [m] (nodes, 3) of a column between smooth walls, by a direct solver."""
     prescribed = np.where(walls(body.points), 0.0, free_everywhere(body.points))
     return at_rest(body.stiffness, body.load, prescribed).reshape(-1, 3)
 
 
 def exact_column(points: Floats, modulus: float, foundation: float = FOUNDATION) -> Floats:
-    """Exact displacement [m] (n, 3) under `PRESSURE`, strains being it over the modulus [Pa]."""
+    """Exact displacement [m] (n, 3) under `PRESSURE`, for a strain of pressure over `modulus`."""
     return np.asarray((PRESSURE / foundation + PRESSURE / modulus * points[:, 2:]) * DOWN)

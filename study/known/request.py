@@ -1,4 +1,4 @@
-"""`verify` and `stability` as the command line asks for them: cases run, stored and judged."""
+"""Requests of the commands `verify` and `stability`: cases run, stored and judged."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from study.known.trial import attempted
 from study.progress import Progress
 from study.run.suiting import read_suited
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 
 
 def verify(progress: Progress, *, quick: bool = False) -> list[CaseVerdict]:
-    """Verdicts on all problems with exact solutions, or on those that take about a second.
+    """Verdicts on all problems with exact solutions, or with `quick` on those of about a second.
 
-    They are solved here and now, one after another, and nothing is stored.
+    They are solved in this process, one after another, and nothing is stored.
     """
     return [tried(case, progress) for case in PROBLEMS if case.quick or not quick]
 
@@ -39,7 +39,7 @@ def tried(case: Case, progress: Progress) -> CaseVerdict:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityRequest:
-    """A scene by name or file, the folder to write, where to run, and whether only quick cases."""
+    """A scene by name or file, the folder to write, where to run, and which cases."""
 
     scene: str = "block"
     out: Path | None = None
@@ -62,13 +62,13 @@ class StabilityRequest:
         return stability_cases(read_suited(self.scene, ()), quick=self.quick)
 
     def refuse(self) -> None:
-        """ValueError, before anything is run, for a scene, folder or workers that will not do."""
-        _ = How(self.workers, self.scheduler)
+        """Raise ValueError, before anything is run, for an unsuitable scene, folder or workers."""
+        _ = Backend(self.workers, self.scheduler)
         for folder in (self.folder, self.store.folder):
             refuse_unwritable(folder, lambda _: None, "stability study")
-        from study.known.stability.cases import own_scene  # compiled, as suite's
+        from study.known.stability.cases import user_scene  # compiled, as suite's
 
-        own_scene.refuse(read_suited(self.scene, ()))
+        user_scene.refuse(read_suited(self.scene, ()))
 
 
 def planned(request: StabilityRequest) -> str:
@@ -77,13 +77,13 @@ def planned(request: StabilityRequest) -> str:
     return str(plan([case.task for case in request.cases()], request.store))
 
 
-def study(request: StabilityRequest, progress: Tell = silent) -> list[CaseVerdict]:
-    """Verdicts on all cases asked for, which are also written as a table."""
+def study(request: StabilityRequest, progress: ReportStatus = silent) -> list[CaseVerdict]:
+    """Verdicts on all requested cases, which are also written as a table."""
     request.refuse()
     chosen = request.cases()
-    how = How(request.workers, request.scheduler)
+    backend = Backend(request.workers, request.scheduler)
     with claimed(request.folder):
-        outcomes = run([case.task for case in chosen], request.store, how, progress)
+        outcomes = run([case.task for case in chosen], request.store, backend, progress)
         verdicts = judged(chosen, outcomes)
         with naming(request.folder):
             request.folder.mkdir(parents=True, exist_ok=True)
@@ -106,5 +106,5 @@ def _findings(outcome: Outcome) -> tuple[Finding, ...]:
 
 
 def all_passed(verdicts: Sequence[CaseVerdict]) -> bool:
-    """Whether a command that ran these cases ends well."""
+    """Whether all cases passed, so that the command succeeds."""
     return all(verdict.passed for verdict in verdicts)

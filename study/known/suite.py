@@ -1,8 +1,9 @@
-"""All cases in their order. A new family is a module in `stability.cases` and a line here."""
+"""All cases in their order; a new family is a module in `stability.cases` and a line here."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pkgutil import resolve_name
 
 from study.known.case import Case
 from study.scene import Scene
@@ -60,48 +61,37 @@ PROBLEMS = (
 """Problems with exact solutions that `verify` solves by the finite-element reference."""
 
 
+FAMILIES = tuple(
+    f"study.known.stability.cases.{name}"
+    for name in (
+        "critical_step",
+        "fixed_step",
+        "long_steps",
+        "damping",
+        "drift",
+        "collapse",
+        "lattice_contact",
+        "lattice_shapes",
+        "elements",
+        "large_strain",
+        "inclusions",
+        "element_contact",
+        "large_contact",
+        "fuzzy_readings",
+        "curves",
+    )
+)
+"""Modules of the stability cases, imported when they are run: their kernels take long to load."""
+
+
 def stability_cases(scene: Scene, *, quick: bool = False) -> list[Case]:
     """A scene's own cases and those of every family of `stability`, or the quick ones of them."""
     return [case for case in _stability(scene) if case.quick or not quick]
 
 
 def _stability(scene: Scene) -> Iterator[Case]:
-    # Here, so that the problems are listed without the lattice's compiled kernels.
-    from study.known.stability.cases import (
-        collapse,
-        critical_step,
-        curves,
-        damping,
-        drift,
-        element_contact,
-        elements,
-        fixed_step,
-        fuzzy_readings,
-        inclusions,
-        large_contact,
-        large_strain,
-        lattice_contact,
-        lattice_shapes,
-        long_steps,
-        own_scene,
-    )
+    from study.known.stability.cases import user_scene
 
-    yield from own_scene.cases(scene)
-    for family in (
-        critical_step,
-        fixed_step,
-        long_steps,
-        damping,
-        drift,
-        collapse,
-        lattice_contact,
-        lattice_shapes,
-        elements,
-        large_strain,
-        inclusions,
-        element_contact,
-        large_contact,
-        fuzzy_readings,
-        curves,
-    ):
-        yield from family.cases()
+    yield from user_scene.cases(scene)
+    for family in FAMILIES:
+        yield from resolve_name(f"{family}:cases")()

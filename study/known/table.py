@@ -82,7 +82,7 @@ def _case_row(verdict: CaseVerdict) -> list[str]:
 
 
 def verification_lines(verdicts: Sequence[CaseVerdict]) -> Iterator[str]:
-    """A block of lines per problem, one per finding, and a sum."""
+    """A block of lines per problem, one per finding, and a total."""
     yield _aligned(("", *VERIFICATION[2:7])).rstrip()
     for verdict in verdicts:
         yield f"{verdict.case.name} ({verdict.case.source}; {verdict.seconds:.1f} s)"
@@ -113,7 +113,7 @@ def verification_json(verdicts: Sequence[CaseVerdict]) -> str:
 
 
 def stability_lines(verdicts: Sequence[CaseVerdict]) -> Iterator[str]:
-    """A line per family, one per case that failed, and a sum."""
+    """A line per family, one per case that failed, and a total."""
     for family, group in groupby(verdicts, key=lambda verdict: verdict.case.family):
         found = list(group)
         passed = sum(verdict.passed for verdict in found)
@@ -126,7 +126,7 @@ def stability_lines(verdicts: Sequence[CaseVerdict]) -> Iterator[str]:
 
 
 def _worst(verdicts: Sequence[CaseVerdict]) -> str:
-    """The largest share of its tolerance that a case used up."""
+    """The largest share of its tolerance that a case used."""
     shares = [
         verdict.finding.difference / verdict.case.tolerance
         for verdict in verdicts
@@ -137,10 +137,10 @@ def _worst(verdicts: Sequence[CaseVerdict]) -> str:
 
 def _told(verdict: CaseVerdict) -> str:
     found = verdict.finding
-    told = f"expected {verdict.case.expectation}; {found.ending}"
+    outcome = f"expected {verdict.case.expectation}; {found.ending}"
     if found.measured is not None:
-        told += f", {found.measured:.6g} beside {found.predicted:.6g}"
-    return f"{told}. {found.message}"
+        outcome += f", {found.measured:.6g} beside {found.predicted:.6g}"
+    return f"{outcome}. {found.message}"
 
 
 def _record(finding: Finding, passed: bool | None) -> dict[str, str | float | None]:
@@ -150,7 +150,7 @@ def _record(finding: Finding, passed: bool | None) -> dict[str, str | float | No
 
 
 def _quantity(finding: Finding) -> str:
-    """What was compared; of a problem that was not solved, why."""
+    """The compared quantity, or the reason why a problem was not solved."""
     return finding.quantity or f"not solved: {finding.message}"
 
 
@@ -163,7 +163,7 @@ def _numbers(finding: Finding) -> tuple[float | None, ...]:
 
 
 def _rounded(numbers: Iterable[float | None], digits: Iterable[int]) -> list[str]:
-    """Numbers to so many digits, an empty text for none."""
+    """Numbers rounded to the given digits, an empty text for none."""
     pairs = zip(numbers, digits, strict=True)
     return ["" if number is None else f"{number:.{count}g}" for number, count in pairs]
 

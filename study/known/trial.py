@@ -17,7 +17,7 @@ from study.sweep.canonical import Plain
 
 
 class OverrunError(Exception):
-    """A case did not end in its time."""
+    """A case exceeded its time limit."""
 
 
 def trial(function: str, arguments: Plain, seconds: float) -> Plain:
@@ -26,10 +26,10 @@ def trial(function: str, arguments: Plain, seconds: float) -> Plain:
 
 
 def attempted(function: str, arguments: Mapping[str, Any], seconds: float) -> tuple[Finding, ...]:
-    """The findings of a case; what it found before it failed is left out.
+    """The findings of a case; those before a failure are discarded.
 
-    A ValueError is a refusal. Any other exception is an error, and so is a warning: who meets the
-    case in a run would have been told of it by the machinery and not by the program.
+    A ValueError is a refusal. Any other exception is an error, and so is a warning: in a run it
+    would reach the user from a library and not from the program.
     """
     try:
         with warnings.catch_warnings(), time_limit(seconds):
@@ -54,10 +54,10 @@ def _plain(finding: Finding) -> Plain:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise OverrunError in this thread after so long, wherever Python is in control.
+    """Raise OverrunError in this thread after `seconds`, wherever Python code is running.
 
-    A signal would serve the main thread only, and workers run their tasks in others. Compiled code
-    is not interrupted: the error comes when it returns.
+    A signal would work in the main thread only, and workers run their tasks in others. Compiled
+    code is not interrupted: the error is raised when it returns.
     """
     here, lock, ended = threading.get_ident(), threading.Lock(), False
 

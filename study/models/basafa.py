@@ -1,4 +1,4 @@
-"""The benchmark of Basafa and Farahmand as the paper prints it: eqs. (5)-(9) and Table II."""
+"""The benchmark of Basafa and Farahmand as printed in the paper: eqs. (5)-(9) and Table II."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from msm.laws import Basafa
 from msm.model import Material
 from study.models.control_point import PointSpring, SpringDashpot
 from study.models.damping import reference_mass
-from study.models.lattice import FOLLOWED, LatticeModel, SpringMaterial
+from study.models.lattice import SUPPORTED_FEATURES, LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout
 from study.models.model import Estimates, ModelKind
 from study.problem.problem import PointProblem
@@ -20,7 +20,7 @@ NAME, LABEL = "basafa", "Basafa benchmark"
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[LatticeModel]:
-    """The one lattice of Table II, which has its own stiffness and not that of the tissue."""
+    """The one lattice of Table II, whose stiffness is its own and not the tissue's."""
     yield LatticeModel(name=NAME, label=LABEL, scene=scene, make=_springs)
 
 
@@ -36,9 +36,9 @@ def on_point(scene: Scene, _: Estimates) -> Iterator[PointSpring]:
 
 
 def _springs(scene: Scene, mesh: LatticeMesh) -> SpringMaterial:
-    """Table II carried from the reference spacing to the lattice's.
+    """Scale Table II from the reference spacing h_0 to the lattice's spacing h.
 
-    K (h / h_0)^2 keeps the modulus 2.5 K_1 / h_0^2, gamma (h / h_0)^3 the damping per mass.
+    K (h / h_0)^2 preserves the modulus 2.5 K_1 / h_0^2, gamma (h / h_0)^3 the damping per mass.
     """
     h, h_0, table = mesh.spacing, scene.damping.reference_spacing, scene.basafa
     per_length = (h / h_0) ** 2 / h
@@ -48,12 +48,12 @@ def _springs(scene: Scene, mesh: LatticeMesh) -> SpringMaterial:
 
 
 def modulus(scene: Scene) -> float:
-    """Young's modulus [Pa] at small strain, which follows from K_1 and the reference spacing."""
+    """Young's modulus [Pa] at small strain, from K_1 and the reference spacing."""
     return 2.5 * scene.basafa.k1 / scene.damping.reference_spacing**2
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On the law, its units and its scale."""
+    """On the law, its units and its scaling."""
     h_0 = scene.damping.reference_spacing
     return [
         *([] if scene.is_point else layout(scene)),
@@ -75,6 +75,6 @@ KIND = ModelKind(
     on_point=on_point,
     assumptions=assumptions,
     is_reference=True,
-    blind_to=("reference", "superposition"),
-    able=FOLLOWED,
+    ignored_keys=("reference", "superposition"),
+    supported_features=SUPPORTED_FEATURES,
 )

@@ -21,7 +21,7 @@ from study.results.records import CurveErrors, ModelRecord, PointRecord
 
 @dataclass(frozen=True)
 class SpringDashpot:
-    """Law of the spring, damping of the point, and Young's modulus [Pa] that they stand for."""
+    """Law of the spring, damping of the point, and the Young's modulus [Pa] they represent."""
 
     law: Law
     damping: NodalDamping
@@ -32,16 +32,16 @@ Make = Callable[[PointProblem], SpringDashpot]
 
 
 def oscillator_of(modulus: float, zeta: float, problem: PointProblem) -> SpringDashpot:
-    """A spring of eq. (1) of Young's modulus [Pa], with the damping of eq. (2)."""
+    """A spring of eq. (1) for a Young's modulus [Pa], with the damping of eq. (2)."""
     k = reference_stiffness(modulus, problem.rest_length)
     return SpringDashpot(Hooke(k), eq_2(zeta, k, problem.mass), modulus)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PointSpring:
-    """A spring and a dashpot on a point, which `make` makes; `bounds` at two other stiffnesses.
+    """A spring and a dashpot on a point, made by `make`; `bounds` make two other stiffnesses.
 
-    `system`: the fuzzy system whose estimate they have.
+    `system`: the fuzzy system that estimated the stiffness.
     """
 
     name: str
@@ -51,12 +51,12 @@ class PointSpring:
     system: str | None = None
 
     def refuse(self, problem: PointProblem) -> None:
-        """ValueError for a spring or a dashpot that cannot be, at the bounds too."""
+        """Raise ValueError for an inadmissible spring or dashpot, at the bounds too."""
         for make in (self.make, *(self.bounds or ())):
             make(problem)
 
     def run(self, problem: PointProblem, watch: Watch) -> ModelRun:
-        """The motion, by a solver to a tight tolerance, and that at both bounds of stiffness."""
+        """The motion, by a solver with a tight tolerance, also at both bounds of the stiffness."""
         oscillator = self.make(problem)
         started = time.perf_counter()
         with watch.progress.stage(self.name):

@@ -25,6 +25,7 @@ from msm.lattice import LatticeMesh
 from msm.model import Counts, Fixed, Step
 from msm.timestep import whole_steps
 from study.models.corrected_errors import Errors, checks
+from study.models.coupled_stepper import CoupledStepper
 from study.models.damping import reference_damping
 from study.models.deformed import Deformed, superposed
 from study.models.finite_elements import (
@@ -32,14 +33,13 @@ from study.models.finite_elements import (
     PreparedElements,
     reference_of,
 )
-from study.models.keeping import recorded
-from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, asked_step
+from study.models.lattice import LatticeModel, PreparedLattice, SpringMaterial, requested_step
 from study.models.lattice_assumptions import springs
 from study.models.mesh_error import MeshSolution
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.models.remainder import FINER, ORDER, PreparedRemainder, Remainder, plus
 from study.models.tissue import of_modulus
-from study.models.together import Together
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
@@ -83,9 +83,8 @@ class CorrectedLattice:
                 f"lattice.integrator: xpbd is softer the longer its step, and {self.name} needs a "
                 "lattice whose small motions are those of its stiffness; choose another"
             )
-        return PreparedCorrected(
-            self, problem, self.fine.prepare(problem), self.coarse.prepare(problem)
-        )
+        coarse = _weights_damped(self.coarse.prepare(problem))
+        return PreparedCorrected(self, problem, self.fine.prepare(problem), coarse)
 
 
 @dataclass(eq=False)
@@ -130,7 +129,7 @@ class PreparedCorrected:
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion by the lattice's own steps, or by equal ones of at most `longest` [s]."""
         solved = self._on_level
-        step: Step = asked_step(self.model.coarse.lattice)
+        step: Step = requested_step(self.model.coarse.lattice)
         if longest is not None:
             interval = float(self.problem.observation.times[1])
             step = Fixed(interval / whole_steps(interval, longest))
@@ -165,7 +164,9 @@ class PreparedCorrected:
         solved = self.best = self.fine.best
         prepared, shape = self._remainder(solved), self._deformed(solved)
         with watch.progress.stage(self.model.name) as advance:
-            found = prepared.run(asked_step(self.model.coarse.lattice), advance, keep_nodes=True)
+            found = prepared.run(
+                requested_step(self.model.coarse.lattice), advance, keep_nodes=True
+            )
         self._keep_fields(found, shape, watch)
         record = replace(
             self._record(found, solved, shape),
@@ -208,10 +209,10 @@ class PreparedCorrected:
         coarse = self.model.coarse
         spacing = FINER * coarse.spacing
         try:
-            other = coarse.varied(spacing=spacing).prepare(self.problem)
+            other = _weights_damped(coarse.varied(spacing=spacing).prepare(self.problem))
             remainder = PreparedRemainder(other, found.vectors)
             with progress.stage(f"{self.model.name}: {1e3 * spacing:.3g} mm") as advance:
-                compared = remainder.run(asked_step(other.model.lattice), advance).trajectory
+                compared = remainder.run(requested_step(other.model.lattice), advance).trajectory
         except ValueError as error:  # of a lattice that is too large
             return str(error)
         lost = f"its lattice of {1e3 * spacing:.3g} mm diverged"
@@ -233,11 +234,11 @@ class PreparedCorrected:
 
     def _keep_fields(self, found: Remainder, shape: Deformed, watch: Watch) -> None:
         """Keep the motion of the mesh's vertices, if it is wanted."""
-        if watch.keeping is None or watch.keeping.fields is None:
+        if watch.persistence is None or watch.persistence.fields is None:
             return
         mesh, times = Mesh(shape.mesh.points, shape.mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(watch.keeping, resume=False)
-        with recorded(afresh, self.model.name, mesh, times) as on_sample:
+        afresh = replace(watch.persistence, resume=False)
+        with record_fields(afresh, self.model.name, mesh, times) as on_sample:
             for sample in found.samples:
                 on_sample(sample, *shape.state(sample, found))
 
@@ -245,7 +246,7 @@ class PreparedCorrected:
         """All parts at rest, stepped together; the vertices of the mesh are delivered by frames."""
         solved = self.best or self._on_level
         parts = self._remainder(solved), self._deformed(solved)
-        return Together(*parts, self.problem.factors, self.fine.model.damping).stepper()
+        return CoupledStepper(*parts, self.problem.factors, self.fine.model.damping).stepper()
 
 
 @lru_cache(maxsize=1)
@@ -297,6 +298,15 @@ def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> Sp
     return replace(made, material=replace(made.material, damping=damped))
 
 
+def _weights_damped(lattice: PreparedLattice) -> PreparedLattice:
+    """The lattice with attached weights damped as tissue, as in the elements and the modes."""
+    plain, loads = lattice.assembly, lattice.assembly.external_loads
+    if loads is None or not loads.attached_mass.any():
+        return lattice
+    damped = replace(loads, attached_mass=np.zeros_like(loads.attached_mass))
+    return replace(lattice, assembly=replace(plain, external_loads=damped))
+
+
 def assumptions(scene: Scene) -> list[str]:
     """On what the sum takes for granted."""
     coarse = _coarse(scene)
@@ -317,5 +327,14 @@ KIND = ModelKind(
     assumptions=assumptions,
     follows_law=True,
     any_load=False,
-    able=frozenset({"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}),
+    supported_features=frozenset(
+        {
+            "several-loads",
+            "travelling-loads",
+            "gravity",
+            "weights",
+            "inclusions",
+            "fixed-surfaces",
+        }
+    ),
 )

@@ -1,4 +1,4 @@
-"""The damping of a scene, as its models have it."""
+"""The damping of a scene, as each of its models applies it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from study.scene import Scene
 
 
 def reference_damping(scene: Scene) -> RayleighDamping:
-    """Of the finite elements: Rayleigh's, or eq. (2) at their modulus."""
+    """Damping of the finite elements: Rayleigh's, or eq. (2) at their modulus."""
     found = nodal_damping(scene, scene.tissue.youngs_modulus)
     return RayleighDamping(found.gamma_0, found.beta)
 
@@ -17,7 +17,7 @@ def reference_damping(scene: Scene) -> RayleighDamping:
 def nodal_damping(scene: Scene, modulus: float) -> NodalDamping:
     """Rayleigh's damping, or eq. (2) for springs of a modulus [Pa].
 
-    Eq. (2) is taken for a node at the reference spacing, so that h does not change it.
+    Eq. (2) is evaluated for a node at the reference spacing, so that it does not depend on h.
     """
     if scene.damping.kind == "rayleigh":
         return NodalDamping(scene.damping.mass, beta=scene.damping.stiffness)
@@ -26,7 +26,7 @@ def nodal_damping(scene: Scene, modulus: float) -> NodalDamping:
 
 
 def lattice_poisson_ratio(scene: Scene) -> float:
-    """Poisson ratio of the lattices that are tuned: the tissue's with a volume term, else 1/4."""
+    """Poisson ratio of the tuned lattices: the tissue's with a volume term, else 1/4."""
     return scene.tissue.poisson_ratio if scene.lattice.volume_term else SPRING_POISSON_RATIO
 
 

@@ -1,4 +1,4 @@
-"""The mesh of the finite elements as they and a lattice beside them deform it together."""
+"""The mesh of the finite elements as deformed by them and by the lattice that corrects them."""
 
 from __future__ import annotations
 
@@ -21,39 +21,44 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Deformed:
-    """The vertices of the finite elements' mesh, as both parts move them.
+    """The vertices of the finite elements' mesh, displaced by both parts.
 
     `weights` (v, n): of the coarse lattice's nodes at the vertices; `subspace`: that of the
-    elements, its vectors (3 v, m) at the vertices only; `motion`: of the elements.
+    elements, with its vectors (3 v, m) at the vertices only; `motion`: of the elements, from
+    `start` [m] (v, 3), their displacement under gravity.
     """
 
     mesh: TetrahedralMesh
     weights: csr_array
     subspace: Subspace
     motion: Superposed
+    start: Floats
 
     @classmethod
     def of(cls, solved: MeshSolution, lattice: LatticeMesh) -> Deformed:
-        """Of a mesh on which the elements were solved."""
+        """The mesh on which the elements were solved."""
         mesh, found = solved.level.mesh, superposed(solved)
         among = found.subspace
         # The unknowns of vertices come before those of edges.
         vertices = np.ascontiguousarray(among.vectors[: mesh.points.size])
         weights, _ = lattice.interpolation(mesh.points)
         own = Subspace(vertices, among.stiffness, among.load, among.others)
-        return cls(mesh, weights, own, found)
+        rest = solved.found.start
+        start = np.zeros_like(mesh.points) if rest is None else rest[: mesh.points.size]
+        return cls(mesh, weights, own, found, start.reshape(-1, 3))
 
     def state(self, sample: int, found: Remainder) -> tuple[Floats, Floats]:
         """Displacement [m] and velocity [m/s] (v, 3) at a sample."""
         own = self.motion.coordinates[sample], self.motion.rates[sample]
         linear = (np.asarray(self.subspace.vectors @ y).reshape(-1, 3) for y in own)
         u, v = (a + self.weights @ b for a, b in zip(linear, found.nodal[sample], strict=True))
-        return u, v
+        return self.start + u, v
 
     def inverted_cells(self, found: Remainder) -> int:
-        """Largest number over the samples of cells turned inside out.
+        """Largest number over the samples of inverted cells.
 
-        Of the mesh as the sum deforms it, its tetrahedra straight, or of the coarse lattice.
+        Counted on the mesh deformed by the sum of both parts, with straight tetrahedra, and on the
+        coarse lattice.
         """
         counts = (
             int((volumes(self._deformed(sample, found)) <= 0.0).sum()) for sample in found.samples
@@ -61,7 +66,7 @@ class Deformed:
         return max(found.lattice.inverted_cells, *counts)
 
     def largest_strain(self, found: Remainder, frames: tuple[int, ...]) -> float:
-        """Largest |principal stretch - 1| of the tetrahedra at the frames that are finite."""
+        """Largest |principal stretch - 1| of the tetrahedra, over the finite frames."""
         finite = set(frames) & set(found.samples)
         rest = _edges(self.mesh)
         stretches = (
@@ -81,7 +86,7 @@ def _edges(mesh: TetrahedralMesh) -> Floats:
 
 
 def superposed(solved: MeshSolution) -> Superposed:
-    """How elements were superposed whose method is that of Ritz vectors or modes."""
+    """The superposition of elements solved with Ritz vectors or modes."""
     found = solved.found.superposed
     assert found is not None  # noqa: S101 - of these methods
     return found

@@ -1,4 +1,4 @@
-"""The error of a model's steps, from the same motion by half as long ones or in more digits."""
+"""Time-step and rounding errors, from motions with half the step or in double precision."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ TINY = 1e-300
 def time_step_errors(
     order: int, probes: tuple[str, ...], whole: Trajectory, half: Trajectory
 ) -> dict[str, CurveErrors]:
-    """Relative L2 errors of whole steps by control point, none if half steps diverged.
+    """Relative L2 errors by control point due to the time step; empty if the half steps diverged.
 
-    By Richardson's extrapolation with the order of the integrator. Scores compare curve with curve,
+    By Richardson extrapolation with the order of the integrator. Scores compare curve with curve,
     so the errors are those of each control point's curves.
     """
     if half.status != "finished":
@@ -40,7 +40,7 @@ def time_step_errors(
 def tool_force_errors(
     order: int, tools: tuple[str, ...], whole: Trajectory, half: Trajectory
 ) -> dict[str, float]:
-    """Relative L2 error of each rigid tool's force by whole steps, as in `time_step_errors`."""
+    """Relative L2 error of each rigid tool's force due to the step, as `time_step_errors`."""
     if half.status != "finished":
         return {}
     share = 1.0 / (1.0 - 0.5**order)
@@ -53,7 +53,7 @@ def tool_force_errors(
 def rounding_errors(
     probes: tuple[str, ...], single: Trajectory, double: Trajectory
 ) -> dict[str, CurveErrors]:
-    """Relative L2 errors of steps in single precision by control point, none if double diverged."""
+    """Relative L2 errors of single precision by control point; empty if double diverged."""
     if double.status != "finished":
         return {}
     return {
@@ -71,7 +71,7 @@ def _difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 def step_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
-    """Whether the steps of a finished model were short enough, or could not be halved."""
+    """Checks of whether the steps of a finished model were short enough."""
     if not errors:
         meaning = "runs with halved steps that diverged although whole steps did not"
         yield Check(name=f"{name}: halved steps", value=1.0, limit=0.0, meaning=meaning)
@@ -80,7 +80,7 @@ def step_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
 
 
 def rounding_checks(name: str, errors: dict[str, CurveErrors]) -> Iterator[Check]:
-    """Whether single precision was enough for a finished model, or double diverged."""
+    """Checks of whether single precision was sufficient for a finished model."""
     if not errors:
         meaning = "runs in double precision that diverged although single precision did not"
         yield Check(name=f"{name}: double precision", value=1.0, limit=0.0, meaning=meaning)
@@ -101,7 +101,7 @@ def _curve_checks(
 
 
 def place(trajectory: Trajectory) -> tuple[float, float, float] | None:
-    """Where a run diverged [m], if it is known."""
+    """Where a run diverged [m], if that is known."""
     near = trajectory.ended_near
     return None if near is None else (float(near[0]), float(near[1]), float(near[2]))
 
@@ -109,10 +109,10 @@ def place(trajectory: Trajectory) -> tuple[float, float, float] | None:
 def estimated_run(
     model: Model, prepared: Prepared, problem: Problem, watch: Watch, order: int | None = None
 ) -> ModelRun:
-    """The motion of a model as it simulates itself, with what can be said of any model.
+    """The run of a model from its own simulation, with what can be stated of any model.
 
-    With the `order` of its steps, their error is estimated by half as long ones. Of its fields
-    nothing is kept, and a note says so where they are wanted.
+    With the `order` of its integrator, the time-step error is estimated from half the step. No
+    nodal fields are written, and a note says so where they were requested.
     """
     started = time.perf_counter()
     with watch.progress.stage(model.name):
@@ -137,6 +137,6 @@ def estimated_run(
         largest_strain=found.largest_strain,
         time_step_errors=errors,
     )
-    wanted = watch.keeping is not None and watch.keeping.fields is not None
+    wanted = watch.persistence is not None and watch.persistence.fields is not None
     notes = (f"Fields of {model.name} are not kept: only lattices and fem keep them.",)
     return ModelRun(found.trajectory, record, checks, notes if wanted else ())

@@ -1,4 +1,4 @@
-"""Fuzzy estimates of the scene's stiffness, and what the report draws of the systems."""
+"""Fuzzy estimates of the scene's stiffness, and the data of the systems for the report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fuzzy.liver.system import records_in_use
 from fuzzy.systems.explain import explain
 from fuzzy.systems.explanation_arrays import drawing_arrays
 from fuzzy.systems.options import InferenceOptions
-from study.models.own_rules import own_estimates, system_of
+from study.models.user_rule_base import system_of, user_estimates
 from study.results.records import FuzzyRecord, StiffnessSet, SystemEstimate
 from study.results.tables import SensitivityEntry
 from study.scene import Scene
@@ -38,17 +38,17 @@ def settings(scene: Scene) -> LiverSettings:
 
 
 def readings(scene: Scene) -> dict[str, float]:
-    """Elastography readings [Pa] that the scene gives."""
+    """The elastography readings [Pa] of the scene."""
     return {name: value for name, value in asdict(scene.patient).items() if value is not None}
 
 
 def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
-    """Estimate of each fuzzy system that the scene names, of the liver's rules or its own.
+    """The estimate of each fuzzy system that the scene names, with the liver's rules or the user's.
 
-    ValueError naming the key, for one without readings among them.
+    ValueError naming the key, for example where there is no reading.
     """
     if scene.fuzzy.rule_base is not None:
-        return own_estimates(scene)
+        return user_estimates(scene)
     if settings(scene).missing.silences and not readings(scene):
         raise ValueError(
             'patient: no reading to estimate from; give one, such as patient.hcv = "9.5 kPa", or '
@@ -61,8 +61,8 @@ def estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
 
 
 @dataclass(frozen=True)
-class FuzzySide:
-    """What the fuzzy systems found: estimates by system, and their part of the results."""
+class FuzzyResults:
+    """Results of the fuzzy systems: estimates by system, and their part of the results folder."""
 
     estimates: dict[str, StiffnessEstimate] = field(default_factory=dict)
     record: FuzzyRecord = field(default_factory=lambda: FuzzyRecord(systems={}))
@@ -71,11 +71,11 @@ class FuzzySide:
     notes: tuple[str, ...] = ()
 
 
-def run_fuzzy(scene: Scene) -> FuzzySide:
-    """Estimates, their sensitivity to every choice, and what the report shows of the systems."""
+def run_fuzzy(scene: Scene) -> FuzzyResults:
+    """Estimates, their sensitivity to every choice, and the data of the systems for the report."""
     found = estimates(scene)
     if scene.fuzzy.rule_base is not None:
-        return _own_side(scene, found)
+        return _user_results(scene, found)
     chosen, given = settings(scene), readings(scene)
     entries, notes = _sensitivity(scene, chosen, given)
     modulus = scene.tissue.youngs_modulus
@@ -86,14 +86,14 @@ def run_fuzzy(scene: Scene) -> FuzzySide:
         surface_inputs=scene.fuzzy.surface,
     )
     arrays = drawings(chosen, scene.fuzzy.systems, given, scene.fuzzy.surface)
-    return FuzzySide(found, record, entries, arrays, notes)
+    return FuzzyResults(found, record, entries, arrays, notes)
 
 
-def _own_side(scene: Scene, found: dict[str, StiffnessEstimate]) -> FuzzySide:
-    """Of a fuzzy system of one's own: nothing is known of its sets, and nothing varied."""
+def _user_results(scene: Scene, found: dict[str, StiffnessEstimate]) -> FuzzyResults:
+    """Results of a user's fuzzy system, whose choices cannot be varied."""
     modulus = scene.tissue.youngs_modulus
     systems = {name: _record(one, modulus) for name, one in found.items()}
-    return FuzzySide(found, FuzzyRecord(systems=systems, rule_count=len(system_of(scene).rules)))
+    return FuzzyResults(found, FuzzyRecord(systems=systems, rule_count=len(system_of(scene).rules)))
 
 
 def _sensitivity(
@@ -138,8 +138,8 @@ def drawings(
 ) -> dict[str, NDArray[Any]]:
     """Membership curves and output surfaces over two readings [Pa], and views of the rules.
 
-    `given` are the readings [Pa] of the patient. Axes of curves and surfaces are in Pa; the views
-    are in the systems' own unit, which they name.
+    `given`: the readings [Pa] of the patient. The axes of curves and surfaces are in Pa; the views
+    are in the unit of the system, which they name.
     """
     arrays: dict[str, NDArray[Any]] = {}
     for variable, curves in stiffness.membership_curves(settings, CURVE_POINTS).items():

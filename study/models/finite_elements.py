@@ -1,4 +1,4 @@
-"""The finite-element reference: linear elasticity on meshes that show its own error."""
+"""The finite-element reference: linear elasticity on several meshes that show its error."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ from study.models.errors import (
 )
 from study.models.grading import is_graded, next_graded
 from study.models.in_contact import contact_record, force_step_errors, resolving, rest_in_contact
-from study.models.keeping import recorded
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large
 from study.models.mesh_error import (
@@ -42,6 +41,7 @@ from study.models.mesh_error import (
     why_unknown,
 )
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.organ.geometry import Level
 from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
@@ -64,23 +64,23 @@ from study.scene import Reference, Scene
 Floats = NDArray[np.float64]
 
 COARSER = 2
-"""Meshes below that of the scene, as many as there are: three show the order of convergence."""
+"""Number of meshes coarser than the scene's: three in all show the order of convergence."""
 GRADED = 3
-"""Graded meshes at least, for the same reason."""
+"""Least number of graded meshes, for the same reason."""
 MOST_HALVED = 2
-"""Times as many steps as usual, at most, that forces of contact may take."""
+"""Largest number of halvings of the model's own steps for contact forces."""
 FINER = 12
-"""Levels above it that an accuracy may take, if they are not too large."""
+"""Largest number of levels above the scene's that an accuracy may require, memory permitting."""
 FRAME_RATE = 60.0
-"""Steps per second [Hz] of a model that is stepped by hand, where it has no rate."""
+"""Steps per second [Hz] of a model stepped by hand, where it has no rate."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FiniteElements:
-    """Finite elements as the scene's table `reference` has them.
+    """Finite elements as specified by the scene's table `reference`.
 
-    `level`: mesh of the organ that a simulation takes, 0 that of the scene, larger is finer; a run
-    takes several. `rate`: steps per second [Hz] of simulations, None for those of the table.
+    `level`: mesh of the organ used by `simulate`, 0 being the scene's, larger is finer; a run uses
+    several. `rate`: steps per second [Hz] of `simulate`, None for those of the table.
     """
 
     reference: Reference
@@ -91,7 +91,7 @@ class FiniteElements:
     label: str = "Finite elements"
 
     def varied(self, **settings: Any) -> Self:
-        """With another level or rate, or other keys of the scene's table `reference`."""
+        """The model with another level or rate, or other keys of the table `reference`."""
         own = {key: settings.pop(key) for key in ("level", "rate") if key in settings}
         return replace(self, reference=replace(self.reference, **settings), **own)
 
@@ -100,19 +100,19 @@ class FiniteElements:
         return PreparedElements(self, problem)
 
     def method(self, times: int = 1) -> fem.Method:
-        """How the motion is found, with so many times the steps of the table or its own."""
+        """The method of the motion, with `times` as many steps as usual."""
         chosen = self.reference
         return fem.Method(chosen.method, chosen.steps_per_sample, chosen.modes, times)
 
 
 @dataclass(eq=False)
 class PreparedElements:
-    """Finite elements of a problem; after a run, `best` is what was solved on its last mesh."""
+    """Finite elements of a problem; after a run, `best` is the solution on its last mesh."""
 
     model: FiniteElements
     problem: Problem
     best: MeshSolution | None = field(default=None, init=False)
-    _times: int = field(default=1, init=False)  # own steps, taken so many times as often
+    _times: int = field(default=1, init=False)  # factor on the number of own steps
     _force_steps: Floats = field(default_factory=lambda: np.zeros(0), init=False)
     _looked_at: tuple[Level, Loaded] | None = field(default=None, init=False)
 
@@ -129,20 +129,20 @@ class PreparedElements:
         return [f"finite-element mesh: {tetrahedra} tetrahedra{finer}"]
 
     def refuse(self) -> None:
-        """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
+        """Raise ValueError for a mesh that exceeds the memory, or misses support or tool."""
         self._refuse(self.own_level())
 
     def _refuse(self, level: Level) -> Loaded:
-        return fem.refuse(level.mesh, *self._on(), self.model.reference.method)
+        return fem.refuse(level.mesh, *self._body_arguments(), self.model.reference.method)
 
-    def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
-        """What a body is made of beside its mesh."""
+    def _body_arguments(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
+        """What a body consists of beside its mesh."""
         problem, element = self.problem, self.model.reference.element
         geometry = problem.geometry
         return problem.tissue, problem.foundation, problem.tool, element, geometry.project
 
     def own_level(self) -> Level:
-        """That of the model. ValueError if the organ has no such."""
+        """The level of the model. ValueError if the organ has no such level."""
         found = self.problem.geometry.level(self.model.level)
         if found is None:
             raise ValueError(
@@ -151,11 +151,11 @@ class PreparedElements:
         return found
 
     def body(self, level: Level | None = None) -> Body:
-        """The body on a level, that of the model by default. ValueError if there is no such."""
+        """The body on a level, by default the model's. ValueError if there is no such level."""
         found, method = level or self.own_level(), self.model.reference.method
         loaded = self._looked_at[1] if self._looked_at and self._looked_at[0] is found else None
-        self._looked_at = None  # its shape functions on the facets are large
-        built = fem.build(found.mesh, *self._on(), method, loaded)
+        self._looked_at = None  # releases its shape functions on the facets, which are large
+        built = fem.build(found.mesh, *self._body_arguments(), method, loaded)
         return with_external_loads(built, external_loads(self.problem))
 
     def simulate(self, longest: float | None = None) -> Simulation:
@@ -169,7 +169,10 @@ class PreparedElements:
         return Simulation(found.trajectory, found.time_step)
 
     def rest(self) -> Floats:
-        """Displacement [m] (q, 3) at rest at the points of the volume field; after a run, its."""
+        """Displacement [m] (q, 3) at rest at the points of the volume field.
+
+        After a run, on the mesh of that run.
+        """
         best, body = self.best, self._best_body()
         u = self._at_rest(body) if best is None else best.found.rest(body)
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
@@ -177,7 +180,8 @@ class PreparedElements:
     def rest_at(self, poisson_ratio: float) -> Floats:
         """The same at another Poisson ratio, on the mesh of the last run if there was one.
 
-        The matrices of that run are let go of, as both would be more than a run takes.
+        The matrices of that run are released, since both sets together would exceed the memory of a
+        run.
         """
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
         own, start = self._best_body(), None
@@ -189,24 +193,26 @@ class PreparedElements:
         return at_points(evaluation(body, points), self._at_rest(body, start))
 
     def _at_rest(self, body: Body, start: Floats | None = None) -> Floats:
-        """Displacement [m] (n,) at rest, sought from a `start` near it."""
+        """Displacement [m] (n,) at rest, iterated from a nearby `start`."""
         if self.problem.rigid_tools:
             return rest_in_contact(self.problem, body)
         return solve_static(body, start=start)
 
     def _best_body(self) -> Body:
-        """That of the last run, or of the model's level, with its matrices."""
+        """The body of the last run, or of the model's level, with its matrices."""
         return self.body() if self.best is None else self._body_of(self.best)
 
     def _body_of(self, solved: MeshSolution) -> Body:
-        """With its matrices, made again where they are not kept."""
+        """The body of a solution, with its matrices assembled again if necessary."""
         return solved.body if isinstance(solved.body, Body) else self.body(solved.level)
 
     def stepper(self) -> Stepper:
-        """Steps of TR-BDF2 at the rate, factors made once, whatever the method of a run."""
+        """Steps of TR-BDF2 at the rate, with one factorisation, whatever the method of a run."""
         body, step = self.body(), 1.0 / (self.model.rate or FRAME_RATE)
         system = Oscillator(body.mass, body.stiffness, body.loads, self.model.damping)
-        motion = SteppedMotion(system, self.problem.factors, step)  # at rest, and the factors
+        motion = SteppedMotion(
+            system, self.problem.factors, step
+        )  # solves the rest state and factorises
 
         sag = fem.start_of(body)
 
@@ -218,7 +224,7 @@ class PreparedElements:
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion on the finest of the meshes that show its error."""
-        coarsest, steps = self._paced(watch.progress)
+        coarsest, steps = self._solve_coarsest(watch.progress)
         solved, error = self._solve(coarsest, watch.progress)
         best = self.best = solved[-1]
         strained, note = self._at_large_strain(solved, watch.progress)
@@ -230,10 +236,10 @@ class PreparedElements:
             notes.append(f"The reference's discretisation error is not estimated: {why}.")
         return ModelRun(best.found.trajectory, record, checks, tuple(filter(None, notes)))
 
-    def _paced(self, progress: Progress) -> tuple[MeshSolution, dict[str, CurveErrors]]:
-        """On the coarsest mesh, where halving the steps is cheap, and the error of the steps.
+    def _solve_coarsest(self, progress: Progress) -> tuple[MeshSolution, dict[str, CurveErrors]]:
+        """Solve on the coarsest mesh, where halving the steps is cheap; with the step error.
 
-        Own steps that hold several samples are halved until it is small enough.
+        The model's own steps that span several samples are halved until the error is small enough.
         """
         coarsest = self.solved_on(self.coarsest, progress)
         while True:
@@ -249,7 +255,7 @@ class PreparedElements:
             coarsest = replace(coarsest, found=half)
 
     def _may_halve(self) -> bool:
-        """Whether steps are the model's own, and could be shorter."""
+        """Whether the steps are the model's own, and could be shorter."""
         if self.problem.rigid_tools:
             own = self.model.reference.steps_per_sample is None
             return own and self._times < MOST_HALVED
@@ -262,8 +268,8 @@ class PreparedElements:
     def _solve(
         self, coarsest: MeshSolution, progress: Progress
     ) -> tuple[list[MeshSolution], DiscretisationError | None]:
-        """On meshes that show the error, until it is small enough."""
-        return (self._solve_graded if self._graded else self._solve_alike)(coarsest, progress)
+        """Solve on meshes that show the error, until it is small enough."""
+        return (self._solve_graded if self._graded else self._solve_uniform)(coarsest, progress)
 
     @property
     def _graded(self) -> bool:
@@ -272,7 +278,7 @@ class PreparedElements:
     def _solve_graded(
         self, coarsest: MeshSolution, progress: Progress
     ) -> tuple[list[MeshSolution], DiscretisationError | None]:
-        """On meshes refined where the error is: as many elements as the scene's has, or more."""
+        """Solve on meshes refined where the error originates, up to the scene's size or beyond."""
         asked, solved = self.model.reference.accuracy, [coarsest]
         error: DiscretisationError | None = None
         fewest = len(self.problem.geometry.mesh.tetrahedra)
@@ -290,7 +296,7 @@ class PreparedElements:
         return solved, error
 
     def refined(self, level: Level, body: Body) -> Level | None:
-        """The next of the graded meshes, None if it is too large; by the body on a level alone."""
+        """The next graded mesh, from the body on a level; None if it is too large."""
         found = next_graded(self.problem, level, body)
         if found is None:
             return None
@@ -299,12 +305,12 @@ class PreparedElements:
             refuse_too_large(
                 found.mesh, self.problem.tissue, body.element, stepping=method in fem.STEPPING
             )
-        except ValueError:  # too fine for the memory
+        except ValueError:  # exceeds the memory
             return None
         return found
 
     def level_of(self, elements: int, progress: Progress) -> Level | None:
-        """The mesh of so many elements that a run took, found without a motion; None of others."""
+        """The graded mesh with this number of elements, without a motion; None if there is none."""
         if not self._graded:
             levels = filter(None, map(self.problem.geometry.level, range(FINER + 1)))
             return next((one for one in levels if len(one.mesh.tetrahedra) == elements), None)
@@ -316,7 +322,7 @@ class PreparedElements:
 
     @property
     def coarsest(self) -> Level:
-        """The first mesh that a run takes."""
+        """The first mesh of a run."""
         found = next(self._usable(range(-COARSER, 0)), self._level_zero)
         return resolving(self.problem, found) if self._graded else found
 
@@ -326,10 +332,10 @@ class PreparedElements:
         assert found is not None  # noqa: S101 - an organ has one
         return found
 
-    def _solve_alike(
+    def _solve_uniform(
         self, coarsest: MeshSolution, progress: Progress
     ) -> tuple[list[MeshSolution], DiscretisationError | None]:
-        """On the scene's mesh and those coarser, then finer until it is accurate enough."""
+        """Solve on the scene's mesh and coarser ones, then on finer ones until accurate enough."""
         geometry, accuracy = self.problem.geometry, self.model.reference.accuracy
         levels = filter(None, (*self._usable(range(-COARSER, 0)), geometry.level(0)))
         solved = [coarsest]
@@ -345,12 +351,12 @@ class PreparedElements:
         return solved, error
 
     def _refine(self, solved: list[MeshSolution], level: Level, progress: Progress) -> None:
-        """Solve on one more mesh, without the matrices of the one before."""
+        """Solve on one more mesh, after releasing the matrices of the previous one."""
         solved[-1] = solved[-1].outlined
         solved.append(self.solved_on(level, progress, solved[-1]))
 
     def _finer(self, last: Level, share: float) -> Level | None:
-        """The level expected to be accurate enough, or the finest there is, if it is finer."""
+        """The level expected to meet the accuracy, or the finest available if that is finer."""
         levels = filter(None, map(self.problem.geometry.level, range(1, FINER + 1)))
         finer = [level for level in levels if level.size < last.size]
         enough = [level for level in finer if level.size <= share * last.size]
@@ -358,21 +364,21 @@ class PreparedElements:
         return next(filter(self._is_usable, (*enough, *reversed(coarser))), None)
 
     def _usable(self, numbers: range) -> Iterator[Level]:
-        """Levels that there are and that a body can be made on."""
+        """Levels that exist and on which a body can be assembled."""
         levels = map(self.problem.geometry.level, numbers)
         return filter(self._is_usable, filter(None, levels))
 
     def _is_usable(self, level: Level) -> bool:
         try:
             self._looked_at = level, self._refuse(level)
-        except ValueError:  # too coarse to meet the tool, or too fine for the memory
+        except ValueError:  # misses the tool, or exceeds the memory
             return False
         return True
 
     def solved_on(
         self, level: Level | None, progress: Progress, coarser: MeshSolution | None = None
     ) -> MeshSolution:
-        """Body and motion on a mesh, None for the model's own, sooner after a coarser one."""
+        """Body and motion on a mesh, None for the model's own; faster after a coarser one."""
         level = level or self.own_level()
         name = f"{self.model.name}: {len(level.mesh.tetrahedra)} tetrahedra"
         with progress.stage(f"{name}, assembly"):
@@ -404,7 +410,7 @@ class PreparedElements:
     def _at_large_strain(
         self, solved: Sequence[MeshSolution], progress: Progress
     ) -> tuple[LargeStrain | None, str]:
-        """Linear beside hyperelastic rest, where strains are large, on a mesh like the scene's."""
+        """Linear and hyperelastic rest compared, where strains are large."""
         law, found = self.model.reference.large_strain, solved[-1].found
         if law == "none" or not is_large(found.largest_strain, found.largest_rotation):
             return None, ""
@@ -419,16 +425,16 @@ class PreparedElements:
         return compared, ""
 
     def _keep_fields(self, best: MeshSolution, watch: Watch) -> str:
-        """Keep the motion of the vertices, if it is wanted; why it cannot be."""
-        keeping = watch.keeping
-        if keeping is None or keeping.fields is None:
+        """Write the motion of the vertices if requested; returns why that is impossible."""
+        persistence = watch.persistence
+        if persistence is None or persistence.fields is None:
             return ""
         moving, mesh = best.found.moving, best.level.mesh
         if moving is None:
             return "Fields of fem are kept of a superposition only, not of steps in time."
         shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(keeping, resume=False)
-        with recorded(afresh, self.model.name, shown, times) as on_sample:
+        afresh = replace(persistence, resume=False)
+        with record_fields(afresh, self.model.name, shown, times) as on_sample:
             for sample in range(len(times)):
                 u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in moving(sample))
                 on_sample(sample, u, v)
@@ -516,7 +522,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[FiniteElements]:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On strain and damping, and on what a comparison with it is worth."""
+    """On strain and damping, and on the scope of a comparison with the reference."""
     damping = (
         "the mass-proportional damping of eq. (2) at the reference modulus"
         if scene.damping.kind == "eq-2"
@@ -528,7 +534,7 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-ABLE = frozenset(
+SUPPORTED_FEATURES = frozenset(
     {
         "moved-tools",
         "several-loads",
@@ -540,4 +546,6 @@ ABLE = frozenset(
     }
 )
 
-KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)
+KIND = ModelKind(
+    models=models, assumptions=assumptions, is_reference=True, supported_features=SUPPORTED_FEATURES
+)

@@ -7,10 +7,10 @@ from functools import partial
 
 from fuzzy.liver.assumptions import assumptions as fuzzy_assumptions
 from fuzzy.liver.stiffness import StiffnessEstimate
-from study.models import own_rules
+from study.models import user_rule_base
 from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import settings
-from study.models.lattice import FOLLOWED, LatticeModel
+from study.models.lattice import SUPPORTED_FEATURES, LatticeModel
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
@@ -20,7 +20,7 @@ LABELS = {"mamdani": "MSM Mamdani", "sugeno": "MSM Sugeno", "interval-type-2": "
 
 
 def models(scene: Scene, estimates: Estimates) -> Iterator[LatticeModel]:
-    """One lattice an estimate, moved at both ends of its interval too, where it has one."""
+    """One lattice for each estimate, also run at both ends of its interval where it has one."""
     for system, found in estimates.items():
         central, *ends = (partial(of_modulus, modulus=modulus) for modulus in _moduli(found))
         yield LatticeModel(
@@ -34,7 +34,7 @@ def models(scene: Scene, estimates: Estimates) -> Iterator[LatticeModel]:
 
 
 def on_point(scene: Scene, estimates: Estimates) -> Iterator[PointSpring]:
-    """One oscillator an estimate, by eqs. (1) and (2)."""
+    """One oscillator for each estimate, by eqs. (1) and (2)."""
     for system, found in estimates.items():
         zeta = scene.damping.ratio
         central, *ends = (partial(oscillator_of, modulus, zeta) for modulus in _moduli(found))
@@ -56,7 +56,7 @@ def assumptions(scene: Scene) -> list[str]:
     """On the springs, then on the fuzzy systems."""
     on_organ = [] if scene.is_point else layout(scene)
     if scene.fuzzy.rule_base is not None:
-        return [*on_organ, *springs(scene), *own_rules.assumptions(scene)]
+        return [*on_organ, *springs(scene), *user_rule_base.assumptions(scene)]
     return [*on_organ, *springs(scene), *fuzzy_assumptions(settings(scene))]
 
 
@@ -65,8 +65,8 @@ KIND = ModelKind(
     on_point=on_point,
     assumptions=assumptions,
     is_tuned=True,
-    of_patient=True,
+    patient_specific=True,
     follows_law=True,
-    blind_to=("patient", "fuzzy", "reference", "superposition", "basafa"),
-    able=FOLLOWED,
+    ignored_keys=("patient", "fuzzy", "reference", "superposition", "basafa"),
+    supported_features=SUPPORTED_FEATURES,
 )

@@ -1,4 +1,4 @@
-"""Meshes of the reference that are finer where the error of the control points comes from."""
+"""Meshes of the reference, refined where the error of the control points originates."""
 
 from __future__ import annotations
 
@@ -19,22 +19,24 @@ from study.scene import Reference
 Floats = NDArray[np.float64]
 
 GROWTH = 4.0
-"""Elements of a mesh over those of the one before."""
+"""Number of elements of a mesh over that of the previous one."""
 GROWTH_IN_CONTACT = 2.0
-"""The same under tools that are moved, whose first mesh is already fine there."""
+"""The same under moved tools, whose first mesh is already fine there."""
 LEAST_GROWTH = 1.4
-"""By less, two meshes are too alike to show the error."""
+"""Smallest growth for which the difference of two meshes shows the error."""
 
 
 STEERING = 1e-7
-"""Residual of solutions that tell where the error is: multigrid begins its set-up with random
-numbers, and should choose the same elements again."""
+"""Residual of the solutions that locate the error.
+
+Multigrid begins its set-up with random numbers, and the same elements should be chosen again.
+"""
 
 
 def is_graded(reference: Reference, problem: Problem) -> bool:
-    """Whether meshes are finer where the error is.
+    """Whether meshes are refined where the error originates.
 
-    `auto` grades those of a mesh file, and under moved tools, which take small elements there.
+    `auto` refines so for organs from a mesh file, and under moved tools, which need small elements.
     """
     if reference.refinement == "auto":
         return problem.geometry.is_file or bool(problem.rigid_tools)
@@ -42,7 +44,7 @@ def is_graded(reference: Reference, problem: Problem) -> bool:
 
 
 def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
-    """A mesh of more elements, where the control points at rest need them; None if too large."""
+    """A mesh with more elements, where the control points at rest need them; None if too large."""
     count = len(level.mesh.tetrahedra)
     usual = GROWTH_IN_CONTACT if problem.rigid_tools else GROWTH
     growth = min(usual, 0.9 * MAX_TETRAHEDRA / count)
@@ -54,7 +56,7 @@ def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
 
 
 def probe_errors(problem: Problem, body: Body) -> Floats:
-    """Share of each cell (cells,) in the relative errors of all control points at rest."""
+    """Contribution of each cell (cells,) to the relative errors of all control points at rest."""
     solve = solver(body, STEERING)
     u = solve(body.whole_load)
     at_probes = evaluation(body, problem.observation.probes)

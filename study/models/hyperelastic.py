@@ -21,11 +21,16 @@ from fem_reference.observation import at_points, evaluation
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import place, step_checks, time_step_errors, tool_force_errors
-from study.models.finite_elements import ABLE, FRAME_RATE, FiniteElements, PreparedElements
+from study.models.finite_elements import (
+    FRAME_RATE,
+    SUPPORTED_FEATURES,
+    FiniteElements,
+    PreparedElements,
+)
 from study.models.in_contact import contact_record, rest_in_contact
-from study.models.keeping import recorded
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
+from study.models.persistence import record_fields
 from study.organ.geometry import Level
 from study.organ.grading import resolved
 from study.problem.problem import Problem
@@ -296,12 +301,12 @@ class PreparedHyperelastic:
 
     def _keep_fields(self, body: Body, pressed: Pressed, found: LargeSolution, watch: Watch) -> str:
         """Keep the motion of the vertices, if it is wanted."""
-        keeping, mesh = watch.keeping, body.mesh
-        if keeping is None or keeping.fields is None:
+        persistence, mesh = watch.persistence, body.mesh
+        if persistence is None or persistence.fields is None:
             return ""
         shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(keeping, resume=False)
-        with recorded(afresh, self.model.name, shown, times) as on_sample:
+        afresh = replace(persistence, resume=False)
+        with record_fields(afresh, self.model.name, shown, times) as on_sample:
             for sample, state in enumerate(found.states):
                 pair = pressed.body.given(state.w), state.v
                 on_sample(sample, *(x.reshape(-1, 3)[: len(mesh.points)] for x in pair))
@@ -355,4 +360,6 @@ def assumptions(scene: Scene) -> list[str]:
     ]
 
 
-KIND = ModelKind(models=models, assumptions=assumptions, is_reference=True, able=ABLE)
+KIND = ModelKind(
+    models=models, assumptions=assumptions, is_reference=True, supported_features=SUPPORTED_FEATURES
+)

@@ -1,4 +1,4 @@
-"""A lattice of springs over the organ, or along its mesh, whatever the springs are made of."""
+"""A lattice of springs over the organ, or springs along the edges of its mesh."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from msm.model import Assembly, Automatic, Counts, Fixed, Material, Rate, Run, S
 from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.mesh.tetrahedra import volumes
-from study.models.at_depth import AtDepth
 from study.models.errors import (
     place,
     rounding_checks,
@@ -30,14 +29,15 @@ from study.models.errors import (
     time_step_errors,
     tool_force_errors,
 )
-from study.models.keeping import OnSample, checkpoint, recorded
+from study.models.indented_stepper import IndentedStepper
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
-from study.models.region_size import Sized, Wanted, sized
+from study.models.persistence import OnSample, checkpoint, record_fields
+from study.models.region_size import RegionRequest, SizedRegion, sized_region
 from study.models.spacing_error import COARSER, spacing_errors
 from study.models.touching import touchable
+from study.problem.heterogeneous import of_tetrahedra
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.problem.varied import of_tetrahedra
 from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import (
@@ -53,7 +53,7 @@ Floats = NDArray[np.float64]
 
 MASS_LIMIT = 0.05
 REGION_KEYS = ("spacing", "levels", "radius", "tolerance")
-FOLLOWED = frozenset(
+SUPPORTED_FEATURES = frozenset(
     {
         "moved-tools",
         "several-loads",
@@ -64,27 +64,27 @@ FOLLOWED = frozenset(
         "fixed-surfaces",
     }
 )
-"""Names of `study.problem.features.FEATURES` that every uniform lattice follows."""
+"""Names of `study.problem.features.FEATURES` that every uniform lattice supports."""
 
 
 @dataclass(frozen=True)
 class SpringMaterial:
-    """What springs are made of: Young's modulus [Pa] at small strain, and the material."""
+    """Young's modulus [Pa] of a spring lattice at small strain, and the springs' material."""
 
     modulus: float
     material: Material
 
 
 Make = Callable[[Scene, LatticeMesh], SpringMaterial]
-"""Springs for a lattice, as a scene and its table `lattice` have them."""
+"""Makes the spring material of a lattice from a scene and its table `lattice`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LatticeModel:
-    """Springs over the organ of a scene, which `make` makes; `bounds` at two other stiffnesses.
+    """Springs over the organ of a scene, made by `make`; `bounds` make two other stiffnesses.
 
-    `system`: the fuzzy system whose estimate they have; `graded`: on cells of several sizes, as the
-    scene's table `region` has them.
+    `system`: the fuzzy system that estimated the stiffness; `graded`: whether the cells are graded
+    as the scene's table `region` says.
     """
 
     name: str
@@ -97,20 +97,20 @@ class LatticeModel:
 
     @property
     def spacing(self) -> float:
-        """Edge [m] of its cells, of graded ones the finest."""
+        """Edge [m] of its cells, or of the finest cells of a graded lattice."""
         if not self.graded:
             return self.lattice.spacing
         return self.scene.region.spacing or 0.5 * self.lattice.spacing
 
     @property
     def lattice(self) -> Lattice:
-        """Its table of the scene."""
+        """The scene's table `lattice`."""
         return self.scene.lattice
 
     def varied(self, **settings: Any) -> Self:
-        """With other keys of the scene's table `lattice`, or `region` where it has them.
+        """The model with other keys of the table `lattice`, or `region` of a graded one.
 
-        A step is left out, and precision is double, unless it is given.
+        Unless they are given, the time step is automatic and the precision double.
         """
         scene = self.scene
         if self.graded:
@@ -122,29 +122,29 @@ class LatticeModel:
         return replace(self, scene=replace(scene, lattice=replace(free, **settings)))
 
     def with_spacing(self, spacing: float) -> Self:
-        """The same on cells of another edge [m]."""
+        """The model with cells of another edge [m]."""
         lattice = replace(self.lattice, spacing=spacing)
         return replace(self, scene=replace(self.scene, lattice=lattice))
 
     def prepare(self, problem: Problem) -> PreparedLattice:
-        """The lattice on the organ, and its springs."""
+        """Build the lattice on the organ, and its springs."""
         if self.graded:
             for unfit in graded.unfit(self.lattice):
                 raise ValueError(unfit)
-            found = sized(problem, self._wanted(), self._of_tissue)
+            found = sized_region(problem, self._region_request(), self._of_tissue)
             plain = found.assembly
-            if problem.is_burdened:
-                plain = _with_burden(problem, plain)
+            if problem.has_further_loads:
+                plain = _loaded(problem, plain)
             made = self.make(self.scene, plain.lattice)
             return replace(on_lattice(self, problem, plain, made), region=found)
         plain = assembled(problem, self.lattice)
         return on_lattice(self, problem, plain, self.make(self.scene, plain.lattice))
 
-    def _wanted(self) -> Wanted:
-        """Where its cells are small."""
+    def _region_request(self) -> RegionRequest:
+        """The table `region` as a request for a graded lattice."""
         region = self.scene.region
         how = region.levels, region.radius, region.tolerance, region.at
-        return Wanted(self.spacing, *how, self.lattice.flexion)
+        return RegionRequest(self.spacing, *how, self.lattice.flexion)
 
     def _of_tissue(self, plain: Assembly) -> tuple[Assembly, Material]:
         made = self.make(self.scene, plain.lattice)
@@ -152,22 +152,25 @@ class LatticeModel:
 
 
 def assembled(problem: Problem, lattice: Lattice) -> Assembly:
-    """The lattice that all models of a scene share."""
+    """The lattice of homogeneous tissue that all models of a scene share."""
     on_mesh = lattice.springs == "tetrahedra"
     mix = () if on_mesh else (lattice.spacing, lattice.flexion, lattice.body_diagonals)
-    if problem.is_burdened:
-        return _burdened(problem, *mix)
+    if problem.has_further_loads:
+        return _with_further_loads(problem, *mix)
     return _cubic(problem, *mix) if mix else _on_mesh(problem)
 
 
 @lru_cache(maxsize=1)
-def _burdened(problem: Problem, *mix: float) -> Assembly:
-    """The lattice with what acts on it beside its first load, on the mesh without a mix."""
-    return _with_burden(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
+def _with_further_loads(problem: Problem, *mix: float) -> Assembly:
+    """The lattice with everything that acts on it beside the first load.
+
+    On a cubic lattice of a spacing, flexion and body diagonals, or on the mesh if none are given.
+    """
+    return _loaded(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
 
 
-def _with_burden(problem: Problem, bare: Assembly) -> Assembly:
-    """A lattice with what acts on it beside its first load."""
+def _loaded(problem: Problem, bare: Assembly) -> Assembly:
+    """Add gravity, weights, further loads and rigid tools to a lattice."""
     surface, times = problem.geometry.surface, problem.observation.times
     points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
     return with_external_loads(
@@ -212,9 +215,9 @@ def _cubic(problem: Problem, spacing: float, flexion: float, body_diagonals: flo
 def on_lattice(
     model: LatticeModel, problem: Problem, plain: Assembly, made: SpringMaterial
 ) -> PreparedLattice:
-    """Springs on a lattice of one tissue, stiffer or softer where that of the problem is.
+    """Give springs to a lattice of homogeneous tissue, and its heterogeneity to the springs.
 
-    An estimate of stiffness is of the tissue around; inclusions keep theirs.
+    A stiffness estimate is that of the surrounding tissue; inclusions keep their own modulus.
     """
     assembly, material = msm.of_tissue(plain, made.material, made.modulus)
     return PreparedLattice(model, problem, assembly, replace(made, material=material), plain)
@@ -222,9 +225,10 @@ def on_lattice(
 
 @dataclass(frozen=True, eq=False)
 class PreparedLattice:
-    """A lattice on its organ; `plain`: the same of one tissue, which other springs start from.
+    """A lattice on its organ.
 
-    `region`: how far its finest cells reach, if it is graded.
+    `plain`: the same lattice of homogeneous tissue, from which other springs are made; `region`:
+    the extent of the finest cells of a graded lattice.
     """
 
     model: LatticeModel
@@ -232,11 +236,11 @@ class PreparedLattice:
     assembly: Assembly
     springs: SpringMaterial
     plain: Assembly
-    region: Sized | None = None
+    region: SizedRegion | None = None
 
     @property
     def linear(self) -> bool:
-        """Whether forces are those of small displacements."""
+        """Whether forces are linearised for small displacements."""
         return self.model.lattice.geometry == "linear"
 
     @property
@@ -251,7 +255,7 @@ class PreparedLattice:
         return float(msm.critical_time_step(self.assembly, self.springs.material, integrator))
 
     def refuse(self) -> None:
-        """ValueError for steps that do not suit, at the bounds of the stiffness too."""
+        """Raise ValueError for unsuitable time steps, at the bounds of the stiffness too."""
         for make in (None, *(self.model.bounds or ())):
             one = self if make is None else self._with(make)
             lattice = self.model.lattice
@@ -259,14 +263,14 @@ class PreparedLattice:
                 one.assembly,
                 one.springs.material,
                 self.problem.observation,
-                asked_step(lattice),
+                requested_step(lattice),
                 integrator=lattice.integrator,
                 linear=self.linear,
                 single=self.single,
             )
 
     def _with(self, make: Make) -> PreparedLattice:
-        """The same lattice of other springs."""
+        """The same lattice with other springs."""
         made = make(self.model.scene, self.assembly.lattice)
         return on_lattice(self.model, self.problem, self.plain, made)
 
@@ -286,11 +290,11 @@ class PreparedLattice:
         ]
 
     def _sizes(self) -> Iterator[str]:
-        """Of cells of several sizes, how many of each, and what their radius is based on."""
+        """On a graded lattice: the number of cells of each size, and how its radius was chosen."""
         found, lattice = self.region, self.assembly.lattice
         if found is None:
             return
-        assert isinstance(lattice, GradedLattice)  # noqa: S101 - which has a size
+        assert isinstance(lattice, GradedLattice)  # noqa: S101 - it has a region
         cells = ", ".join(
             f"{len(one.cells)} of {1e3 * one.spacing:.3g} mm" for one in lattice.levels
         )
@@ -305,25 +309,25 @@ class PreparedLattice:
         )
 
     def _law(self) -> str:
-        """Name in the table of the law that the springs have."""
+        """Name of the springs' law in the table `LAWS`."""
         kind = force_law_of(self.springs.material.law)
         return next(name for name, found in LAWS.items() if found is kind)
 
     def simulate(self, longest: float | None = None) -> Simulation:
-        """The motion by the scene's steps, or by equal ones of at most `longest` [s]."""
-        step: Step = asked_step(self.model.lattice)
+        """The motion by the scene's steps, or by equal steps of at most `longest` [s]."""
+        step: Step = requested_step(self.model.lattice)
         if longest is not None:
             interval = float(self.problem.observation.times[1])
             step = Fixed(interval / whole_steps(interval, longest))
-        found = self._march(step)
+        found = self._integrate(step)
         return Simulation(found.trajectory, found.smallest_step, found.margin, found.inverted_cells)
 
     def moved(self, step: Step | None = None) -> Run:
-        """The motion by the scene's or given steps with what it took, without any error of it."""
-        return self._march(asked_step(self.model.lattice) if step is None else step)
+        """The motion by the scene's or the given steps, without an error estimate."""
+        return self._integrate(requested_step(self.model.lattice) if step is None else step)
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion, its error by halved steps, and the motion at both bounds of its stiffness."""
+        """The motion, its errors, and the motion at both bounds of the stiffness interval."""
         found, errors, half = self._run(watch), {}, None
         rounding: dict[str, CurveErrors] = {}
         finished = found.trajectory.status == "finished"
@@ -351,18 +355,21 @@ class PreparedLattice:
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
 
-        ValueError where more than one load acts, of which there is no linearised rest to tell.
+        ValueError where further loads act, since the linearised rest state is defined for one load
+        only.
         """
-        if self.problem.is_burdened:
-            raise ValueError("the lattice at rest is told under one load on a weightless body only")
+        if self.problem.has_further_loads:
+            raise ValueError(
+                "the linearised rest of a lattice is defined for one load on a weightless body only"
+            )
         nodal = msm.static_displacement(self.assembly, self.springs.material)
         points = self.problem.observation.volume_points
         return np.asarray(self.assembly.lattice.interpolation(points)[0] @ nodal)
 
     def stepper(self) -> Stepper:
-        """The lattice at rest; between its steps the limit is looked at as often as in a run.
+        """The lattice at rest; the stability limit is checked as often as in a run.
 
-        Under tools that are moved it restarts where they are deepest.
+        Under moved tools it restarts where they are deepest.
         """
         lattice = self.model.lattice
         motion = LatticeStepper(
@@ -376,7 +383,9 @@ class PreparedLattice:
         dt = _step(lattice, motion.limit_at_rest)
         if self.problem.rigid_tools:
             seen = self.problem.observation
-            deep = AtDepth(motion, float(seen.times[seen.frames[0]]), partial(_step, lattice))
+            deep = IndentedStepper(
+                motion, float(seen.times[seen.frames[0]]), partial(_step, lattice)
+            )
             steps = deep.take_step, motion.u.copy, dt, motion.u.size, deep.advance, deep.restart
             return Stepper(*steps)
         return Stepper(
@@ -394,32 +403,34 @@ class PreparedLattice:
         mesh, times = Mesh(lattice.nodes, lattice.cells), self.problem.observation.times
         with (
             watch.progress.stage(name) as advance,
-            recorded(watch.keeping, name, mesh, times) as on_sample,
+            record_fields(watch.persistence, name, mesh, times) as on_sample,
         ):
-            return self._march(
-                asked_step(self.model.lattice), advance, watch, name, on_sample=on_sample
+            return self._integrate(
+                requested_step(self.model.lattice), advance, watch, name, on_sample=on_sample
             )
 
     def _halved(self, found: Run, watch: Watch) -> Trajectory:
         name = self.model.name
         with watch.progress.stage(f"{name}: halved steps") as advance:
             step = Counts(2 * found.substeps)
-            return self._march(step, advance, watch, f"{name}-halved").trajectory
+            return self._integrate(step, advance, watch, f"{name}-halved").trajectory
 
     def _by_spacing(self, found: Run, watch: Watch) -> tuple[SpacingErrors | None, tuple[str, ...]]:
-        """Errors by the spacing, from a coarser lattice, or why there are none.
+        """Discretisation errors from a coarser lattice, or a note on why there are none.
 
-        Of those under more than one load of a given force, which no reference may follow.
+        Only under moved tools or several loads, where there may be no finite-element reference.
         """
         model = self.model
-        if not self.problem.is_burdened or model.graded or model.lattice.springs != "lattice":
+        if not self.problem.has_further_loads or model.graded or model.lattice.springs != "lattice":
             return None, ()
         try:
             coarser = model.with_spacing(COARSER * model.spacing).prepare(self.problem)
             with watch.progress.stage(f"{model.name}: coarser lattice") as advance:
-                step = asked_step(model.lattice)
-                coarse = coarser._march(step, advance, watch, f"{model.name}-coarser").trajectory
-        except ValueError as error:  # so coarse that a support or a load misses it
+                step = requested_step(model.lattice)
+                coarse = coarser._integrate(
+                    step, advance, watch, f"{model.name}-coarser"
+                ).trajectory
+        except ValueError as error:  # a support or a load misses the coarser lattice
             return None, (_unknown_by_spacing(model, str(error)),)
         errors = spacing_errors(self.problem, model.spacing, coarse, found.trajectory)
         if errors is None:
@@ -427,14 +438,14 @@ class PreparedLattice:
         return errors, ()
 
     def _rounding(self, found: Run, watch: Watch) -> dict[str, CurveErrors]:
-        """What single precision costs, by the same steps in double; empty for steps in double."""
+        """Rounding errors against the same steps in double precision; empty for double."""
         if not self.single:
             return {}
         name, scene = f"{self.model.name}-double", self.model.scene
         other = replace(scene, lattice=replace(scene.lattice, precision="double"))
         double = replace(self, model=replace(self.model, scene=other))
         with watch.progress.stage(f"{self.model.name}: double precision") as advance:
-            whole = double._march(Counts(found.substeps), advance, watch, name).trajectory
+            whole = double._integrate(Counts(found.substeps), advance, watch, name).trajectory
         return rounding_errors(self.problem.probes, found.trajectory, whole)
 
     def _bounds(self, watch: Watch) -> tuple[Trajectory, Trajectory] | None:
@@ -447,8 +458,8 @@ class PreparedLattice:
         name = self.model.name
         other = self._with(make)
         with watch.progress.stage(f"{name}: {side} bound") as advance:
-            step = asked_step(self.model.lattice)
-            return other._march(step, advance, watch, f"{name}-{side}").trajectory
+            step = requested_step(self.model.lattice)
+            return other._integrate(step, advance, watch, f"{name}-{side}").trajectory
 
     def _lost_bounds(self, bounds: tuple[Trajectory, Trajectory] | None) -> tuple[str, ...]:
         return tuple(
@@ -458,12 +469,12 @@ class PreparedLattice:
             if run.status == "diverged"
         )
 
-    def _march(
+    def _integrate(
         self,
         step: Step,
         advance: Advance = lambda _: None,
         watch: Watch = SILENT,
-        kept_as: str = "",
+        state_name: str = "",
         on_sample: OnSample = lambda *_: None,
     ) -> Run:
         return msm.run(
@@ -476,7 +487,7 @@ class PreparedLattice:
             integrator=self.model.lattice.integrator,
             linear=self.linear,
             single=self.single,
-            checkpoint=checkpoint(watch.keeping, kept_as),
+            checkpoint=checkpoint(watch.persistence, state_name),
             on_sample=on_sample,
         )
 
@@ -491,7 +502,7 @@ class PreparedLattice:
         )
 
     def record(self, found: Run, rounding: dict[str, CurveErrors] | None = None) -> ModelRecord:
-        """What is said of a run, without the error of its steps; with that of its rounding."""
+        """The record of a run with the given rounding errors, without time-step errors."""
         model, trajectory, damping = self.model, found.trajectory, self.springs.material.damping
         return ModelRecord(
             name=model.name,
@@ -527,13 +538,13 @@ class PreparedLattice:
         )
 
     def _poisson_ratio(self) -> float | None:
-        """None where the mesh decides, and not the springs."""
+        """Poisson ratio of the springs; None where the mesh determines it."""
         if self.model.lattice.springs == "tetrahedra":
             return None
         return self.springs.material.poisson_ratio
 
     def _node_mass(self) -> float:
-        """Of an inner node of the cubic lattice, or the mean of a mesh [kg]."""
+        """Mass [kg] of an inner node of the cubic lattice, or the mean over a mesh."""
         if self.model.lattice.springs == "tetrahedra":
             return float(self.assembly.mass.mean())
         return self.problem.tissue.density * self.model.spacing**3
@@ -544,7 +555,7 @@ def _unknown_by_spacing(model: LatticeModel, why: str) -> str:
 
 
 def _mass_of(problem: Problem) -> float:
-    """Of the organ [kg] on its mesh."""
+    """Mass [kg] of the organ on its tetrahedral mesh."""
     density, mesh = problem.tissue.density, problem.geometry.mesh
     made = of_tetrahedra(mesh, problem.tissue)
     if made is None:
@@ -552,8 +563,8 @@ def _mass_of(problem: Problem) -> float:
     return float(volumes(mesh) @ made.density(density))
 
 
-def asked_step(lattice: Lattice) -> Step:
-    """How a scene wants steps to be chosen."""
+def requested_step(lattice: Lattice) -> Step:
+    """How a scene wants time steps to be chosen."""
     if lattice.time_step is not None:
         return Fixed(lattice.time_step)
     if lattice.step_rate is not None:
@@ -562,7 +573,7 @@ def asked_step(lattice: Lattice) -> Step:
 
 
 def _step(lattice: Lattice, limit: float) -> float:
-    """The step [s] that a run at rest would take, but for a whole number of them to a sample."""
+    """The step [s] of a run at rest, before it is shortened to divide the sampling interval."""
     if lattice.time_step is not None:
         return lattice.time_step
     if lattice.step_rate is not None:

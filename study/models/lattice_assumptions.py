@@ -1,4 +1,4 @@
-"""What is read into the paper, or left out, of lattices of springs: sentences for the report."""
+"""Assumptions of spring lattices, as sentences for the report."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _law(scene: Scene) -> str:
 
 
 def _named(law: SpringLaw) -> str:
-    """A law as the points it goes through, or else as its numbers."""
+    """A law described by its support points, or by its constants."""
     points = [len(value) for value in law.parameters.values() if isinstance(value, tuple)]
     if points:
         return f"{points[0]} points of the scene, which the paper does not have"

@@ -22,14 +22,14 @@ from study.results.records import CurveErrors, CurveOrders, DiscretisationError
 Floats = NDArray[np.float64]
 
 LARGEST_JUMP = 0.6
-"""Of the element size at once: sizes far apart do not show the order."""
+"""Largest step between element sizes: sizes far apart do not show the order."""
 LINEAR_LOCKING = 0.4
-"""Poisson ratio above which linear elements are far too stiff on any mesh that is run here."""
+"""Poisson ratio above which linear elements lock on any mesh that is practical here."""
 
 
 @dataclass(frozen=True)
 class MeshSolution:
-    """The reference on one mesh; `body` keeps no matrices once a finer mesh is to be solved."""
+    """The reference on one mesh; `body` has no matrices once a finer mesh is to be solved."""
 
     level: Level
     body: Body | Outline
@@ -41,7 +41,7 @@ class MeshSolution:
         return replace(self, body=self.body.outline) if isinstance(self.body, Body) else self
 
     def near(self, body: Body) -> Floats | None:
-        """Vectors (n, k) near those of a superposition on another mesh; none of steps in time."""
+        """Starting vectors (n, k) for a superposition on another mesh; None for time steps."""
         superposed = self.found.superposed
         return None if superposed is None else carried(superposed.subspace.vectors, self.body, body)
 
@@ -95,7 +95,7 @@ def _estimate(
 
 
 def formal_order(solved: MeshSolution) -> float:
-    """Of the elements' convergence."""
+    """The elements' formal order of convergence."""
     return ELEMENTS[solved.found.element].formal_order
 
 
@@ -104,17 +104,17 @@ def _truncation(solved: MeshSolution) -> CurveChange:
 
 
 def locks(problem: Problem, solved: MeshSolution) -> bool:
-    """Whether the elements are far too stiff at the tissue's Poisson ratio."""
+    """Whether the elements lock at the tissue's Poisson ratio."""
     return solved.found.element == "p1" and problem.tissue.poisson_ratio > LINEAR_LOCKING
 
 
 def is_too_coarse(accuracy: float | None, error: DiscretisationError | None) -> bool:
-    """Whether an accuracy that is asked for is missed, or not known to be reached."""
+    """Whether a requested accuracy is missed, or not known to be reached."""
     return accuracy is not None and (error is None or error.worst.displacement > accuracy)
 
 
 def next_size(accuracy: float | None, error: DiscretisationError | None) -> float:
-    """Element size, as a share of the last, at which the accuracy is expected."""
+    """Element size at which the accuracy is expected, over the last one."""
     if error is None or accuracy is None:
         return 1.0
     excess = error.worst.displacement / accuracy
@@ -123,7 +123,7 @@ def next_size(accuracy: float | None, error: DiscretisationError | None) -> floa
 
 
 def why_unknown(problem: Problem, solved: MeshSolution) -> str:
-    """What keeps the error from being estimated."""
+    """Why the error cannot be estimated."""
     if locks(problem, solved):
         return (
             "linear elements lock at this Poisson ratio and seem to have converged when they have "

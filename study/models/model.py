@@ -1,7 +1,7 @@
 """What a model is: settings that are prepared for a problem, run, and stepped.
 
-A model is a frozen dataclass of its settings in SI units, made of a scene by a `ModelKind`. To add
-one: a file with a model and its kind, and a line in `study.models.table.MODELS`.
+A model is a frozen dataclass of its settings in SI units, made from a scene by a `ModelKind`. To
+add one, write a file with a model and its kind, and a line in `study.models.table.MODELS`.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from study.scene.part import without
 
 if TYPE_CHECKING:
     from fuzzy.liver.stiffness import StiffnessEstimate
-    from study.models.keeping import Keeping
+    from study.models.persistence import Persistence
 
 Floats = NDArray[np.float64]
 Estimates = Mapping[str, "StiffnessEstimate"]
-"""Of stiffness, by fuzzy system."""
+"""Stiffness estimates by fuzzy system."""
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """The motion of a model, and the steps that it took.
+    """The motion of a model, and the time steps that it took.
 
-    `step` [s]: the shortest; `margin`: smallest ratio of the critical step to one that was taken;
-    `inverted_cells`: turned inside out; `largest_strain`: absolute, in the kept frames, None where
-    it is not known.
+    `step` [s]: the shortest; `margin`: smallest ratio of the critical step to a step taken, None
+    without a critical step; `inverted_cells`: number of cells turned inside out; `largest_strain`:
+    absolute, over the recorded frames, None where it is unknown.
     """
 
     trajectory: Trajectory
@@ -47,11 +47,11 @@ class Simulation:
 
 @dataclass(frozen=True)
 class ModelRun:
-    """The motion of a model with its record, in which its own numerical errors stand.
+    """The motion of a model with its record, which states the model's own numerical errors.
 
-    `bounds`: motion at both ends of an interval of stiffness, if the model has one; `halved`: that
-    by half as long steps, if it finished; `certified`: bound [m] (samples, probes) of what the
-    displacement is off all unknowns, of a subspace that has one.
+    `bounds`: the motion at both ends of a stiffness interval, if the model has one; `halved`: the
+    motion with half the time step, if it finished; `certified` [m] (samples, probes): bound on the
+    error of a reduced model's displacement against the unreduced one, if there is one.
     """
 
     trajectory: Trajectory
@@ -65,18 +65,16 @@ class ModelRun:
 
 @dataclass(frozen=True)
 class Stepper:
-    """A prepared model at rest, to be stepped one step at a time.
+    """A prepared model at rest, to be advanced one time step at a time.
 
-    `take_step()` goes one step on, as a run does it, with all that a run does between steps;
-    `take_bare_steps(count)` goes on without what is between them, None where there is nothing;
-    `take_many(count)` takes so many at once, as a run does between samples, None where that costs
-    what single ones do.
-    `restart()` puts it at rest again, where what a step costs depends on the motion, or where tools
-    that are moved are deepest.
-    `displacement()` [m] (n, 3) of the nodes is the state that is delivered. `step` [s]; `unknowns`:
-    components of displacement, or coordinates of a superposition, which every step turns into
-    displacements. `bound()` [m] (probes,): of what the displacement delivered at the control points
-    is off all unknowns, where that can be proven; it costs nothing unless it is asked for.
+    `take_step()` advances by one step exactly as a run does, including the work between steps.
+    `take_bare_steps(count)` advances without that work; None if there is none. `take_many(count)`
+    advances by several steps as a run does between samples; None if that costs as much as single
+    steps. `restart()` returns to the state from which steps are timed: rest, or under moved tools
+    the deepest indentation. `displacement()` [m] (n, 3): the nodal displacement that is delivered.
+    `step` [s]; `unknowns`: displacement components, or reduced coordinates that each step expands
+    to displacements. `bound()` [m] (probes,): certified bound on the error of the displacement at
+    the control points against the unreduced model; evaluated only when called.
     """
 
     take_step: Callable[[], None]
@@ -89,7 +87,7 @@ class Stepper:
     take_many: Callable[[int], None] | None = None
 
     def take_steps(self, count: int) -> None:
-        """Go so many steps on, with all that a run does between them."""
+        """Advance by `count` steps, including the work that a run does between them."""
         if self.take_many is not None:
             self.take_many(count)
             return
@@ -99,14 +97,14 @@ class Stepper:
 
 @dataclass(frozen=True)
 class Watch:
-    """Who is told how far a run is, and what of it is kept on disk meanwhile."""
+    """Observers of a run: its progress reporting, and what it writes to disk meanwhile."""
 
     progress: Progress
-    keeping: Keeping | None = None
+    persistence: Persistence | None = None
 
 
 SILENT = Watch(Silent())
-"""Nobody is told, and nothing is kept."""
+"""Reports no progress and writes nothing."""
 
 
 class Prepared(Protocol):
@@ -114,32 +112,32 @@ class Prepared(Protocol):
 
     @property
     def critical_time_step(self) -> float:
-        """Longest stable step [s] at rest; infinite for a model without a limit."""
+        """Longest stable time step [s] at rest; infinite for a model without a limit."""
 
     def describe(self) -> list[str]:
-        """Lines on what would be run, for a person."""
+        """Lines for a reader on what would be run."""
 
     def simulate(self, longest: float | None = None) -> Simulation:
-        """The motion by steps as the model chooses them, or by equal ones of at most so long [s].
+        """The motion by the model's own steps, or by equal steps of at most `longest` [s].
 
         Equal steps divide the sampling interval.
         """
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion with its record, and the error of its steps as far as it can be told."""
+        """The motion with its record, and an estimate of its time-step error where there is one."""
 
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest under the full load, at the points of the volume field.
 
-        Linearised where the model is not linear.
+        Linearised about the unloaded state where the model is nonlinear.
         """
 
     def stepper(self) -> Stepper:
-        """The model at rest, to be timed or stepped by hand."""
+        """The model at rest, for timing or for stepping by hand."""
 
 
 class Model(Protocol):
-    """A model with its settings; `name` is unique in a study, `label` is printed."""
+    """A model with its settings."""
 
     @property
     def name(self) -> str:
@@ -147,10 +145,10 @@ class Model(Protocol):
 
     @property
     def label(self) -> str:
-        """In print."""
+        """The name in print."""
 
     def varied(self, **settings: Any) -> Self:
-        """With other settings by name, plain values as JSON has them."""
+        """The model with other settings by name, given as plain JSON values."""
 
     def prepare(self, problem: Problem) -> Prepared:
         """Set up for a problem. ValueError for settings that do not fit it."""
@@ -171,16 +169,18 @@ class PointModel(Protocol):
 class ModelKind:
     """What a name in a scene's list of models stands for.
 
-    `models` of a scene and the fuzzy estimates: one, or several as for `msm`; `on_point`: likewise
-    for a scene that is a single control mass point, None where the kind needs an organ.
-    `assumptions`: sentences on what was read into the paper or left out. `is_reference`: whether
-    the others are compared with it; `any_load`: whether it follows a load whose place was not known
-    beforehand; `is_tuned`: whether its models are those of the fuzzy estimates; `of_patient`:
-    whether their stiffness is a patient's, who has no part in trade-offs and extremes;
-    `follows_law`: whether its springs have the law and damping of the scene; `blind_to`: tables and
-    keys of the scene that its models are made without, so that a run that differs in these alone
-    need not move them again; `able`: names of `study.problem.features.FEATURES` that it follows.
-    A model that is a reference has the name of its kind.
+    `models` makes one model, or several as for `msm`, from a scene and the fuzzy estimates.
+    `on_point` does so for a scene that is a single control mass point; None if the kind needs an
+    organ. `assumptions` gives sentences on how the paper was interpreted and what is neglected.
+
+        is_reference        the others are compared with it; its model has the name of the kind
+        is_tuned            its stiffness is that of the fuzzy estimates
+        patient_specific    its stiffness is a patient's; it has no part in trade-off and stability
+        follows_law         its springs have the law and damping of the scene
+        any_load            it can follow a load whose place was unknown when it was prepared
+        ignored_keys        tables and keys of a scene that do not affect its models; a run that
+                            differs only in these reuses their results
+        supported_features  names of `study.problem.features.FEATURES` that its models support
     """
 
     models: Callable[[Scene, Estimates], Iterable[Model]]
@@ -188,13 +188,16 @@ class ModelKind:
     assumptions: Callable[[Scene], list[str]] = lambda _: []
     is_reference: bool = False
     is_tuned: bool = False
-    of_patient: bool = False
+    patient_specific: bool = False
     follows_law: bool = False
     any_load: bool = True
-    blind_to: tuple[str, ...] = ()
-    able: frozenset[str] = frozenset()
+    ignored_keys: tuple[str, ...] = ()
+    supported_features: frozenset[str] = frozenset()
 
-    def seen(self, scene: Scene) -> Scene:
-        """What its models see of a scene: only a patient's are made of readings and rules."""
-        unread = () if self.of_patient else ("patient", "fuzzy")
-        return without(scene, (*unread, *self.blind_to))
+    def relevant_part(self, scene: Scene) -> Scene:
+        """The part of a scene that its models depend on.
+
+        Only patient-specific models depend on readings and fuzzy rules.
+        """
+        unread = () if self.patient_specific else ("patient", "fuzzy")
+        return without(scene, (*unread, *self.ignored_keys))

@@ -1,4 +1,4 @@
-"""The plain baseline of the fuzzy estimates: springs of the elastography reading as it is."""
+"""The plain baseline of the fuzzy estimates: springs with the elastography reading as modulus."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from study.models.control_point import PointSpring, oscillator_of
 from study.models.estimates import readings
-from study.models.lattice import FOLLOWED, LatticeModel
+from study.models.lattice import SUPPORTED_FEATURES, LatticeModel
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
@@ -19,7 +19,10 @@ NAME, LABEL = "reading", "MSM reading as is"
 
 
 def modulus(scene: Scene) -> float:
-    """Young's modulus [Pa]: the reading, of several their geometric mean. ValueError of none."""
+    """Young's modulus [Pa]: the reading, or the geometric mean of several.
+
+    ValueError without a reading.
+    """
     given = list(readings(scene).values())
     if not given:
         raise ValueError(f"models: {NAME} needs a reading; give one in [patient] or leave it out")
@@ -53,8 +56,8 @@ KIND = ModelKind(
     models=models,
     on_point=on_point,
     assumptions=assumptions,
-    of_patient=True,
+    patient_specific=True,
     follows_law=True,
-    blind_to=("fuzzy", "reference", "superposition", "basafa"),
-    able=FOLLOWED,
+    ignored_keys=("fuzzy", "reference", "superposition", "basafa"),
+    supported_features=SUPPORTED_FEATURES,
 )

@@ -1,7 +1,7 @@
-"""A lattice that is fine where the scene asks for it, and coarse elsewhere.
+"""A lattice that is fine in a region of interest and coarse elsewhere.
 
-Its cells are finest round the tools, along their paths too, and round control points that are
-wanted; away from these they double in size, so that an organ takes a tenth of the nodes.
+Its cells are finest around the tools, along their paths, and around the requested control points.
+Away from these they double in size, so that an organ takes a tenth of the nodes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[LatticeModel]:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On where cells are small, and on the springs as of every lattice."""
+    """On where cells are small, and on the springs as for every lattice."""
     (found,) = models(scene, {})
     region, edge = scene.region, found.spacing
     size = (
@@ -50,7 +50,7 @@ KIND = ModelKind(
     models=models,
     assumptions=assumptions,
     follows_law=True,
-    any_load=False,  # elsewhere it has large cells
-    blind_to=("reference", "superposition", "basafa"),
-    able=TISSUE.able,
+    any_load=False,  # cells are coarse away from the known places
+    ignored_keys=("reference", "superposition", "basafa"),
+    supported_features=TISSUE.supported_features,
 )

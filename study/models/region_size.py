@@ -1,9 +1,9 @@
-"""How far a region of interest reaches: as given, or as a tolerance at rest asks for.
+"""The radius of a region of interest: as given, or found from a tolerance at rest.
 
-Rest is that of small displacements under the full load, where lattices are solved in moments. A
-region is large enough where its control points are off those of a lattice of the finest cells
-throughout by less than the tolerance. Motion and large displacements are not looked at: the one
-is led by the same stiffness, the other stays where cells are finest.
+Candidates are solved at rest for small displacements under the full load, which is fast. A region
+is large enough if its control points differ from those of a lattice with the finest cells
+throughout by less than the tolerance. Motion and large displacements are not considered: motion is
+governed by the same stiffness, and large displacements stay within the finest cells.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ Floats = NDArray[np.float64]
 FIRST = 0.5
 """The smallest region tried, in radii of the tool."""
 LARGER = 1.25
-"""How much farther the next one reaches."""
+"""Factor from one candidate radius to the next."""
 PATH_POINTS = 32
-"""Of a tool that is moved: places on its way round which cells are fine."""
+"""Number of places on the path of a moved tool around which cells are fine."""
 
 
 @dataclass(frozen=True)
-class Sized:
-    """A graded lattice, how far its finest cells reach [m], and what of a rest it is off.
+class SizedRegion:
+    """A graded lattice, the radius [m] of its finest cells, and its difference at rest.
 
-    `apart`: largest relative difference of a wanted control point's rest from that of the finest
-    cells throughout, None where the radius was given.
+    `apart`: largest relative difference of a requested control point at rest from that with the
+    finest cells throughout; None where the radius was given.
     """
 
     assembly: Assembly
@@ -45,8 +45,8 @@ class Sized:
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What a region is asked for: `at`, control points beside the tools, by name."""
+class RegionRequest:
+    """The request for a region; `at`: names of control points beside the tools."""
 
     spacing: float
     levels: int
@@ -56,31 +56,33 @@ class Wanted:
     flexion: float
 
 
-def sized(
-    problem: Problem, wanted: Wanted, of_tissue: Callable[[Assembly], tuple[Assembly, Material]]
-) -> Sized:
-    """The lattice of a given radius, or the smallest that keeps the tolerance.
+def sized_region(
+    problem: Problem,
+    wanted: RegionRequest,
+    of_tissue: Callable[[Assembly], tuple[Assembly, Material]],
+) -> SizedRegion:
+    """The lattice of a given radius, or the smallest one that meets the tolerance.
 
-    `of_tissue`: a lattice with what its cells are made of. ValueError for a control point that
-    there is not, for too many cells, and for a tolerance where more acts than one load.
+    `of_tissue`: gives a lattice the material of its cells. ValueError for an unknown control point,
+    for too many cells, and for a tolerance where more than one load acts.
     """
     where = places(problem, wanted.at)
     if wanted.radius is not None:
-        return Sized(_assembled(problem, wanted, where, wanted.radius), wanted.radius, None)
-    if problem.is_burdened:
+        return SizedRegion(_assembled(problem, wanted, where, wanted.radius), wanted.radius, None)
+    if problem.has_further_loads:
         raise ValueError(NO_TOLERANCE)
     whole = _assembled(problem, wanted, where, None)
     probes = [problem.tool_probe, *(problem.probes.index(name) for name in wanted.at)]
     aim = _rest(problem, *of_tissue(whole), probes)
-    kept = Sized(whole, float(np.ptp(problem.surface_rule.points, axis=0).max()), 0.0)
+    kept = SizedRegion(whole, float(np.ptp(problem.surface_rule.points, axis=0).max()), 0.0)
     radii = list(_radii(problem))
-    while radii:  # halved, for larger ones come closer but for the chance of how cells lie
+    while radii:  # bisection: the difference falls with the radius but for noise
         middle = len(radii) // 2
         found = _assembled(problem, wanted, where, radii[middle])
         rest = _rest(problem, *of_tissue(found), probes)
         apart = float((_size(rest - aim) / _size(aim)).max())
         if apart <= wanted.tolerance:
-            kept = Sized(found, radii[middle], apart)
+            kept = SizedRegion(found, radii[middle], apart)
         radii = radii[:middle] if apart <= wanted.tolerance else radii[middle + 1 :]
     return kept
 
@@ -100,15 +102,17 @@ def places(problem: Problem, at: tuple[str, ...] = ()) -> Floats:
 
 
 def _radii(problem: Problem) -> Iterator[float]:
-    """From a part of the tool's radius on, each a little larger, to the size of the organ."""
+    """Candidate radii [m], from a fraction of the tool's radius up to the size of the organ."""
     radius, largest = FIRST * problem.tool.radius, np.ptp(problem.surface_rule.points, axis=0).max()
     while radius < largest:
         yield radius
         radius *= LARGER
 
 
-def _assembled(problem: Problem, wanted: Wanted, where: Floats, radius: float | None) -> Assembly:
-    """Cells up to a radius [m], or of one size throughout."""
+def _assembled(
+    problem: Problem, wanted: RegionRequest, where: Floats, radius: float | None
+) -> Assembly:
+    """Graded cells up to a radius [m], or uniform cells throughout."""
     levels = wanted.levels if radius is not None else 1
     reach = tuple((radius or 0.0) * 2.0**level for level in range(levels - 1))
     return assemble_graded(

@@ -1,8 +1,7 @@
-"""The error of a lattice by its spacing: what a coarser one tells of it.
+"""Discretisation error of a lattice, from the same motion on a coarser one.
 
-Points of the surface stop at a tool where facets of the lattice are, and cells at the surface are
-cut: the force on a tool converges at first order. A motion of the coarser lattice costs a sixteenth
-of one of the finer.
+Contact is enforced at the facets of the lattice, and cells at the surface are cut, so the force on
+a tool converges at first order. The coarser motion costs a sixteenth of the finer one.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from study.similarity.fields import relative_l2_of_curves
 Floats = NDArray[np.float64]
 
 COARSER = 2.0
-"""Spacing of the lattice that tells the error, times that of the one whose error it is."""
+"""Spacing of the coarser lattice over that of the lattice whose error is estimated."""
 ORDER = 1.0
-"""Assumed of two lattices. Estimates were 0.3 to 4.6 times the error of forces: docs/tools.md."""
+"""Assumed order of convergence. Estimates were 0.3 to 4.6 times the force error: docs/tools.md."""
 TINY = 1e-300
 
 
@@ -48,9 +47,9 @@ def spacing_errors(
 
 
 def force_differences(problem: Problem, one: Floats, other: Floats) -> Floats:
-    """Relative differences (2, tools) of forces [N] (samples, tools, 3) from others.
+    """Relative differences (2, tools) of forces [N] (samples, tools, 3).
 
-    In L2 over time, and of the largest along each tool's axis.
+    In L2 over time, and of the largest force along each tool's axis.
     """
     found = np.zeros((2, len(problem.rigid_tools)))
     for i, tool in enumerate(problem.rigid_tools):

@@ -1,6 +1,6 @@
-"""Finite elements in a subspace of few vectors: nearly free to step, once these are computed.
+"""Finite elements in a subspace of a few vectors: cheap to step once the vectors are computed.
 
-The vectors belong to one load pattern. A tool that moves over the organ needs others.
+The vectors belong to one load pattern. A tool at another place on the organ needs others.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ Floats = NDArray[np.float64]
 STEP = 1.0 / 60.0
 """Longest step [s] of the load, which is linear within it."""
 ORDER = 2
-"""Of the error by such steps."""
+"""Order of the error due to these steps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuperpositionModel:
-    """So many Ritz vectors or modes of finite elements, `level` 0 being the scene's mesh.
+    """Finite elements in Ritz vectors or modes; `level` 0 is the scene's mesh.
 
-    `certificate`: vectors by which their error is bounded, 0 for no bound.
+    `certificate`: number of vectors for the bound on their error, 0 for no bound.
     """
 
     element: str
@@ -62,7 +62,7 @@ class SuperpositionModel:
     label: str = "Superposition"
 
     def varied(self, **settings: Any) -> Self:
-        """With other vectors, another count or level."""
+        """The model with other vectors, another number of them or another level."""
         return replace(self, **settings)
 
     def prepare(self, problem: Problem) -> PreparedSuperposition:
@@ -87,29 +87,29 @@ class PreparedSuperposition:
     mesh: TetrahedralMesh
 
     def refuse(self) -> None:
-        """ValueError for a mesh that the memory does not hold, or that is not held or touched."""
-        fem.refuse(self.mesh, *self._on())
+        """Raise ValueError for a mesh that exceeds the memory, or misses support or tool."""
+        fem.refuse(self.mesh, *self._body_arguments())
 
-    def _on(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
-        """What the body is made of beside its mesh."""
+    def _body_arguments(self) -> tuple[Tissue, Support, ToolPatch, str, Projection | None]:
+        """What a body consists of beside its mesh."""
         problem, element = self.problem, self.model.element
         geometry = problem.geometry
         return problem.tissue, problem.foundation, problem.tool, element, geometry.project
 
     @cached_property
     def body(self) -> Body:
-        """Assembled once."""
-        return fem.build(self.mesh, *self._on())
+        """The body, assembled once."""
+        return fem.build(self.mesh, *self._body_arguments())
 
     @cached_property
     def subspace(self) -> Subspace:
-        """The vectors, and the body among them."""
+        """The vectors, and the body projected on them."""
         make = ritz_subspace if self.model.vectors == "ritz" else modal_subspace
         return make(self.body, self.model.count)
 
     @cached_property
     def certificate(self) -> Certificate:
-        """What its error is bounded by. ValueError where there is none, with the reason."""
+        """What bounds its error. ValueError with the reason where there is no bound."""
         if not factors_fit(self.body.unknowns, self.body.element):
             raise ValueError(f"the memory holds no factors of {self.body.unknowns} unknowns")
         probes = evaluation(self.body, self.problem.observation.probes)
@@ -134,7 +134,7 @@ class PreparedSuperposition:
         return whole_steps(float(self.problem.observation.times[1]), longest or STEP)
 
     def simulate(self, longest: float | None = None) -> Simulation:
-        """The motion, exact in the subspace for a load that is linear over steps of a frame."""
+        """The motion, exact in the subspace for a load that is linear over each frame."""
         seen, subspace = self.problem.observation, self.subspace
         sample = float(seen.times[1])
         every = self._steps_per_sample(longest)
@@ -143,7 +143,7 @@ class PreparedSuperposition:
         return Simulation(found.trajectory, sample / every, largest_strain=found.strain)
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion, its errors by the steps of the load and by the subspace, and its record."""
+        """The motion, its errors due to the load's steps and the subspace, and its record."""
         found = estimated_run(self.model, self, self.problem, watch, ORDER)
         bound, notes = self._certified(found.trajectory.displacement, watch)
         elements = ElementsRecord(
@@ -167,7 +167,7 @@ class PreparedSuperposition:
         return replace(found, record=record, notes=(*found.notes, *notes), certified=bounds)
 
     def _certified(self, motion: Floats, watch: Watch) -> tuple[Certified | None, tuple[str, ...]]:
-        """The bound of a motion's error if one is asked for, or a note on why there is none."""
+        """The bound on a motion's error if requested, or a note on why there is none."""
         if not self.model.certificate:
             return None, ()
         try:
@@ -184,7 +184,7 @@ class PreparedSuperposition:
         return at_points(evaluation(self.body, points), self.subspace.rest())
 
     def stepper(self) -> Stepper:
-        """Steps of a frame, each of which gives the displacement of all nodes, and its bound."""
+        """Steps of one frame, each of which gives the displacement of all nodes and its bound."""
         subspace = self.subspace
         motion = SubspaceMotion(subspace, self.model.damping, self.problem.factor, STEP)
 
@@ -217,7 +217,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[SuperpositionModel]:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On what a fixed subspace leaves out."""
+    """On the limitations of a fixed subspace."""
     chosen = scene.superposition
     kind = "load-dependent Ritz vectors" if chosen.vectors == "ritz" else "modes of vibration"
     return [
@@ -230,5 +230,5 @@ KIND = ModelKind(
     models=models,
     assumptions=assumptions,
     any_load=False,
-    able=frozenset({"inclusions", "fixed-surfaces"}),
+    supported_features=frozenset({"inclusions", "fixed-surfaces"}),
 )

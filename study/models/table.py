@@ -1,4 +1,4 @@
-"""The models there are, by the names that a scene gives them."""
+"""The table of models, by the names that a scene gives them."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ MODELS = {
     "superposition": "study.models.superposition:KIND",
     "corrected": "study.models.corrected:KIND",
 }
-"""Where each kind stands; imported when it is used, for what computes it is heavy."""
+"""Where each kind is defined; imported when it is used, since the models take long to import."""
 
 
 def kind(name: str) -> ModelKind:
-    """The kind of a name. ValueError with the names there are."""
+    """The kind of a name. ValueError with the existing names."""
     if name not in MODELS:
         raise ValueError(f"models: {name!r} is no model; there are {', '.join(MODELS)}")
     found: ModelKind = resolve_name(MODELS[name])
@@ -33,7 +33,7 @@ def kind(name: str) -> ModelKind:
 
 
 def named(scene: Scene) -> list[str]:
-    """Names of the kinds in a scene, in the order of the table, in which they run."""
+    """Names of the kinds in a scene, in the order of the table, which is the order of the runs."""
     return sorted(scene.models, key=list(MODELS).index)
 
 
@@ -42,7 +42,7 @@ def models_of(scene: Scene, estimates: Estimates) -> Iterator[Model]:
     seen: set[str] = set()
     for name in named(scene):
         of_kind = kind(name)
-        for found in of_kind.models(of_kind.seen(scene), estimates):
+        for found in of_kind.models(of_kind.relevant_part(scene), estimates):
             if found.name in seen:
                 raise ValueError(f"models: {name} makes a second model named {found.name}")
             seen.add(found.name)
@@ -59,8 +59,8 @@ def point_models_of(scene: Scene, estimates: Estimates) -> Iterator[PointModel]:
 
 
 def model(scene: Scene, name: str) -> Model:
-    """The model of a kind that has one. ValueError for a kind of several, as of fuzzy estimates."""
-    found = list(kind(name).models(kind(name).seen(scene), {}))
+    """The single model of a kind. ValueError for a kind of several, such as fuzzy estimates."""
+    found = list(kind(name).models(kind(name).relevant_part(scene), {}))
     if len(found) != 1:
         raise ValueError(f"models: {name} stands for several models; name a kind that is one model")
     return found[0]
@@ -77,7 +77,7 @@ def is_tuned(scene: Scene) -> bool:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """What each kind in a scene assumes, each sentence once."""
+    """The assumptions of each kind in a scene, without repetition."""
     return list(
         dict.fromkeys(text for name in named(scene) for text in kind(name).assumptions(scene))
     )

@@ -1,4 +1,4 @@
-"""The lattice with the tissue's own modulus: a baseline that needs no patient and no estimate."""
+"""The lattice with the tissue's own modulus: a baseline without patient and estimate."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from msm.laws import Hooke, Law, initial_stiffness
 from msm.model import Material
 from msm.volume import volume_term
 from study.models.damping import lattice_poisson_ratio, nodal_damping
-from study.models.lattice import FOLLOWED, LatticeModel, SpringMaterial
+from study.models.lattice import SUPPORTED_FEATURES, LatticeModel, SpringMaterial
 from study.models.lattice_assumptions import layout, springs
 from study.models.model import Estimates, ModelKind
 from study.scene import Scene
 
 FRACTION = 0.8
-"""Of the critical step, where nothing else is asked for."""
+"""Default time step over the critical one."""
 
 
 def lacks_poisson_ratio(scene: Scene) -> bool:
-    """Whether the tissue's Poisson ratio is one that springs alone do not have."""
+    """Whether springs without a volume term cannot represent the tissue's Poisson ratio."""
     return scene.tissue.poisson_ratio > SPRING_POISSON_RATIO
 
 
@@ -36,13 +36,13 @@ def of_modulus(scene: Scene, mesh: LatticeMesh, *, modulus: float) -> SpringMate
 
 
 def elastic(mesh: LatticeMesh, modulus: float, nu: float) -> Material:
-    """Linear springs of a modulus [Pa], and the volume term that makes up for nu above 1/4."""
+    """Linear springs of a modulus [Pa], with the volume term that raises nu above 1/4."""
     law = Hooke(reference_stiffness(modulus, mesh.spacing, nu))
     return Material(law, volume_term(mesh, modulus, nu) if nu > SPRING_POISSON_RATIO else None)
 
 
 def spring_law(scene: Scene, k: float) -> Law:
-    """Linear springs of eq. (1), k [N/m], or the scene's law in proportion to them."""
+    """Linear springs of eq. (1), k [N/m], or the scene's law scaled to that stiffness at rest."""
     law = scene.lattice.law
     return Hooke(k) if law is None else law.make(k)
 
@@ -62,6 +62,6 @@ KIND = ModelKind(
     models=models,
     assumptions=assumptions,
     follows_law=True,
-    blind_to=("reference", "superposition", "basafa"),
-    able=FOLLOWED,
+    ignored_keys=("reference", "superposition", "basafa"),
+    supported_features=SUPPORTED_FEATURES,
 )

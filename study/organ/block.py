@@ -1,4 +1,4 @@
-"""A block of tetrahedra on the lower corner of the axes."""
+"""A block of tetrahedra, with its lower corner at the origin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def block_mesh(size: tuple[float, float, float], element_size: float) -> Tetrahe
 
 
 def block_of_cells(size: tuple[float, float, float], counts: NDArray[np.int64]) -> TetrahedralMesh:
-    """Block [0, size] [m] of so many cells along each axis, each cut into six (Kuhn)."""
+    """Block [0, size] [m] with this number of cells per axis, each cut into six (Kuhn)."""
     axes = [np.linspace(0.0, s, n + 1) for s, n in zip(size, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(counts + 1)

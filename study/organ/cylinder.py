@@ -1,4 +1,4 @@
-"""A quarter of a straight cylinder in tetrahedra, its axis along z from the origin."""
+"""A quarter of a straight cylinder of tetrahedra, with its axis along z from the origin."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SECTORS = 2
-"""Of the quarter; ring k has k parts of an arc in each."""
+"""Sectors of the quarter; ring k has k parts of an arc in each."""
 
 
 def quarter_cylinder(radius: float, height: float, rings: int, layers: int) -> TetrahedralMesh:
-    """X and y from zero, within a `radius` [m] of the axis, of a `height` [m].
+    """The quarter with x and y from zero, of a `radius` [m] and a `height` [m].
 
-    Rings get thinner towards the rim and layers towards both ends, where faces that are held make
-    the stress singular.
+    Rings become thinner towards the rim and layers towards both ends, where held faces make the
+    stress singular.
     """
     radii = radius * np.sin(0.5 * np.pi * np.arange(rings + 1) / rings)
     levels = 0.5 * height * (1.0 - np.cos(np.pi * np.arange(layers + 1) / layers))
@@ -39,7 +39,7 @@ def quarter_cylinder(radius: float, height: float, rings: int, layers: int) -> T
 
 
 def onto_side(radius: float, rings: int) -> Callable[[Floats], Floats]:
-    """Takes the middles of edges round the side (n, 3) to it, and leaves all other points."""
+    """Moves the midpoints of edges on the curved side (n, 3) onto it, and leaves other points."""
     nearest = radius * np.cos(0.25 * np.pi / (SECTORS * rings)) * (1.0 - 1e-9)
 
     def project(points: Floats) -> Floats:
@@ -60,7 +60,7 @@ def _ring(radius: float, number: int) -> Floats:
 
 
 def _triangles(rings: int) -> Ints:
-    """Of all rings, (k, 3); ring k starts at number SECTORS k (k - 1) / 2 + k."""
+    """Triangles (k, 3) of all rings; ring k starts at number SECTORS k (k - 1) / 2 + k."""
     found = []
     for k in range(rings):
         inner, outer = (SECTORS * n * (n - 1) // 2 + n for n in (k, k + 1))

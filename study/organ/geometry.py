@@ -32,27 +32,30 @@ Levels = Callable[[int], "Level | None"]
 Cut = Callable[[TetrahedralMesh], Stuffed]
 
 FINER = 4.0 / 3.0
-"""Ratio of the element sizes of a level and the next finer one, where it is free."""
+"""Ratio of the element sizes of a level and the next finer one, where it can be chosen."""
 BLOCK_PARTS = 4
 REFINE_ABOVE = 1.3
-"""A user's mesh is refined while its mean edge exceeds this many element sizes."""
+"""A user's mesh is refined while its mean edge exceeds this multiple of the element size."""
 MAX_TETRAHEDRA = 60_000
 TETRAHEDRA_PER_CUBE = 12
-"""Of the body-centred lattice; a block has six."""
+"""For the body-centred lattice; a block has six."""
 LOST = 0.03
-"""Share of a surface's volume that its mesh may lack or exceed; curved elements lack far less."""
+"""Admissible volume error of a surface's mesh; curved elements have a far smaller one."""
 LOST_AT_MOST = 0.15
-"""The same of its coarser meshes, which only show how results converge."""
+"""The same for its coarser meshes, which only serve convergence."""
 COARSEST = 0.5
-"""Largest element size over the cube root of the built-in liver's volume. There a mesh has about a
-hundred tetrahedra and four fifths of the volume; a little above, its lobes are lost, then all."""
+"""Largest element size over the cube root of the built-in liver's volume.
+
+At this size a mesh has about a hundred tetrahedra and four fifths of the volume; slightly above,
+its lobes are lost, then everything.
+"""
 
 
 @dataclass(frozen=True)
 class Level:
-    """A mesh of the organ, and the size of its elements up to a factor that all levels share.
+    """A mesh of the organ, and its element size up to a factor that all levels share.
 
-    `background`: what the mesh was cut from along the surface, None where it is not cut.
+    `background`: the mesh that was cut along the surface to make it, None where it was not cut.
     """
 
     mesh: TetrahedralMesh
@@ -62,7 +65,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Background:
-    """A mesh round the organ, and the tetrahedron of it that each of the organ is a piece of."""
+    """A mesh around the organ, and the tetrahedron of it that each of the organ's is part of."""
 
     mesh: TetrahedralMesh
     origins: NDArray[np.int64]
@@ -72,12 +75,12 @@ class Background:
 class Geometry:
     """`mesh` for all integrals, level 0 of the finite elements; `surface`: its boundary.
 
-    `level`: meshes of the same organ, finer as the number grows, or None where there is none;
-    `cut`: cuts a background along its
-    surface, None where the meshes have none; `body`: the exact shape if it is known, else the mesh;
-    `project`: onto its surface, if it is known and curved; `volume` [m^3] of `mesh`; `notes`: what
-    was found, repaired or assumed; `is_file`: of a user's file; `offset` [m] (3,): what was
-    subtracted from the coordinates of that, which may lie far from the origin.
+    `level`: meshes of the same organ, finer with the number, or None where there is none; `cut`:
+    cuts a background mesh along its surface, None where the meshes have none; `body`: the exact
+    shape if known, else the mesh; `project`: onto its surface, if it is known and curved; `volume`
+    [m^3] of `mesh`; `notes`: what was found, repaired or assumed; `is_file`: whether it is from a
+    user's file; `offset` [m] (3,): subtracted from the coordinates of that file, which may be far
+    from the origin.
     """
 
     mesh: TetrahedralMesh
@@ -95,8 +98,8 @@ class Geometry:
 def block(size: tuple[float, float, float], element_size: float) -> Geometry:
     """A block of edges [m] in elements of about `element_size` [m].
 
-    All axes are cut into as many parts more from level to level, from 2 to 4 and on. ValueError for
-    elements so small that they are too many.
+    Level k divides the largest cells, of BLOCK_PARTS element sizes, into BLOCK_PARTS + k parts
+    along each axis, at least 2. ValueError for elements so small that they are too many.
     """
     _check_count(float(np.prod(size)), element_size)
     parts = cell_counts(size, BLOCK_PARTS * element_size)
@@ -152,7 +155,7 @@ def built_in_liver(volume: float, element_size: float) -> Geometry:
 def _levels(
     signed: SignedFunction, box: tuple[Floats, Floats], volume: float, size: float, largest: float
 ) -> Levels:
-    """Meshes cut from lattices of a size [m], 0, and coarser and finer ones within the limits."""
+    """Meshes cut from lattices: level 0 of a size [m], coarser and finer ones within the limits."""
 
     @cache
     def level(k: int) -> Level | None:
@@ -167,10 +170,10 @@ def _levels(
 
 
 def enclosed(surface: SurfaceMesh, element_size: float, notes: tuple[str, ...] = ()) -> Geometry:
-    """What a closed surface encloses, in elements of about `element_size` [m].
+    """The volume within a closed surface, in elements of about `element_size` [m].
 
     They are smaller where the organ is too thin for them. The meshes depend on the arguments alone.
-    MeshError for a surface that takes too many.
+    MeshError for a surface that needs too many.
     """
     volume = enclosed_volume(surface.points, surface.triangles)
     box = surface.points.min(axis=0), surface.points.max(axis=0)
@@ -195,7 +198,7 @@ def enclosed(surface: SurfaceMesh, element_size: float, notes: tuple[str, ...] =
 
 
 def _lost(level: Level, volume: float) -> float:
-    """Share of a volume [m^3] that a mesh does not have."""
+    """Relative error of a mesh's volume against a volume [m^3]."""
     return 1.0 - float(volumes(level.mesh).sum()) / volume
 
 
@@ -227,8 +230,8 @@ def from_file(
 ) -> Geometry:
     """The organ of a mesh file in its unit and axes, in elements of about `element_size` [m].
 
-    `pieces` "largest" drops all others. The last organs are kept, as commands ask several times.
-    Raises MeshError, a ValueError, for a file that cannot be used.
+    `pieces` "largest" drops all others. The last organs are cached, since commands request them
+    several times. Raises MeshError, a ValueError, for an unusable file.
     """
     try:
         state = path.stat()
@@ -261,7 +264,7 @@ def _from_file(
 
 
 def _refined(given: TetrahedralMesh, element_size: float, notes: tuple[str, ...]) -> Geometry:
-    """A user's mesh, refined by halves until its elements are as small as asked."""
+    """A user's mesh, bisected until its elements are as small as requested."""
     meshes, found = [given], list(notes)
     while mean_edge(meshes[-1]) > REFINE_ABOVE * element_size and _can_refine(meshes[-1]):
         meshes.append(refined(meshes[-1]))

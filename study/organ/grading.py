@@ -14,12 +14,12 @@ from study.organ.geometry import MAX_TETRAHEDRA, Background, Geometry, Level
 Floats = NDArray[np.float64]
 
 MOST_PARTS = 64.0
-"""Of an element at once: beyond, its error was not known well enough."""
+"""Largest number of parts of an element at once: its error is not known well enough for more."""
 TRIALS = 6
 ROUNDS, TOO_MANY = 40, 8
-"""Of bisection, and tetrahedra round the organ over those that it may have."""
+"""Rounds of bisection, and limit of tetrahedra around the organ over those it may have."""
 TOLERANCE = 0.05
-"""Of the number of elements added."""
+"""Relative tolerance of the number of added elements."""
 
 
 def graded(
@@ -28,8 +28,8 @@ def graded(
     """A finer mesh of about `growth` times the elements, small where errors (cells,) are large.
 
     Elements are bisected, so that the new mesh is nested in the old one up to the surface, along
-    which it is cut anew. `order`: that in the element size by which the sum of the errors falls.
-    None where the mesh would be too large.
+    which it is cut again. `order`: of the sum of the errors in the element size. None if the mesh
+    would be too large.
     """
     background = level.background or Background(level.mesh, np.arange(len(level.mesh.tetrahedra)))
     share = np.zeros(len(background.mesh.tetrahedra))
@@ -42,7 +42,7 @@ def graded(
 def resolved(
     geometry: Geometry, level: Level, wanted: Callable[[Floats, Floats], Floats]
 ) -> Level | None:
-    """A mesh whose edges are no longer than is wanted; None where it would be too large.
+    """A mesh with edges no longer than `wanted`; None if it would be too large.
 
     `wanted` [m] (n,) of tetrahedra: by their centres [m] (n, 3) and longest edges [m] (n,).
     """
@@ -59,7 +59,7 @@ def resolved(
 
 
 def _level(geometry: Geometry, level: Level, lattice: TetrahedralMesh) -> Level | None:
-    """What a background has of the organ, its size by the number of elements."""
+    """The part of a background mesh within the organ, its size by the number of elements."""
     cut = None if geometry.cut is None else geometry.cut(lattice)
     mesh = lattice if cut is None else cut.mesh
     if len(mesh.tetrahedra) > MAX_TETRAHEDRA:
@@ -69,11 +69,11 @@ def _level(geometry: Geometry, level: Level, lattice: TetrahedralMesh) -> Level 
 
 
 def equidistributed(mesh: TetrahedralMesh, errors: Floats, order: float, more: int) -> Bisection:
-    """The mesh bisected into about so many `more` tetrahedra, for the least sum of errors (t,).
+    """The mesh bisected into about `more` further tetrahedra, for the least sum of errors (t,).
 
-    An error that falls as a tetrahedron's volume to the power order / 3 + 1 is least in sum, for a
-    number of tetrahedra, where each is cut into a number that goes as its 1 / (1 + order / 3)th
-    power.
+    The error of a tetrahedron is taken to fall as its volume to the power order / 3 + 1. The sum is
+    then least, for a number of tetrahedra, if the number of parts of each is proportional to its
+    error to the power 1 / (1 + order / 3).
     """
     weight = errors ** (1.0 / (1.0 + order / 3.0))
     aim = float(more)
@@ -87,7 +87,7 @@ def equidistributed(mesh: TetrahedralMesh, errors: Floats, order: float, more: i
 
 
 def _parts(weight: Floats, total: float) -> Floats:
-    """In proportion to the weight, between 1 and the most, with this sum or the largest."""
+    """Numbers proportional to the weight, between 1 and MOST_PARTS, with this sum or the most."""
     some = np.log(weight[weight > 0.0])
     if not some.size:
         return np.ones(len(weight))

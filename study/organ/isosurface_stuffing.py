@@ -29,20 +29,20 @@ SNAP_SHORT = 0.41189
 TO_NEAREST = 2.0 / math.sqrt(3.0)
 """Long edge over short edge of the lattice; a node has both."""
 LONG = 0.95
-"""Share of the long edge beyond which an edge is not short."""
+"""Share of the long edge above which an edge counts as long."""
 BISECTIONS = 40
 PARTS = 2.0**BISECTIONS
-"""Of a segment, between which so many bisections tell."""
+"""Number of parts of a segment that bisection distinguishes."""
 SURE, GUESSES = 5, 5
-"""Bisections before false position, and looks by it."""
+"""Bisections before false position, and evaluations by it."""
 CLOSE = 1.5
-"""Lattice cubes from the shape within which a finer lattice may find more of it."""
+"""Distance from the shape, in lattice cubes, within which a finer lattice may find more of it."""
 
 
 class Stuffed(NamedTuple):
     """The part of a background mesh in which a shape's function is negative.
 
-    `origins` (t,): tetrahedron of the background that each one is a piece of.
+    `origins` (t,): tetrahedron of the background that each one is part of.
     """
 
     mesh: TetrahedralMesh
@@ -63,7 +63,7 @@ def stuff(
 def lattice_round(
     signed: SignedFunction, lower: Floats, upper: Floats, element_size: float
 ) -> TetrahedralMesh:
-    """The tetrahedra of a lattice over a box that hold some of the shape, or lie close to it."""
+    """The tetrahedra of a lattice over a box that intersect the shape, or lie close to it."""
     nodes, tetrahedra = body_centred_lattice(lower, upper, element_size)
     close = (signed(nodes)[tetrahedra] < CLOSE * element_size).any(axis=1)
     return _compact(nodes, tetrahedra[close])
@@ -92,7 +92,7 @@ def body_centred_lattice(lower: Floats, upper: Floats, size: float) -> tuple[Flo
 
 
 def _tetrahedra_across(corner: Ints, centre: Ints, axis: int) -> Ints:
-    """Four tetrahedra round each pair of centres joined through a face normal to `axis`."""
+    """Four tetrahedra around each pair of centres joined through a face normal to `axis`."""
     corner, centre = np.moveaxis(corner, axis, 0), np.moveaxis(centre, axis, 0)
     a, b = centre[:-1].ravel(), centre[1:].ravel()
     face = corner[1:-1]
@@ -102,11 +102,11 @@ def _tetrahedra_across(corner: Ints, centre: Ints, axis: int) -> Ints:
 
 
 def _crossing(signed: SignedFunction, inside: Floats, outside: Floats) -> Floats:
-    """Point where each segment meets the surface: the last one inside that bisection comes to.
+    """Point where each segment meets the surface: the last one inside that bisection reaches.
 
-    Once a few bisections have told the place, guesses by false position take less than half of the
-    looks that the others would. One counts where the shares next to it, of those that bisection can
-    come to, are inside and not; elsewhere bisection goes on.
+    After some bisections, false position needs less than half of the remaining evaluations. Its
+    result counts if the adjacent points of bisection are inside and outside; otherwise bisection
+    continues.
     """
     span = outside - inside
 
@@ -134,7 +134,7 @@ Ends = tuple[Floats, Floats]
 def _narrowed(
     low: Floats, high: Floats, ends: Ends, share: Floats, at: Callable[[Floats], Floats]
 ) -> tuple[Floats, Floats, Ends]:
-    """Brackets, and the function at their ends, by a look at a share in each."""
+    """Brackets, and the function at their ends, after an evaluation at a share of each."""
     value = at(share)
     is_inside = value < 0
     narrowed = np.where(is_inside, value, ends[0]), np.where(is_inside, ends[1], value)
@@ -144,7 +144,7 @@ def _narrowed(
 def _false_position(
     low: Floats, high: Floats, ends: Ends, at: Callable[[Floats], Floats]
 ) -> Floats:
-    """Where the function is zero, or nearly; an end that stays is given half of its weight.
+    """Where the function is about zero; the weight of an end that stays is halved.
 
     The Illinois method: Dowell and Jarratt (1971), BIT 11:168.
     """
@@ -178,7 +178,7 @@ def _cut_edges(value: Floats, tetrahedra: Ints) -> Ints:
 def _snap(
     signed: SignedFunction, nodes: Floats, value: Floats, tetrahedra: Ints
 ) -> tuple[Floats, Floats]:
-    """Move each node that lies close to a crossing onto the nearest one; its value becomes zero."""
+    """Move each node close to a crossing onto the nearest one; its value becomes zero."""
     crossed = _cut_edges(value, tetrahedra)
     ends = nodes[crossed]
     points = _crossing(signed, ends[:, 0], ends[:, 1])
@@ -194,9 +194,9 @@ def _snap(
 
 
 def _snapping_distance(nodes: Floats, tetrahedra: Ints, some: Ints) -> Floats:
-    """How far [m] either end (e, 2) of some edges may move along it.
+    """Distance [m] that either end (e, 2) of some edges may move along it.
 
-    Where the lattice is graded, no farther than along an edge to the node's nearest neighbour.
+    In a graded lattice no farther than along an edge to the node's nearest neighbour.
     """
     every = edges(tetrahedra)
     length = np.linalg.norm(nodes[every[:, 1]] - nodes[every[:, 0]], axis=1)
@@ -211,7 +211,7 @@ def _snapping_distance(nodes: Floats, tetrahedra: Ints, some: Ints) -> Floats:
 def _cut(
     signed: SignedFunction, nodes: Floats, value: Floats, tetrahedra: Ints
 ) -> tuple[Floats, Ints, Ints]:
-    """Points with the crossings appended, the inner parts of all tetrahedra, and of which each."""
+    """Points with the crossings appended, the inner parts of all tetrahedra, and their origins."""
     held = np.flatnonzero((value[tetrahedra] < 0).any(axis=1))
     tetrahedra = tetrahedra[held]
     crossed = _cut_edges(value, tetrahedra)
@@ -296,7 +296,7 @@ def _orient(points: Floats, tetrahedra: Ints) -> Ints:
 
 
 def _largest_component(node_count: int, tetrahedra: Ints) -> Ints:
-    """Numbers of all tetrahedra but the crumbs of a shape thinner than an element."""
+    """Numbers of all tetrahedra except fragments of a shape thinner than an element."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -69,7 +69,7 @@ def plan(scene: Scene) -> Plan:
     if scene.is_point:
         return Plan(scene, tuple(_point(scene)))
     problem = problem_of(scene)
-    if problem.is_burdened:
+    if problem.has_further_loads:
         return _by_motions(scene, problem, required)
     seen = look(scene, problem)
     foresight = Foresight(seen, measure(required, problem))

@@ -1,1 +1,1 @@
-"""The problem that every model solves, in SI units; it knows no scene."""
+"""The boundary-value problem that every model solves, in SI units and independent of scenes."""

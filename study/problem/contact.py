@@ -1,4 +1,4 @@
-"""Support and tool as fields over the surface, the same for every model and every mesh."""
+"""Supports and blunt tools as fields over the surface, the same for every model and mesh."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SIDEWAYS = 1e-6
-"""Cosine up to which a surface faces to the side of a direction, but for rounding."""
+"""Cosine below which a surface is perpendicular to a direction, up to rounding."""
 
 
 @dataclass(frozen=True)
 class Foundation:
     """Winkler foundation of the surface that faces `outward`, near its extreme plane.
 
-    `level`: largest coordinate [m] of the organ along `outward`; `depth` [m]: where it ends;
-    `stiffness` [Pa/m]: traction per displacement of a surface that squarely faces `outward`. With a
-    `centre` [m] (3,) it is the surface within `depth` of that instead, whichever way it faces.
+    `level` [m]: largest coordinate of the organ along `outward`; `depth` [m]: extent of the
+    foundation below it; `stiffness` [Pa/m]: traction per displacement of a surface perpendicular to
+    `outward`. With a `centre` [m] (3,) it is the surface within `depth` of that point, whatever its
+    orientation.
     """
 
     outward: Floats
@@ -33,7 +34,7 @@ class Foundation:
         """Stiffness per area [Pa/m] at points (..., 3) with outward normals (..., 3).
 
         Area counts by its projection on the side. Over the deeper half of the depth the stiffness
-        fades to zero without a kink, so that integrals converge under refinement.
+        decreases smoothly to zero, so that integrals converge under refinement.
         """
         below = np.clip(self._below(points), 0.0, 1.0)
         fade = np.clip(2.0 * (1.0 - below), 0.0, 1.0)
@@ -41,25 +42,25 @@ class Foundation:
         return np.asarray(self.stiffness * smooth * self._facing(normals))
 
     def fixed(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
-        """Components (..., 3) along which nothing moves: none, as a foundation is elastic."""
+        """Fixed components (..., 3): none, as a foundation is elastic."""
         return np.zeros(np.broadcast_shapes(points.shape, normals.shape), dtype=np.bool_)
 
     def scaled(self, times: float) -> Foundation:
-        """So many times as stiff."""
+        """The foundation with `times` its stiffness."""
         return replace(self, stiffness=times * self.stiffness)
 
     def covers(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
-        """Whether it has points (..., 3) with outward normals (..., 3) of the surface."""
+        """Whether it supports points (..., 3) of the surface with outward normals (..., 3)."""
         return np.asarray((self._below(points) < 1.0) & (self._facing(normals) > SIDEWAYS))
 
     def _below(self, points: Floats) -> Floats:
-        """How far from where it begins, over how far it goes."""
+        """Depth below the extreme plane, or distance from the centre, over the extent."""
         if self.centre is not None:
             return np.asarray(np.linalg.norm(points - self.centre, axis=-1) / self.depth)
         return np.asarray((self.level - points @ self.outward) / self.depth)
 
     def _facing(self, normals: Floats) -> Floats:
-        """How much of an area counts."""
+        """Share of an area that counts."""
         if self.centre is not None:
             return np.ones(normals.shape[:-1])
         return np.asarray(np.clip(normals @ self.outward, 0.0, None))
@@ -67,7 +68,7 @@ class Foundation:
 
 @dataclass(frozen=True)
 class ToolPatch:
-    """Blunt tool at `centre` [m] pushing along the unit vector `direction` with `force` [N].
+    """A blunt tool at `centre` [m] that pushes along the unit vector `direction` with `force` [N].
 
     `name`: the key of the scene that places it, for messages.
     """
@@ -81,8 +82,8 @@ class ToolPatch:
     def profile(self, points: Floats, normals: Floats) -> Floats:
         """Traction at points (..., 3) with outward normals (..., 3), up to a factor.
 
-        (1 - (r/radius)^2)^2 over the surface that faces the tool, r measured across its axis, times
-        the surface's projection on it. Each model scales its own integral to `force`.
+        (1 - (r/radius)^2)^2 over the surface that faces the tool, with r measured across its axis,
+        times the projection of the surface on it. Each model scales its own integral to `force`.
         """
         offset = points - self.centre
         along = offset @ self.direction
@@ -94,7 +95,7 @@ class ToolPatch:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A blunt tool beside the first, or a station of one that travels (`study.problem.way`).
+    """A further blunt tool, or one station of a travelling tool (`study.problem.tool_travel`).
 
     `factor`: share of its force at times [s].
     """
@@ -105,9 +106,9 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class Weight:
-    """A body of a `mass` [kg] fixed on a patch: it hangs on it by gravity, and moves with it.
+    """A body of a `mass` [kg] attached to a patch: it is pulled by gravity and adds inertia.
 
-    `patch` has a force of 1 N, so that its profile scaled to it shares the mass out.
+    `patch` has a force of 1 N, so that its scaled profile distributes the mass.
     """
 
     patch: ToolPatch

@@ -1,4 +1,4 @@
-"""What a scene may ask beyond one load on a homogeneous, weightless body."""
+"""What a scene may require beyond one load on a homogeneous, weightless body."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ FEATURES = {
     "inclusions": "tissue that differs from place to place",
     "fixed-surfaces": "clamped or sliding supports",
 }
-"""Names of what a model must be able to follow, in the words of a message."""
+"""Names of features that a model must support, with their words in messages."""
 
 BESIDE_ONE_LOAD = ("moved-tools", "several-loads", "travelling-loads", "gravity", "weights")
-"""Of these, what acts beside a single load of a given force."""
+"""Those features that act beside a single load of given force."""
 
 
 def refuse_beside_one_load(features: Iterable[str], what: str) -> None:
-    """ValueError where a study that is of a single load is asked for more."""
+    """Raise ValueError where a study of a single load is given further loads."""
     present = set(features)
     found = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in present]
     if found:

@@ -1,4 +1,4 @@
-"""Load histories and the sample that shows the peak."""
+"""Load histories, and the sample at which a load peaks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Duration = Annotated[float, Quantity("s", 0.0, 3600.0)]
 
 @dataclass(frozen=True, kw_only=True)
 class LoadHistory:
-    """Load factor over time, by a name of `HISTORIES` and the values that it uses."""
+    """Load factor over time: a name of `HISTORIES` and the parameters that it uses."""
 
     kind: Annotated[str, Choice("study.problem.history:HISTORIES")] = "ramp-hold-release"
     ramp: Duration = 1.0
@@ -52,6 +52,6 @@ HISTORIES: dict[str, Callable[[LoadHistory, Floats], Floats]] = {
 
 
 def peak_sample(factors: Floats) -> int:
-    """Last sample at which the load is largest: where the organ has yielded the longest."""
+    """Last sample at which the load is largest, where the organ has had most time to yield."""
     size = np.abs(factors)
     return int(np.flatnonzero(size >= size.max() * (1.0 - 1e-9))[-1])

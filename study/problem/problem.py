@@ -11,29 +11,28 @@ from numpy.typing import NDArray
 from study.mesh.quadrature import SurfaceRule, VolumeRule
 from study.organ.geometry import Geometry
 from study.problem.contact import Load, ToolPatch, Weight
+from study.problem.heterogeneous import OUTLINE, HeterogeneousTissue, notes_of
 from study.problem.response import Response, ToolPath
 from study.problem.rigid import RigidTool
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
+from study.problem.tool_travel import full_share, travel_paths
 from study.problem.trajectory import Observation
-from study.problem.varied import OUTLINE, VariedTissue, notes_of
-from study.problem.way import full_share, ways
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """An organ with support, tool, load history, tissue, and what is observed of it.
+    """An organ with supports, tools, load histories, tissue, and what is observed of it.
 
-    `foundation`: all that holds it, fixed surfaces too. `tool` and `factor`: the first tool as a
-    load, and the share of its force at times [s]; a tool that is moved has no force there and
-    stands in `rigid_tools`. `loads`: those of further tools; a blunt tool that travels is a load at
-    each station of its way, the first tool at the first of them.
-    `gravity` [m/s^2] (3,) acts on the tissue and on `weights`; with `given_loaded` the geometry is
-    the shape at rest under it, and displacements count from there. `probes`: names of the control
-    points; `of_tools`: what was found of rigid tools. Two problems are the same only if they are
-    one object, so that what is assembled for one is kept by it.
+    `foundation`: all supports, fixed surfaces included. `tool` and `factor`: the first tool as a
+    load, and the share of its force at times [s]; a moved tool has no force there and is one of the
+    `rigid_tools`. `loads`: those of further tools; a blunt tool that travels is one load per
+    station of its path, the first tool at the first station. `gravity` [m/s^2] (3,) acts on the
+    tissue and on `weights`; with `given_loaded` the geometry is the shape at rest under gravity,
+    and displacements are relative to it. `probes`: names of the control points; `of_tools`: notes
+    on the rigid tools. Problems compare by identity, so that assemblies can be cached per problem.
     """
 
     geometry: Geometry
@@ -53,13 +52,13 @@ class Problem:
     of_tools: tuple[str, ...] = ()
 
     @property
-    def is_burdened(self) -> bool:
+    def has_further_loads(self) -> bool:
         """Whether more acts on the organ than its first tool as a load."""
         return bool(self.rigid_tools or self.loads or self.weights or self.gravity.any())
 
     @property
     def response(self) -> Response:
-        """How its motion is looked at."""
+        """What is compared of its motion."""
         times, volumes = self.observation.times, self.volume_rule.weights
         tools = tuple(ToolPath(one.name, one.axis, one.travel(times)) for one in self.rigid_tools)
         return Response(times, self.probes, self.tool.direction, volumes, tools)
@@ -74,9 +73,9 @@ class Problem:
 
     @property
     def full(self) -> Floats:
-        """Share (loads,) of each load where all are told at rest in full.
+        """Share (loads,) of each load in the full load at rest.
 
-        Of a tool that travels it is there where it is at the first of the kept frames, the peak.
+        A travelling tool is placed where it is at the first recorded frame, the peak.
         """
         times, frames = self.observation.times, self.observation.frames
         peak = float(times[frames[0] if frames else -1])
@@ -84,28 +83,28 @@ class Problem:
         return np.array([full_share(one, peak) for one in histories])
 
     @property
-    def ways(self) -> Floats:
+    def travel_paths(self) -> Floats:
         """Places [m] (tools, places, 3), equally spaced in time, of each tool that travels."""
         first = (self.tool, self.factor)
         loads = [first, *((load.tool, load.factor) for load in self.loads)]
-        return ways([(tool.name, tool.centre, factor) for tool, factor in loads])
+        return travel_paths([(tool.name, tool.centre, factor) for tool, factor in loads])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was found or assumed of the organ, how much is of other tissue, and of tools."""
+        """Notes on the organ, on the share of heterogeneous tissue, and on tools."""
         of_tissue = notes_of(self.geometry.mesh, self.tissue)
         return (*self.geometry.notes, *of_tissue, *self.of_tools)
 
     @property
     def inclusions(self) -> Floats:
-        """Points [m] (regions, OUTLINE, 3) of the surface of each region of other tissue."""
-        regions = self.tissue.regions if isinstance(self.tissue, VariedTissue) else ()
+        """Points [m] (regions, OUTLINE, 3) on the surface of each region of other tissue."""
+        regions = self.tissue.regions if isinstance(self.tissue, HeterogeneousTissue) else ()
         outlines = [one.outline for one in regions if len(one.outline)]
         return np.stack(outlines) if outlines else np.zeros((0, OUTLINE, 3))
 
     @property
     def tool_probe(self) -> int:
-        """The control point nearest to the tool."""
+        """Number of the control point nearest to the tool."""
         away = self.observation.probes - self.tool.centre
         return int(np.linalg.norm(away, axis=1).argmin())
 
@@ -114,7 +113,7 @@ class Problem:
 class PointProblem:
     """A single control mass point of a `mass` [kg] on a spring of a `rest_length` [m].
 
-    `force` [N] along the spring at times [s] up to the last of `times` [s] (samples,).
+    `force` [N] along the spring at times [s], up to the last of `times` [s] (samples,).
     """
 
     times: Floats
@@ -125,5 +124,5 @@ class PointProblem:
 
     @property
     def response(self) -> Response:
-        """How its motion is looked at: along the spring."""
+        """What is compared of its motion: the components along the spring."""
         return Response(self.times, self.probes, np.array([1.0, 0.0, 0.0]), np.zeros(0))

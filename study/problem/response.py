@@ -1,4 +1,4 @@
-"""What is compared of a motion: displacement and velocity along the tool's push."""
+"""The response quantities: displacement and velocity along the tool's push, and tool forces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Motion:
-    """Time [s], displacement [m] and velocity [m/s] of a point along a line, (samples,)."""
+    """Time [s], displacement [m] and velocity [m/s] of a point along an axis, (samples,)."""
 
     time: Floats
     displacement: Floats
@@ -23,7 +23,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class ToolPath:
-    """A rigid tool by name: its unit axis (3,), and how far [m] (samples, 3) its tip is moved."""
+    """A rigid tool by name: its unit axis (3,), and the travel [m] (samples, 3) of its tip."""
 
     name: str
     axis: Floats
@@ -32,7 +32,7 @@ class ToolPath:
 
 @dataclass(frozen=True)
 class ToolCurve:
-    """Travel [m] along a tool's axis, force [N] on the body along it and across, (samples,)."""
+    """Travel [m] along a tool's axis, axial and tangential force [N] on the body, (samples,)."""
 
     time: Floats
     travel: Floats
@@ -42,10 +42,10 @@ class ToolCurve:
 
 @dataclass(frozen=True)
 class Response:
-    """The response quantities: times [s], names of the probes, unit vector of the tool's push.
+    """Times [s], names of the control points, and the unit vector of the tool's push.
 
-    `volumes` [m^3] (q,) weigh the points of the volume field. `tools`: rigid tools, whose force is
-    one of the quantities.
+    `volumes` [m^3] (q,): weights of the points of the volume field. `tools`: rigid tools, whose
+    forces are response quantities too.
     """
 
     times: Floats
@@ -62,7 +62,7 @@ class Response:
         return ToolCurve(self.times, path.travel @ path.axis, along, across)
 
     def motion(self, trajectory: Trajectory, probe: int) -> Motion:
-        """Displacement and velocity of a probe along the push."""
+        """Displacement and velocity of a control point along the push."""
         return Motion(
             self.times,
             trajectory.displacement[:, probe] @ self.direction,

@@ -1,8 +1,9 @@
-"""Rigid tools that are moved along a given path, and what of a body they touch.
+"""Rigid tools that are moved along a prescribed path, and their geometry of contact.
 
-A tool has a tip and an axis along which it faces the body. In its own frame, x and y across the
-axis, z along it from the tip, it fills: a sphere of its radius below the tip; a punch, the cylinder
-of its radius below the plane z = 0, of which the side touches nothing; a plate, all below z = 0.
+A tool has a tip and an axis along which it faces the body. In its own frame, with x and y across
+the axis and z along it from the tip, it occupies: a sphere of its radius below the tip; a punch,
+the cylinder of its radius below the plane z = 0, without contact on its side; a plate, all of z <
+0.
 """
 
 from __future__ import annotations
@@ -19,23 +20,23 @@ SPHERE, PUNCH, PLATE = range(3)
 SHAPES = {"sphere": SPHERE, "punch": PUNCH, "plate": PLATE}
 """Shapes of rigid tools by name."""
 TOOLS = ("blunt", *SHAPES)
-"""All shapes; a blunt tool is no body but a smooth pressure."""
+"""All shapes; a blunt tool is no rigid body but a smooth pressure."""
 BONDED, SLIDING = "bonded", "sliding"
 CONTACTS = (BONDED, SLIDING)
-"""What a rigid tool does to the surface: hold what it touches at the start, or press on it only."""
+"""Contact of a rigid tool: hold what it touches at the start, or press without adhesion."""
 
 FLUSH = 1e-3
-"""Distance from a bonded plate, as a share of the body, within which the surface is held."""
+"""Distance from a bonded plate, relative to the body, within which the surface is held."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidTool:
     """A rigid tool whose tip starts at `tip` [m] (3,) and faces along the unit vector `axis` (3,).
 
-    `shape`: a number of `SHAPES`; `radius` [m], without meaning for a plate. `travel`: displacement
-    [m] (k, 3) of the tip at times [s] (k,). `bonded`: the surface within the tool's radius of its
-    axis that faces it moves with it from the start; else a part of the surface is pushed while it
-    would enter the tool, never pulled, and with `friction`, Coulomb's coefficient, dragged.
+    `shape`: a number of `SHAPES`; `radius` [m], unused for a plate. `travel`: displacement [m] (k,
+    3) of the tip at times [s] (k,). `bonded`: the facing surface within the tool's radius of its
+    axis moves with it from the start. Otherwise contact is unilateral: the surface is kept out of
+    the tool, never pulled, and dragged with Coulomb's coefficient `friction`.
     """
 
     name: str
@@ -48,7 +49,7 @@ class RigidTool:
     friction: float = 0.0
 
     def holds(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
-        """Which points (n, 3) with outward normals (n, 3) a bonded tool holds from its start on."""
+        """Which points (n, 3) with outward normals (n, 3) a bonded tool holds."""
         offset = points - self.tip
         along = offset @ self.axis
         facing = normals @ self.axis < 0.0
@@ -58,10 +59,10 @@ class RigidTool:
         return np.asarray(facing & (across <= self.radius) & (np.abs(along) < self.radius))
 
     def touching(self, points: Floats, normals: Floats) -> RigidTool:
-        """The tool moved along its axis so far that it touches what faces it of a surface.
+        """The tool shifted along its axis until it touches the surface opposite to it.
 
-        Points (n, 3) with outward normals (n, 3); the tool itself if none is opposite. What lies
-        deeper in it than its radius, such as another lobe behind it, does not count, but does so
+        For points (n, 3) with outward normals (n, 3); the tool itself if none is opposite. Points
+        deeper in it than its radius, such as those of another lobe behind it, are ignored, except
         for a plate.
         """
         offset = points - self.tip
@@ -77,9 +78,9 @@ class RigidTool:
         return replace(self, tip=self.tip + along[opposite].min() * self.axis)
 
     def gap(self, points: Floats, time: float) -> tuple[Floats, Floats]:
-        """Distance [m] (n,) of points (n, 3) from the tool at a time [s], and its gradient (n, 3).
+        """Gap [m] (n,) between points (n, 3) and the tool at a time [s], and its gradient (n, 3).
 
-        Negative inside the tool. Infinite where a punch has nothing opposite.
+        Negative inside the tool, infinite where nothing of a punch is opposite.
         """
         offset = points - self.tip - self.travel(np.array([time]))[0]
         along = offset @ self.axis

@@ -1,4 +1,4 @@
-"""What holds the organ: elastic foundations, and surfaces that do not move or slide only."""
+"""Supports of the organ: elastic foundations, and clamped or sliding surfaces."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ FOUNDATION, CLAMPED, SLIDING = "foundation", "clamped", "sliding"
 KINDS = (FOUNDATION, CLAMPED, SLIDING)
 """Kinds of support by name."""
 FREE = 1e-6
-"""Of the stiffness against a rigid motion relative to the largest, below which nothing resists."""
+"""Stiffness against a rigid motion, relative to the largest, below which the motion is free."""
 
 
 class Support(Protocol):
-    """What holds a surface."""
+    """Protocol of a support of part of the surface."""
 
     def density(self, points: Floats, normals: Floats) -> Floats:
         """Stiffness per area [Pa/m] at points [m] (..., 3) with outward normals (..., 3)."""
 
     def fixed(self, points: Floats, normals: Floats) -> Booleans:
-        """Components (..., 3) along which the surface there does not move."""
+        """Components (..., 3) that are fixed at points with outward normals (..., 3)."""
 
     def scaled(self, times: float) -> Support:
-        """So many times as stiff, but for what does not move."""
+        """The support with `times` its stiffness; fixed components stay fixed."""
 
 
 @dataclass(frozen=True, eq=False)
 class FixedSurface:
-    """A surface that does not move along `directions` (3,): that of a foundation of this `extent`.
+    """A surface fixed along `directions` (3,): that of a foundation of this `extent`.
 
-    The limit of such a foundation as its stiffness grows, in those directions.
+    It is the limit of that foundation as its stiffness grows, in those directions.
     """
 
     extent: Foundation
     directions: Booleans
 
     def density(self, points: Floats, normals: Floats) -> Floats:
-        """No stiffness beside what is fixed."""
+        """Zero: it has no stiffness beside the fixed components."""
         return np.zeros(np.broadcast_shapes(points.shape, normals.shape)[:-1])
 
     def fixed(self, points: Floats, normals: Floats) -> Booleans:
@@ -60,31 +60,31 @@ class FixedSurface:
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """Several supports, each of which holds its own surface."""
+    """Several supports, each of its own part of the surface."""
 
     parts: tuple[Support, ...]
 
     def density(self, points: Floats, normals: Floats) -> Floats:
-        """The sum of all."""
+        """The sum over all supports."""
         return np.asarray(sum(one.density(points, normals) for one in self.parts))
 
     def fixed(self, points: Floats, normals: Floats) -> Booleans:
-        """What any of them fixes."""
+        """Components that any of the supports fixes."""
         found = np.stack([one.fixed(points, normals) for one in self.parts])
         return np.asarray(found.any(axis=0))
 
     def scaled(self, times: float) -> Supports:
-        """All of them so many times as stiff."""
+        """All supports with `times` their stiffness."""
         return Supports(tuple(one.scaled(times) for one in self.parts))
 
 
 def free_motion(
     support: Support, points: Floats, normals: Floats, areas: Floats
 ) -> tuple[Floats, Floats] | None:
-    """A rigid motion that nothing resists, as translation and rotation (3,); None if there is none.
+    """A rigid motion that the support does not resist, None if there is none.
 
-    `areas` (n,) of the points of a surface. The rotation is about the middle of the points, over
-    half of their extent; the larger of the two is 1.
+    As translation and rotation (3,) about the middle of the points, the rotation scaled by half of
+    their extent; the larger of the two is 1. `areas` (n,): weights of the surface points.
     """
     extent = 0.5 * float(np.ptp(points, axis=0).max())
     arm = (points - points.mean(axis=0)) / extent

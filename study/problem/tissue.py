@@ -1,4 +1,4 @@
-"""What the organ is made of."""
+"""The tissue of the organ."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from study.annotation.quantity import Quantity
 
 @dataclass(frozen=True, kw_only=True)
 class Tissue:
-    """Isotropic elastic tissue, that of the reference; the values not given are a liver's.
+    """Isotropic elastic tissue, that of the reference; default values are those of a liver.
 
-    The fuzzy estimates of stiffness are judged against its modulus.
+    Fuzzy estimates of stiffness are compared with its modulus.
     """
 
     youngs_modulus: Annotated[float, Quantity("Pa", 100.0, 1e6)] = 9.5e3
@@ -21,5 +21,5 @@ class Tissue:
 
     @property
     def highest_poisson_ratio(self) -> float:
-        """Its own, and of tissue that differs from place to place the largest."""
+        """Its own; of heterogeneous tissue the largest."""
         return self.poisson_ratio

@@ -1,4 +1,4 @@
-"""What a model is asked to record, and what it gives back."""
+"""What a model is asked to record, and the motion that it returns."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Status = Literal["finished", "diverged", "not finished"]
-"""Not finished: no state was found to go on from, or the means of the run did not suffice."""
+""""not finished": no next state was found, or the resources of the run did not suffice."""
 
 
 @dataclass(frozen=True)
 class Observation:
-    """When and where a model is looked at.
+    """When and where a model is observed.
 
-    `times` [s] (samples,), equally spaced from zero;
-    `probes` [m] (probes, 3); `frames`: samples at which the whole field is kept, the first and last
-    of which are what strains are looked for at; `volume_points` [m] (q, 3) and `surface_points` [m]
-    (s, 3): where it is kept.
+    `times` [s] (samples,), equally spaced from zero; `probes` [m] (probes, 3); `frames`: samples at
+    which fields are recorded, of which the first and the last are used for strains; `volume_points`
+    [m] (q, 3) and `surface_points` [m] (s, 3): where fields are recorded.
     """
 
     times: Floats
@@ -31,7 +30,7 @@ class Observation:
 
     @property
     def ends(self) -> tuple[int, ...]:
-        """First and last of the frames; none without frames."""
+        """First and last of the frames; empty without frames."""
         return self.frames[:1] + self.frames[-1:]
 
 
@@ -39,11 +38,11 @@ class Observation:
 class Trajectory:
     """Motion of one model.
 
-    `displacement` [m] and `velocity` [m/s], shape (samples, probes, 3); `volume_field` [m], shape
-    (frames, q, 3); `surface_field` [m], shape (frames, s, 3). `tool_force` [N], shape (samples,
-    tools, 3): what the body does to each rigid tool of the problem. A motion that did not finish
-    keeps NaN from where it `ended_at` [s] on, 0 if it never began: one that diverged, if it has
-    nodes, near the rest position [m] of which.
+    `displacement` [m] and `velocity` [m/s] (samples, probes, 3); `volume_field` [m] (frames, q, 3);
+    `surface_field` [m] (frames, s, 3); `tool_force` [N] (samples, tools, 3): force of the body on
+    each rigid tool. A motion that did not finish is NaN from the time `ended_at` [s] on, which is 0
+    if it never began; one that diverged also has the rest position [m] of the node where it did, if
+    known.
     """
 
     displacement: Floats
@@ -57,7 +56,7 @@ class Trajectory:
 
 
 def empty_trajectory(observation: Observation, tools: int = 0) -> Trajectory:
-    """Arrays of the right shape, filled with NaN, for a model to write into."""
+    """Arrays of the right shapes, filled with NaN, for a model to write into."""
     samples, frames = len(observation.times), len(observation.frames)
     return Trajectory(
         np.full((samples, len(observation.probes), 3), np.nan),

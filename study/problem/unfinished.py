@@ -1,12 +1,12 @@
-"""A model that finds in its run that it cannot: a result of that model, as divergence is."""
+"""The error of a model that cannot finish its run: a result, like divergence."""
 
 from __future__ import annotations
 
 
 class UnfinishedError(ValueError):
-    """Why a motion is not finished, and what would help; both parts of a sentence.
+    """Why a motion is not finished, and a remedy; both are parts of a sentence.
 
-    For what only the work of a run can tell. What a scene shows beforehand is a plain ValueError.
+    Only for what the work of a run reveals. What can be seen from the scene is a plain ValueError.
     """
 
     def __init__(self, reason: str, remedy: str) -> None:

@@ -1,4 +1,4 @@
-"""What a study found, on disk and in memory.
+"""Results of a study, on disk and in memory.
 
 >>> results = Results.load("results/block")
 >>> motion = results.curve("msm-mamdani", "tool")

@@ -1,4 +1,4 @@
-"""Arrays of a results folder: read from .npz, and held against the names and shapes they have."""
+"""Arrays of a results folder: read from .npz, and checked for their names and shapes."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 Arrays = dict[str, NDArray[Any]]
 Shapes = Mapping[str, str]
-"""Names of arrays, and a letter for each dimension: the same letter is the same number."""
+"""Names of arrays, and a letter per dimension: equal letters are equal numbers."""
 
 DAMAGED = (
     *(OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
 )
-"""What numpy and zipfile raise for files that are cut or altered."""
+"""Exceptions of numpy and zipfile for truncated or altered files."""
 
 
 def read(path: Path) -> Arrays:
-    """Arrays of a file, none if it is missing. ValueError naming a file that holds no arrays."""
+    """Arrays of a file, empty if it is missing. ValueError naming a file that holds no arrays."""
     if not path.exists():
         return {}
     try:
@@ -39,7 +39,7 @@ def read(path: Path) -> Arrays:
 
 
 def check_names(file: str, arrays: Arrays, wanted: list[str]) -> None:
-    """ValueError for an array that is missing or one too many."""
+    """Raise ValueError for a missing or unexpected array."""
     for name in wanted:
         if name not in arrays:
             raise ValueError(f"{file}: array {name} is missing")
@@ -49,7 +49,7 @@ def check_names(file: str, arrays: Arrays, wanted: list[str]) -> None:
 
 
 def check_shapes(file: str, arrays: Arrays, shapes: Shapes, known: Mapping[str, int]) -> None:
-    """ValueError for an array of another shape; a name that ends with ? may be empty instead.
+    """Raise ValueError for an array of another shape; a name ending in ? may be empty instead.
 
     `known`: numbers that letters stand for; the others are taken from the first array that has
     them. A digit stands for itself.
@@ -71,7 +71,7 @@ def check_shapes(file: str, arrays: Arrays, shapes: Shapes, known: Mapping[str, 
 
 
 def check_numbers(file: str, arrays: Arrays, texts: tuple[str, ...] = ()) -> None:
-    """ValueError for an array that is not of finite numbers, or of texts where it is to be."""
+    """Raise ValueError for an array that is not of finite numbers, or of texts where required."""
     for name, array in arrays.items():
         kinds = "U" if name.endswith(texts or ("\0",)) else "fiub"
         if array.dtype.kind not in kinds and array.size:

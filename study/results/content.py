@@ -1,7 +1,7 @@
-"""Whether the parts of a results folder are those of one scene: models, probes, samples, arrays.
+"""Consistency of a results folder with its scene: models, control points, samples, arrays.
 
-Checksums tell that a file is not that of the run; this tells which row, and holds where somebody
-made the checksums again. Messages name file and line.
+Checksums show that a file is not that of the run. These checks name the row, and also hold where
+somebody has recomputed the checksums. Messages name file and line.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FIRST_LINE = 2
-"""Of a table's rows, below the names of its columns."""
+"""Line number of a table's first row, below the header."""
 STATUSES: tuple[str, ...] = get_args(Status)
 SAME_TIME = 1e-9
-"""Share of the simulated time within which two times are the same; tables have twelve digits."""
+"""Share of the simulated time within which two times are equal; tables have twelve digits."""
 SAME_SCORE = 1e-9
-"""Within which two scores are the same; tables have twelve digits."""
+"""Difference within which two scores are equal; tables have twelve digits."""
 SURFACE: Shapes = {
     **{"points": "n3", "triangles": "m3", "tool": "23", "probes": "p3", "held": "m", "loaded": "m"},
     **{"cut": "c3", "cut_triangles": "t3", "film": "f"},
 }
 OF_MODEL: Shapes = {"": "2n3", "cut.": "2c3", "film.": "fn3"}
-"""Arrays of a model by what stands before its name."""
+"""Arrays of a model by the prefix of their names."""
 SETS: Shapes = {"sets": "s", "x": "x", "principal": "sx", "lower": "sx", "upper": "sx"}
 VIEW: Shapes = {
     **{"unit": "", "inputs": "d", "readings": "d", "answer": "", "interval?": "2"},
@@ -62,7 +62,7 @@ TEXTS = (".sets", ".unit", ".inputs", ".text", ".terms.set", ".outputs")
 
 
 class Wanted(NamedTuple):
-    """Samples of a model at a control point, the fewest and the most that there may be."""
+    """Samples of a model at a control point: the smallest and the largest admissible number."""
 
     model: str
     probe: str
@@ -71,7 +71,7 @@ class Wanted(NamedTuple):
 
 
 def check(results: Results) -> None:
-    """Raise ValueError naming file and row of what does not belong to the scene."""
+    """Raise ValueError naming file and row of what is inconsistent with the scene."""
     scene, record = results.scene, results.record
     _check_record(scene, record)
     _check_models(scene, record)
@@ -87,7 +87,7 @@ def check(results: Results) -> None:
     _check_ratings(results)
     _check_score_errors(results)
     _check_score_differences(results)
-    differences = [row[:-1] for row in results.field_differences]
+    differences = [row[:3] for row in results.field_differences]
     _check_keys("errors.csv", differences, [] if scene.is_point else _different(record))
     _check_sensitivity(results)
     _check_fields(results)
@@ -95,7 +95,7 @@ def check(results: Results) -> None:
 
 
 def _check_tools(results: Results, times: Floats) -> None:
-    """Forces go by model, tool and time, as far as the model has a motion."""
+    """Forces are ordered by model, tool and time, over the part of the motion that exists."""
     scene, record = results.scene, results.record
     names = ["tool", *(f"tool.{n}" for n in range(2, len(scene.tools) + 1))]
     moved = [name for name, one in zip(names, scene.tools, strict=True) if one.is_moved]
@@ -140,7 +140,7 @@ def _agree(key: str, found: object, scenes: object) -> None:
 
 
 def _check_models(scene: Scene, record: StudyRecord) -> None:
-    """Each model stands for a kind in the scene; a kind may name its models as it likes."""
+    """Each model belongs to a kind in the scene; a kind may name its models freely."""
     kinds = [_kind(model.name, scene.models) for model in record.models]
     for model, kind in zip(record.models, kinds, strict=True):
         if kind is None and set(scene.models) <= set(kinds):
@@ -206,14 +206,14 @@ def _curves(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
 
 
 def _finite_samples(model: ModelRecord, times: Floats) -> int:
-    """A model whose motion ended has samples up to then."""
+    """Number of samples of a model up to the end of its motion."""
     if model.ended_at_s is None:
         return len(times)
     return int((times < model.ended_at_s - SAME_TIME * times[-1]).sum())
 
 
 def _bands(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
-    """Of models with an interval; a band ends where the run at a bound diverged, as a note says."""
+    """Bands of models with an interval; a band ends where the run at a bound diverged."""
     for model in record.models:
         system = record.fuzzy.systems.get(model.system or "")
         if system is None or system.interval_pa is None or model.status == "not finished":
@@ -224,7 +224,7 @@ def _bands(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
 
 
 def _bounded(record: StudyRecord, times: Floats) -> Iterator[Wanted]:
-    """Of models with a certificate."""
+    """Bounds of models with a certificate."""
     for model in record.models:
         if model.elements is not None and model.elements.certified is not None:
             for probe in record.probes:
@@ -237,7 +237,7 @@ def _check_motions(
     wanted: Iterator[Wanted],
     times: Floats,
 ) -> None:
-    """Rows go by model, control point and time, from the first sample on."""
+    """Rows are ordered by model, control point and time, from the first sample on."""
     at = 0
     for model, probe, fewest, most in wanted:
         for sample in range(most):
@@ -261,7 +261,7 @@ def _check_motions(
 def _check_keys(
     file: str, found: Sequence[tuple[str, ...]], wanted: Sequence[tuple[str, ...]]
 ) -> None:
-    """Rows are those wanted, in order."""
+    """The rows are those expected, in order."""
     for line, (row, key) in enumerate(zip(found, wanted, strict=False), FIRST_LINE):
         if row != key:
             raise ValueError(f"{file}, line {line}: {_words(row)}, where {_words(key)} is to stand")
@@ -277,7 +277,7 @@ def _words(key: tuple[str, ...]) -> str:
 
 
 def _scored(record: StudyRecord) -> list[tuple[str, ...]]:
-    """Model, reference, probe, curve and measure of each score; notes say what has none."""
+    """Model, reference, control point, curve and measure of each score; notes name missing ones."""
     from study.similarity.score import MEASURES
 
     names = [model.name for model in record.models if not model.inverted_cells]
@@ -295,7 +295,7 @@ def _scored(record: StudyRecord) -> list[tuple[str, ...]]:
 
 
 def _check_ratings(results: Results) -> None:
-    """The parts of each score by ISO/TS 18571 add up to it."""
+    """The parts of each ISO/TS 18571 score add up to it."""
     scores = [row for row in results.scores if row.measure == "iso-18571"]
     _check_keys("iso_18571.csv", [row[:4] for row in results.ratings], [row[:4] for row in scores])
     for line, (row, score) in enumerate(zip(results.ratings, scores, strict=True), FIRST_LINE):
@@ -323,7 +323,7 @@ def _check_score_errors(results: Results) -> None:
 
 
 def _check_score_differences(results: Results) -> None:
-    """Of every two models scored at one place, in the order of the scores."""
+    """Differences of every two models scored in one place, in the order of the scores."""
     file, rows = "score_differences.csv", results.score_differences
     scores = {row[:5]: row.score for row in results.scores}
     pairs_of_keys = paired(list(dict.fromkeys(row[:3] for row in results.scores)))
@@ -354,7 +354,7 @@ def _check_parts(where: str, row: ScoreError | ScoreDifference) -> None:
 
 
 def _different(record: StudyRecord) -> list[tuple[str, ...]]:
-    """Model, reference and quantity of each difference of the field, of models that finished."""
+    """Model, reference and quantity of each field difference, for models that finished."""
     sound = [model for model in record.models if not model.inverted_cells]
     names = [model.name for model in sound]
     lost = {model.name for model in sound if model.status != "finished"}
@@ -391,7 +391,7 @@ def _check_sensitivity(results: Results) -> None:
 
 
 def _check_fields(results: Results) -> None:
-    """Surface, tools and their ways, control points, inclusions, cut, and what each model does."""
+    """Surface, tools and their paths, control points, inclusions, section, and model fields."""
     file, fields, record = "fields.npz", results.fields, results.record
     if results.scene.is_point:
         return check_names(file, fields, [])

@@ -1,7 +1,7 @@
-"""What is said of a results folder that is not whole."""
+"""The error of an incomplete or unusable results folder."""
 
 from __future__ import annotations
 
 
 class ResultsError(ValueError):
-    """A folder that cannot be read or written; the message says what to do."""
+    """A folder that cannot be read or written; the message states the remedy."""

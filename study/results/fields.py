@@ -1,7 +1,7 @@
-"""Motion of every node of a model, kept on disk as it runs, and given out as one VTKHDF file.
+"""Motion of every node of a model, recorded on disk during the run and written as one VTKHDF file.
 
-The frames wait in a raw file, where a sample that is undone is simply written over. It holds the
-motion of a run that was interrupted, too, which goes on in it.
+The frames are kept in a raw file, in which a sample that is repeated is simply overwritten. The
+file also holds the motion of an interrupted run, which continues in it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ CHECKSUM = 4
 
 
 class Mesh(NamedTuple):
-    """Where fields live: points [m] (n, 3), and tetrahedra (c, 4) or lattice cells (c, 8)."""
+    """The mesh of a field: points [m] (n, 3), and tetrahedra (c, 4) or lattice cells (c, 8)."""
 
     points: Floats
     cells: Ints
@@ -35,9 +35,9 @@ class Mesh(NamedTuple):
 class Frames:
     """Displacement [m] and velocity [m/s] of all nodes, (n, 3) each, at samples 0 to `count` - 1.
 
-    On a raw file of 64-bit numbers, unbuffered: what was written outlives the program. Each frame
-    ends with a checksum. With `resume`, those that are in it stay until written over, up to the
-    first one that is cut or altered.
+    Stored in a raw file of 64-bit numbers, unbuffered, so that written frames outlive the program.
+    Each frame ends with a checksum. With `resume`, existing frames stay until they are overwritten,
+    up to the first one that is truncated or altered.
     """
 
     def __init__(self, path: Path, nodes: int, *, resume: bool = False) -> None:
@@ -48,19 +48,19 @@ class Frames:
         self.count = self._whole() if keep else 0
 
     def _whole(self) -> int:
-        """How many frames are whole, from the first on."""
+        """Number of complete frames from the first on."""
         count = self.path.stat().st_size // (self.size + CHECKSUM)
         return next((k for k in range(count) if self._frame(k) is None), count)
 
     def _frame(self, sample: int) -> bytes | None:
-        """What is written of a sample, None if it is not whole."""
+        """The stored bytes of a sample, None if it is not complete."""
         with self.path.open("rb") as file:
             file.seek(sample * (self.size + CHECKSUM))
             data, checksum = file.read(self.size), file.read(CHECKSUM)
         return data if checksum == _checksum(data) else None
 
     def write(self, sample: int, u: Floats, v: Floats) -> None:
-        """Keep a sample as the last one. ValueError if those before it are missing."""
+        """Record a sample as the last one. ValueError if earlier samples are missing."""
         if sample > self.count:
             raise ValueError(
                 f"{self.path}: holds the fields of {self.count} samples, and sample {sample} is to "
@@ -75,7 +75,7 @@ class Frames:
         self.count = sample + 1
 
     def read(self, sample: int) -> dict[str, Floats]:
-        """Displacement and velocity of a sample, by these names. OSError if it is not whole."""
+        """Displacement and velocity of a sample, by these names. OSError if it is not complete."""
         if not 0 <= sample < self.count:
             raise IndexError(f"{self.path}: no sample {sample} among {self.count}")
         data = self._frame(sample)
@@ -93,10 +93,10 @@ def _checksum(data: bytes) -> bytes:
 def recording(
     path: Path, mesh: Mesh, times: Floats, raw: Path, *, resume: bool = False
 ) -> Iterator[Frames]:
-    """Frames in the file `raw`, which become `path` when the block ends without an exception.
+    """Frames in the file `raw`, written to `path` when the block ends without an exception.
 
-    Only samples up to the one written last are given out, so a run that was lost ends there.
-    `times` [s] (samples,). The raw file stays, for the caller to remove.
+    Only samples up to the last one written are included, so a run that diverged ends there. `times`
+    [s] (samples,). The raw file stays, for the caller to remove.
     """
     frames = Frames(raw, len(mesh.points), resume=resume)
     with frames.file:
@@ -106,9 +106,10 @@ def recording(
 
 
 def _give_out(path: Path, mesh: Mesh, times: Floats, frames: Frames) -> None:
-    """Write aside, and move into place what is complete.
+    """Write under a temporary name, and move the complete file into place.
 
-    OSError first where there may be no space: on a full disk HDF5 prints pages, and may crash.
+    OSError beforehand if the disk may be too full: HDF5 then prints pages of messages and may
+    crash.
     """
     from study.results.vtkhdf import write
 

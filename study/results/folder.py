@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from study.results.content import check
 from study.results.errors import ResultsError
 from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
 from study.results.tables import (
+    TABLES,
     BandSample,
     CertifiedSample,
     CurveSample,
@@ -46,6 +47,7 @@ from study.results.tables import (
     ScoreError,
     SensitivityEntry,
     SimilarityScore,
+    TableFile,
     ToolForceSample,
     ToolForceScore,
     read_table,
@@ -73,8 +75,8 @@ class Results:
     """Content of a results folder.
 
     `record`: the numbers; then the rows of the tables. `fields`: arrays of the surface and of each
-    model's displacement on it, `fuzzy`: sets and output surfaces, both to be drawn and empty where
-    a scene has none.
+    model's displacement on it; `fuzzy`: sets and output surfaces. Both are for figures, and empty
+    where a scene has none.
     """
 
     scene: Scene
@@ -95,7 +97,7 @@ class Results:
 
     @classmethod
     def load(cls, folder: Path | str) -> Results:
-        """Content of a folder, checked whole; see `read`."""
+        """Content of a folder, fully checked; see `read`."""
         return read(Path(folder))
 
     def model(self, name: str) -> ModelRecord:
@@ -106,9 +108,9 @@ class Results:
         raise KeyError(f"{name}: not among {', '.join(one.name for one in self.record.models)}")
 
     def tool_force(self, model: str, tool: str) -> ToolCurve:
-        """Force of a rigid tool on a model's body, up to where a run was lost.
+        """Force of a rigid tool on a model's body, up to the end of the run.
 
-        KeyError for a model or tool that there is not.
+        KeyError for an unknown model or tool.
         """
         self.model(model)
         if tool not in {one.tool for one in self.record.tools}:
@@ -119,8 +121,8 @@ class Results:
     def curve(self, model: str, probe: str) -> Motion:
         """Time [s], displacement [m] and velocity [m/s] along the push, (samples,) each.
 
-        Samples that a diverged run lost are missing. KeyError for a model or probe that there is
-        not.
+        Samples after the divergence of a run are missing. KeyError for an unknown model or control
+        point.
         """
         self.model(model)
         if probe not in self.record.probes:
@@ -130,29 +132,25 @@ class Results:
 
 
 def write(results: Results, folder: Path) -> None:
-    """Write the files of a results folder into a folder with nothing but fields; see `replacing`.
+    """Write the files of a results folder into a folder that holds nothing but fields.
 
-    Their checksums last: they cover the fields of all nodes that the models have left there.
+    The checksums are written last: they include the fields of all nodes that the models have
+    written.
     """
     (folder / SCENE).write_text(write_scene(results.scene), encoding="utf-8")
-    write_table(folder / "curves.csv", CurveSample, results.curves)
-    write_table(folder / "bands.csv", BandSample, results.bands)
-    write_table(folder / "certified.csv", CertifiedSample, results.certified)
-    if results.record.tools:
-        write_table(folder / "tool_force.csv", ToolForceSample, results.tool_forces)
-        write_table(folder / "tool_similarity.csv", ToolForceScore, results.tool_scores)
-    write_table(folder / "similarity.csv", SimilarityScore, results.scores)
-    write_table(folder / "iso_18571.csv", Iso18571Rating, results.ratings)
-    write_table(folder / "score_errors.csv", ScoreError, results.score_errors)
-    write_table(folder / "score_differences.csv", ScoreDifference, results.score_differences)
-    write_table(folder / "errors.csv", FieldDifference, results.field_differences)
-    write_table(folder / "sensitivity.csv", SensitivityEntry, results.sensitivity)
+    for table in _tables(results.record):
+        write_table(folder / table.file, table.kind, getattr(results, table.attribute))
     for stem, arrays in (("fields", results.fields), ("fuzzy", results.fuzzy)):
         if arrays:
             np.savez_compressed(folder / f"{stem}.npz", allow_pickle=False, **arrays)
     sums = manifest.digests(folder)
     _write_record(results.record, folder / MARK, sums)
     manifest.write(folder, sums | {MARK: manifest.digest(folder / MARK)})
+
+
+def _tables(record: StudyRecord) -> Iterator[TableFile]:
+    """The tables that a folder with this record has."""
+    return (table for table in TABLES if record.tools or not table.of_tools)
 
 
 def _write_record(record: StudyRecord, path: Path, sums: Mapping[str, str]) -> None:
@@ -162,11 +160,11 @@ def _write_record(record: StudyRecord, path: Path, sums: Mapping[str, str]) -> N
 
 
 def read(folder: Path) -> Results:
-    """Read a results folder and check it whole.
+    """Read a results folder and check it completely.
 
-    Raises ResultsError, with file and, in a table, line, for a folder that holds no results or
-    those of another version, that lacks a file or has one of another run, or in which a row or an
-    array is missing, one too many, changed or not of its scene.
+    Raises ResultsError, with the file and, in a table, the line: for a folder that holds no results
+    or those of another version, that lacks a file or has one of another run, or in which a row or
+    an array is missing, unexpected, changed or inconsistent with its scene.
     """
     try:
         table = _numbers(folder)
@@ -192,9 +190,9 @@ def read(folder: Path) -> Results:
 
 
 def summary(folder: Path, scene: Scene) -> Results | None:
-    """Numbers of a folder that a run of the scene has left: its record, differences of the field.
+    """Numbers of a folder that a run of the scene has left: its record and field differences.
 
-    None if it is not as that run left it; its content is taken for that of the scene.
+    None if the folder is not as that run left it; its content is assumed to be that of the scene.
     """
     try:
         table = _numbers(folder)
@@ -208,24 +206,17 @@ def summary(folder: Path, scene: Scene) -> Results | None:
 
 
 def _content(folder: Path, table: Mapping[str, object]) -> Results:
-    """All files in memory. ValueError naming file and line of what is damaged or does not fit."""
+    """All files in memory. ValueError naming file and line of what is damaged or inconsistent."""
     record, scene = _record(table), _scene(folder)
+    rows: dict[str, Any] = {
+        one.attribute: read_table(folder / one.file, one.kind) for one in _tables(record)
+    }
     results = Results(
         scene,
         record,
-        read_table(folder / "curves.csv", CurveSample),
-        read_table(folder / "bands.csv", BandSample),
-        read_table(folder / "certified.csv", CertifiedSample),
-        read_table(folder / "tool_force.csv", ToolForceSample) if record.tools else (),
-        read_table(folder / "tool_similarity.csv", ToolForceScore) if record.tools else (),
-        read_table(folder / "similarity.csv", SimilarityScore),
-        read_table(folder / "iso_18571.csv", Iso18571Rating),
-        read_table(folder / "score_errors.csv", ScoreError),
-        read_table(folder / "score_differences.csv", ScoreDifference),
-        read_table(folder / "errors.csv", FieldDifference),
-        read_table(folder / "sensitivity.csv", SensitivityEntry),
-        npz.read(folder / "fields.npz"),
-        npz.read(folder / "fuzzy.npz"),
+        **rows,
+        fields=npz.read(folder / "fields.npz"),
+        fuzzy=npz.read(folder / "fuzzy.npz"),
     )
     check(results)
     if manifest.digest(folder / SCENE) != record.provenance.scene_sha256:
@@ -241,7 +232,7 @@ def _refuse(folder: Path, name: str) -> NoReturn:
 
 
 def _check_mixed(folder: Path, table: Mapping[str, object], sums: Mapping[str, str]) -> None:
-    """Checksums that somebody made again do not make the files of two runs one."""
+    """Raise where files of two runs were mixed, even if somebody recomputed the checksums."""
     wanted = table.get(CHECKSUMS)
     wanted = wanted if isinstance(wanted, dict) else {}
     for name in sorted(sums.keys() | wanted.keys() - {MARK}):
@@ -274,7 +265,7 @@ def _finite(text: str) -> float:
 
 
 def _record(table: Mapping[str, object]) -> StudyRecord:
-    """ValueError naming the key that is missing or no value of its kind."""
+    """Raise ValueError naming a key that is missing or has a value of the wrong type."""
     from pydantic import ValidationError
 
     try:
@@ -309,7 +300,7 @@ def _check_version(folder: Path, table: Mapping[str, object]) -> None:
 
 
 def replacing(folder: Path) -> AbstractContextManager[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
     FolderError before the block if `folder` holds anything but results, or cannot be written.
     """
@@ -335,9 +326,9 @@ def _foreign(present: set[str]) -> str | None:
 
 @contextmanager
 def told_to_start_again() -> Iterator[None]:
-    """Give an OSError of the block that says nothing of how to go on a note that does.
+    """Add a note on how to continue to an OSError of the block that has none.
 
-    Such is one of moving results into place, when `continuing` has removed what it kept.
+    Such an error occurs when results are moved into place, after `continuing` removed its states.
     """
     try:
         yield
@@ -349,10 +340,10 @@ def told_to_start_again() -> Iterator[None]:
 
 @contextmanager
 def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
-    """A folder beside `folder` for what an interrupted run goes on from; success removes it.
+    """A folder beside `folder` for the states of an interrupted run; success removes it.
 
-    ResultsError if it is of another scene than the one that is to be resumed. What the machine or a
-    signal ends in the block has a note of how to go on.
+    ResultsError if the states are of another scene than the one to be resumed. What the machine or
+    a signal ends in the block gets a note on how to continue.
     """
     folder = folder.resolve()
     state = folder.with_name(f".{folder.name}.state")
@@ -374,7 +365,7 @@ def continuing(folder: Path, scene: Scene, *, resume: bool) -> Iterator[Path]:
 
 
 def _check_same(state: Path, scene: Scene) -> None:
-    """A state is of one scene: another would be refused by its first lattice, after hours maybe."""
+    """Raise if the states are of another scene, before any model is run."""
     try:
         before = tomllib.loads((state / SCENE).read_text(encoding="utf-8"))
     except (OSError, ValueError):  # there is none, or a kill left half of it: each state tells
@@ -390,7 +381,7 @@ def _check_same(state: Path, scene: Scene) -> None:
 
 
 def _kept(state: Path) -> list[str]:
-    """Names of the models that have a state; fields without one are of no use."""
+    """Names of the models that have a state; fields without a state are of no use."""
     return sorted(path.stem for path in state.glob("[!.]*.npz")) if state.is_dir() else []
 
 

@@ -1,6 +1,6 @@
 """SHA256SUMS: checksums of a results folder, which `sha256sum -c SHA256SUMS` verifies too.
 
-The reports are not among them, for they can be made again.
+The reports are not included, since they can be made again.
 """
 
 from __future__ import annotations
@@ -11,37 +11,39 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from study.results.errors import ResultsError
+from study.results.tables import TABLES
 
 NAME = "SHA256SUMS"
 REPORT, PAGE = "report.pdf", "report.html"
 FIELDS = ".vtkhdf"
 MESH = "mesh.msh"
-"""The tetrahedra of a run, if they are wanted."""
+"""The tetrahedra of a run, if requested."""
 DATA = frozenset(
     {
-        *("results.json", "scene.toml", "fields.npz", "fuzzy.npz"),
-        *("curves.csv", "bands.csv", "similarity.csv", "errors.csv", "sensitivity.csv"),
-        *("iso_18571.csv", "score_errors.csv", "score_differences.csv", "certified.csv"),
-        *("tool_force.csv", "tool_similarity.csv", MESH),
+        *("results.json", "scene.toml", "fields.npz", "fuzzy.npz", MESH),
+        *(table.file for table in TABLES),
     }
 )
-ALWAYS = DATA - {"fields.npz", "fuzzy.npz", "tool_force.csv", "tool_similarity.csv", MESH}
-"""What every run writes; a point has no fields, a scene maybe no fuzzy systems or rigid tools."""
+ALWAYS = DATA - {
+    *("fields.npz", "fuzzy.npz", MESH),
+    *(table.file for table in TABLES if table.of_tools),
+}
+"""Files of every run; fields, fuzzy systems and rigid tools depend on the scene."""
 LINE = re.compile(r"(?P<digest>[0-9a-f]{64}) [ *](?P<name>[^/\0]+)")
 REMEDY = "restore the folder as the run left it, or run the scene again"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_END = {0: 40, 1: 44, 2: 28, 3: 28}
-"""Where a superblock of each version says how long the file is."""
+"""Offset in a superblock of each version at which the length of the file is stated."""
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file, which is not held in memory."""
+    """SHA-256 of a file, read in pieces."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of each data file that a folder holds, by name."""
+    """SHA-256 of each data file of a folder, by name."""
     return {name: digest(folder / name) for name in _present(folder)}
 
 
@@ -52,7 +54,7 @@ def write(folder: Path, sums: Mapping[str, str]) -> None:
 
 
 def read(folder: Path) -> dict[str, str]:
-    """Checksums by name. ResultsError naming the line that is none, or what is left out."""
+    """Checksums by name. ResultsError naming a malformed line, or a file that is omitted."""
     path = folder / NAME
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -72,10 +74,10 @@ def read(folder: Path) -> dict[str, str]:
 
 
 def altered(folder: Path) -> tuple[str, ...]:
-    """Names of files that are not those of the run, by their checksums.
+    """Names of files whose checksums differ from those of the run.
 
-    Fields of all nodes, which may be large and which nothing here reads, are only looked at for
-    being as long as they say. ResultsError for a file that is missing, cut or not of the run.
+    Fields of all nodes may be large and are not read here, so only their length is checked.
+    ResultsError for a file that is missing, truncated or not of the run.
     """
     sums = read(folder)
     for name in sorted(sums):
@@ -95,7 +97,7 @@ def altered(folder: Path) -> tuple[str, ...]:
 
 
 def _present(folder: Path) -> list[str]:
-    """Data files in a folder; a hidden one is being written."""
+    """Data files of a folder; hidden ones are still being written."""
     names = (path.name for path in folder.iterdir())
     return sorted(
         name for name in names if name in DATA or (name.endswith(FIELDS) and name[0] != ".")
@@ -103,7 +105,7 @@ def _present(folder: Path) -> list[str]:
 
 
 def _check_length(path: Path) -> None:
-    """An HDF5 file says in its head where it ends. ResultsError if it ends before that."""
+    """An HDF5 file states its length in its header. ResultsError if it is shorter."""
     with path.open("rb") as file:
         head = file.read(64)
     at = HDF5_END.get(head[8]) if len(head) == 64 and head.startswith(HDF5) else None

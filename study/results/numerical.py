@@ -10,11 +10,12 @@ from study.results.records import CurveErrors, ModelRecord
 def numerical_errors(
     reference: ModelRecord, models: Sequence[ModelRecord], probe: str, curve: str
 ) -> list[float | None]:
-    """Relative L2 errors of curves by steps and rounding, and by the reference's mesh and subspace.
+    """Relative L2 errors of curves: time step and rounding, mesh and subspace of the reference.
 
-    Their sum bounds, about, how far a relative L2 score of these models moves or their difference;
-    for other measures it is a yardstick. None stands for one that is not estimated. A spring
-    lattice is a model at its spacing and has none by its mesh.
+    Their sum approximately bounds the change of a relative L2 score of these models, or of their
+    difference; for other measures it is a yardstick. None stands for an error that is not
+    estimated. A spring lattice is a model at its spacing, and has no discretisation error of its
+    own here.
     """
     compared = [reference, *models]
     steps = [_of_curve(curve, model.time_step_errors.get(probe)) for model in compared]
@@ -39,7 +40,7 @@ def whole_error(parts: Sequence[float | None]) -> float | None:
 
 
 def _of_curve(curve: str, errors: CurveErrors | None) -> float | None:
-    """A loop of the phase plane has the larger of its two."""
+    """The error of a curve; the phase plane has the larger of its two."""
     if errors is None:
         return None
     found = {"displacement": errors.displacement, "velocity": errors.velocity}

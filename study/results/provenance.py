@@ -1,4 +1,4 @@
-"""What made a result: versions, commit, platform."""
+"""Provenance of results: versions, commit, platform."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def provenance(
 ) -> Provenance:
     """Versions, commit, platform, and hashes of the scene and of the files that it names.
 
-    `tissue`: that of `tissue_sha256`.
+    `tissue`: the hash of `tissue_sha256`.
     """
     return Provenance(
         versions={p: _version(p) for p in PACKAGES} | {"python": platform.python_version()},
@@ -52,10 +52,10 @@ def mesh_sha256(mesh: str | None) -> str | None:
 
 
 def organ_sha256(scene: Scene) -> str | None:
-    """SHA-256 of all files that a scene's organ is made of: its mesh, inclusions and map.
+    """SHA-256 of all files of a scene's organ: its mesh, inclusions and map of stiffness.
 
-    That of the mesh alone where there is no other; None without any. ValueError if one cannot be
-    read.
+    That of the mesh alone where there is no other file; None without any. ValueError if a file
+    cannot be read.
     """
     own = mesh_sha256(scene.organ.mesh)
     sums = _tissue_sums(scene)
@@ -63,7 +63,7 @@ def organ_sha256(scene: Scene) -> str | None:
 
 
 def tissue_files(scene: Scene) -> dict[str, str]:
-    """Files that a scene's tissue is made of, by their keys: meshes of inclusions, and the map."""
+    """Files of a scene's tissue by their keys: meshes of inclusions, and the map of stiffness."""
     named = {
         f"tissue.inclusion.{number}.mesh": one.mesh
         for number, one in enumerate(scene.tissue.inclusion, 1)
@@ -117,7 +117,7 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """Commit of the checkout this runs from, marked if it has changes; None elsewhere."""
+    """Commit of the checkout of this program, marked if it is modified; None without a checkout."""
     git = shutil.which("git")
     if git is None or not (ROOT / ".git").exists():
         return None
@@ -127,7 +127,7 @@ def _commit() -> str | None:
 
 
 def _processor() -> str | None:
-    """Name of the processor as Linux tells it."""
+    """Name of the processor, as reported by Linux."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,7 +1,7 @@
-"""What results.json says, as frozen records that writer and readers share.
+"""The content of results.json, as frozen records shared by writer and readers.
 
-Numbers are in SI units, errors relative in the L2 norm unless a name says otherwise; None where a
-model has no such number.
+Numbers are in SI units, errors relative in the L2 norm unless stated otherwise; None where a model
+has no such number.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class CurveOrders:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """A number that passes at or below its limit, and what it means."""
+    """A number that passes if it does not exceed its limit, and its meaning."""
 
     name: str
     value: float
@@ -38,7 +38,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether it is within its limit; one that is not a number is not."""
+        """Whether it is within its limit; NaN is not."""
         return self.value <= self.limit
 
 
@@ -74,7 +74,7 @@ class DiscretisationError:
 
 @dataclass(frozen=True, kw_only=True)
 class LargeStrain:
-    """What a hyperelastic solid at rest does otherwise than the linear one on the same mesh."""
+    """Differences of a hyperelastic solid at rest from the linear one on the same mesh."""
 
     law: str
     field_difference: float
@@ -84,14 +84,14 @@ class LargeStrain:
 
 @dataclass(frozen=True, kw_only=True)
 class CertifiedReduction:
-    """Bounds, not estimates, of what a subspace's motion is off all unknowns of its mesh.
+    """Certified bounds on the error of a reduced motion against the unreduced model.
 
-    Under the same load, linear over the same steps: of neither the mesh's nor the steps' error.
-    `energy`: largest bound of the error's energy norm over the largest of the motion; by control
-    point the bound of the displacement's error in relative L2 of its curve, and the largest
-    [m]. `rest`: of the energy norm under the full load at rest. `vectors`: of the Krylov space by
-    which the error is bounded; `rounding`: what rounding alone adds to `energy` where the whole
-    load comes at once.
+    For the same load, linear over the same steps; discretisation and time-step errors are not
+    included. `energy`: largest bound on the error's energy norm over the largest norm of the
+    motion; by control point the bound on the displacement error in relative L2 of its curve, and
+    the largest [m]. `rest`: of the energy norm at rest under the full load. `vectors`: dimension of
+    the Krylov space that bounds the error; `rounding`: contribution of rounding to `energy` where
+    the whole load is applied at once.
     """
 
     vectors: int
@@ -106,7 +106,7 @@ class CertifiedReduction:
 class ToolForceRecord:
     """The largest force on a moved tool, and relative L2 errors of the force over time.
 
-    By the mesh, the steps and the last quarter of the subspace; None where it is not estimated.
+    By the mesh, the time step and the last quarter of the subspace; None where not estimated.
     """
 
     peak_n: float
@@ -117,10 +117,10 @@ class ToolForceRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactRecord:
-    """What only finite elements under moved tools have, `forces` by the name of the tool.
+    """Contact of finite elements with moved tools, `forces` by the name of the tool.
 
-    `vertices` that may bear pressure; `penetration_m`: how deep any point of the surface was inside
-    a tool, for the surface is kept out in the mean over each vertex.
+    `vertices`: number of vertices that may carry pressure; `penetration_m`: deepest point of the
+    surface inside a tool, since contact is enforced in the mean over each vertex.
     """
 
     vertices: int
@@ -132,10 +132,10 @@ class ContactRecord:
 class ElementsRecord:
     """What only finite elements have.
 
-    `subspace_vectors` and `truncation`, of which `truncation_error` is the larger, are those of a
-    superposition, and so is `certified`, None where no bound was asked for or found;
-    `accuracy_missed`: the accuracy that was asked for and not reached. `law`: the hyperelastic law
-    of a motion at large strain, None of a linear one.
+    `subspace_vectors`, `truncation` and `certified` are those of a superposition;
+    `truncation_error` is the larger part of `truncation`, and `certified` None where no bound was
+    requested or found. `accuracy_missed`: the requested accuracy if it was not reached. `law`: the
+    hyperelastic law of a motion at large strain, None for a linear one.
     """
 
     element: str
@@ -160,8 +160,8 @@ class LatticeRecord:
     """What only a lattice of springs has.
 
     `smallest_step_margin`: smallest ratio of the critical step to the step taken; `poisson_ratio`:
-    None where the mesh decides it; `rounding_errors`: of steps in single precision against the same
-    in double, by control point, empty for steps in double.
+    None where the mesh determines it; `rounding_errors`: of steps in single precision against the
+    same in double, by control point, empty for steps in double.
     """
 
     springs: int
@@ -178,12 +178,12 @@ class LatticeRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class SpacingErrors:
-    """Estimated errors of a lattice by its spacing, from the same motion on a coarser one.
+    """Estimated discretisation errors of a lattice, from the same motion on a coarser one.
 
-    By Richardson's extrapolation from a lattice of `coarser_m`, with an assumed `order`; relative
-    L2 of the displacement by control point and of the force of each moved tool over time, and that
-    of the largest force, taken no smaller: two lattices may meet in one number by chance. Of the
-    discretisation alone: what springs cannot do at any spacing is not in it.
+    By Richardson extrapolation from a lattice of `coarser_m` with an assumed `order`: relative L2
+    of the displacement by control point and of the force of each moved tool over time, and that of
+    the largest force, which is not taken smaller, since single numbers of two lattices may
+    coincide. The model error of springs at any spacing is not included.
     """
 
     coarser_m: float
@@ -195,12 +195,12 @@ class SpacingErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class CorrectionRecord:
-    """What only a corrected lattice has: its coarse lattice, and what that leaves uncertain.
+    """What only a corrected lattice has: its coarse lattice, and the remaining uncertainty.
 
-    `remainder`: what the lattice does beyond itself linear, L2 by control point, and
-    `remainder_errors`: the estimated error of that by the lattice's spacing, from a lattice of
-    `compared_spacing_m`, None and empty where it is not estimated; both relative to the whole
-    motion. `vectors` of the linear lattice, and `truncation_error`: of its motion by them.
+    `remainder`: the nonlinear part of the lattice's motion, L2 by control point, and
+    `remainder_errors`: its estimated discretisation error, from a lattice of `compared_spacing_m`;
+    None and empty where not estimated; both relative to the whole motion. `vectors` of the
+    linearised lattice, and `truncation_error`: of its motion by them.
     """
 
     spacing_m: float
@@ -222,16 +222,15 @@ class PointRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelRecord:
-    """What a run says of every model, and in its last four of what it is made of.
+    """What a run states of every model; its last four fields are specific to a kind of model.
 
-    `label`: its name in print; `status`: finished, diverged or not finished, as which of the latter
-    it `ended_at_s` before its end, at 0 if it never began, and with `reason` and `remedy` if it is
-    not finished; `system`: the fuzzy system whose estimate it was given; `small_strain_modulus_pa`:
-    Young's modulus it has at small strain; `time_step_errors`: by control point, empty where they
-    are not estimated. `tool_force_errors`: relative L2 error of the force of each rigid tool, by
-    steps and mesh as far as they are estimated; `tool_overlap_m`: deepest overlap of body and
-    tools, None without tools. `spacing_errors`: of a lattice under more than one load of a given
-    force, None where they are not estimated.
+    `label`: its name in print; `status`: finished, diverged or not finished, with `ended_at_s` for
+    the latter two, 0 if the motion never began, and `reason` and `remedy` if it is not finished;
+    `system`: the fuzzy system that estimated its stiffness; `small_strain_modulus_pa`: its Young's
+    modulus at small strain; `time_step_errors`: by control point, empty where not estimated.
+    `tool_force_errors`: relative L2 error of the force of each rigid tool, by time step and mesh as
+    far as estimated; `tool_overlap_m`: deepest overlap of body and tools, None without tools.
+    `spacing_errors`: of a lattice under moved tools or several loads, None where not estimated.
     """
 
     name: str
@@ -277,12 +276,12 @@ class ModelRecord:
 
     @property
     def time_step_error(self) -> CurveErrors | None:
-        """The largest of any control point by the time step, None where it is not estimated."""
+        """The largest time-step error of any control point, None where not estimated."""
         return largest(self.time_step_errors) if self.time_step_errors else None
 
     @property
     def inverted_cells(self) -> int:
-        """How many cells of a lattice turned inside out, zero of other models."""
+        """Number of inverted cells of a lattice, zero for other models."""
         return 0 if self.lattice is None else self.lattice.inverted_cells
 
 
@@ -296,7 +295,7 @@ def largest(errors: dict[str, CurveErrors]) -> CurveErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class SystemEstimate:
-    """Stiffness that one fuzzy system estimates; `interval_pa` of type-2 only."""
+    """Stiffness estimated by one fuzzy system; `interval_pa` for type-2 only."""
 
     estimate_pa: float
     relative_to_reference: float
@@ -308,7 +307,7 @@ class SystemEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessSet:
-    """A linguistic set of stiffness, with the elastography it is placed by [kPa] and its source."""
+    """A linguistic set of stiffness, with the elastography that places it [kPa] and its source."""
 
     aetiology: str
     stage: str
@@ -332,7 +331,7 @@ class StiffnessSet:
 
 @dataclass(frozen=True, kw_only=True)
 class FuzzyRecord:
-    """What the fuzzy systems were and found; empty for a scene without them."""
+    """The fuzzy systems and their estimates; empty for a scene without them."""
 
     systems: dict[str, SystemEstimate]
     rule_count: int | None = None
@@ -342,7 +341,7 @@ class FuzzyRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class LatticeLimits:
-    """What springs cannot do at rest, whatever stiffness they are given.
+    """Errors of springs at rest that no stiffness removes.
 
     Relative L2 differences of the field from the reference: with its modulus, against a reference
     of Poisson ratio 1/4, at the best factor on the field, and with a volume term.
@@ -361,9 +360,9 @@ class LatticeLimits:
 class BudgetPart:
     """One cause in an error budget, all relative to the reference's norm at the peak.
 
-    `size`: L2 norm of this part; `contribution`: its projection on the whole difference, which may
-    be negative; contributions add up to the total. `left`: the difference that is left once this
-    and the causes before are mended. `error` of the part, None where it is not known.
+    `size`: L2 norm of this part; `contribution`: its projection on the total difference, which may
+    be negative; contributions add up to the total. `left`: the difference that remains after
+    removing this cause and those before. `error` of the part, None where unknown.
     """
 
     cause: str
@@ -375,9 +374,9 @@ class BudgetPart:
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBudget:
-    """What the field difference of a model from a reference at the peak is made of.
+    """The parts of the field difference between a model and a reference at the peak.
 
-    `total`: relative L2; `total_error`: the reference's own error by its mesh, if it is estimated.
+    `total`: relative L2; `total_error`: the reference's own discretisation error, if estimated.
     """
 
     model: str
@@ -389,7 +388,7 @@ class ErrorBudget:
 
 @dataclass(frozen=True, kw_only=True)
 class Dimensionless:
-    """Size of the organ, and numbers that show a mistaken unit before anything is run."""
+    """Size of the organ, and dimensionless numbers that reveal a wrong unit."""
 
     extent_m: float
     volume_m3: float
@@ -409,7 +408,7 @@ class ControlPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """What made the results; the study draws no random numbers, so `seed` is None.
+    """Provenance of the results; the study draws no random numbers, so `seed` is None.
 
     `tissue_sha256`: of all files of inclusions and the map of stiffness, None without any.
     """
@@ -429,8 +428,8 @@ class Provenance:
 class StageRecord:
     """A stage of a run: its wall time, when that was measured (UTC), and whether it was `kept`.
 
-    A kept stage was computed by an earlier run of this program here, and is not computed again;
-    stages may run side by side.
+    A kept stage was computed by an earlier run of this program here and read from the store. Stages
+    may run side by side.
     """
 
     name: str
@@ -441,12 +440,12 @@ class StageRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class ToolForce:
-    """Largest force [N] of a rigid tool on a model's body along its axis, when, and how deep.
+    """Largest axial force [N] of a rigid tool on a model's body, its time, and the tool's depth.
 
-    `relative_error` of the force over time, L2, None where it is not estimated: by the steps, of
-    finite elements by mesh and subspace too. `work_j`: what the tool did on the body up to the
-    end. `spacing_error` of the force over time by a lattice's spacing, estimated from a coarser
-    one; None of other models and where it is not estimated.
+    `relative_error` of the force over time, L2, None where not estimated: by the time step, and for
+    finite elements by mesh and subspace too. `work_j`: work of the tool on the body up to the end.
+    `spacing_error` of the force over time from a coarser lattice, None for other models and where
+    not estimated.
     """
 
     model: str
@@ -461,11 +460,11 @@ class ToolForce:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRecord:
-    """The whole of results.json but for the checksums of the other files.
+    """The content of results.json except for the checksums of the other files.
 
-    `references`: names of the models that the others are compared with, in order; `workers`: how
-    many processes its stages ran in side by side, which their wall times bear. `tools`: the force
-    of each rigid tool in each model, where there are any.
+    `references`: names of the models that the others are compared with, in order; `workers`: number
+    of processes that its stages ran in, which affects their wall times. `tools`: the force of each
+    rigid tool in each model, where there are any.
     """
 
     title: str

@@ -1,7 +1,7 @@
-"""The folder of a scene of which only the rest is wanted.
+"""The folder of a scene of which only the state at rest is required.
 
 rest.csv    displacement at the control points under the full load, and its estimated errors
-rest.vtu    displacement of the organ on the finest mesh, if the field is wanted
+rest.vtu    displacement of the organ on the finest mesh, if the field is required
 scene.toml  the scene that was solved
 """
 
@@ -26,10 +26,10 @@ Floats = NDArray[np.float64]
 
 
 class RestRow(NamedTuple):
-    """A control point at rest: rest.csv; estimated errors relative to its displacement.
+    """A control point at rest, a row of rest.csv; errors are relative to its displacement.
 
-    `along_push_m`: along the push of the tool; `mesh_error` with a factor of safety; the other
-    error is that of large displacements on a lattice, or of leaving them out.
+    `along_push_m`: along the push of the tool; `mesh_error` includes a factor of safety; the other
+    error is that of large displacements on a lattice, or of neglecting them.
     """
 
     probe: str
@@ -42,7 +42,7 @@ class RestRow(NamedTuple):
 
 
 def replacing(folder: Path) -> AbstractContextManager[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
     FolderError before the block if `folder` holds anything but a rest, or cannot be written.
     """

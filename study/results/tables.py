@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple, TypeVar, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 
 class CurveSample(NamedTuple):
@@ -59,9 +59,9 @@ class BandSample(NamedTuple):
 
 
 class CertifiedSample(NamedTuple):
-    """Bound of what a superposition's displacement is off all unknowns: certified.csv.
+    """Bound on the displacement error of a superposition against the unreduced model.
 
-    The length of the error, not only along the push, is at most this at that time.
+    A row of certified.csv. The magnitude of the error vector is at most this at that time.
     """
 
     model: str
@@ -125,8 +125,8 @@ class ScoreError(NamedTuple):
 class ScoreDifference(NamedTuple):
     """A model's score less that of another, each part of its error paired: score_differences.csv.
 
-    The same blocks, samples, windows and axes count for both, so that what moves both alike does
-    not count. `numerical`: sum of the relative errors of the three curves.
+    Blocks, samples, windows and axes are the same for both, so that what affects both alike
+    cancels. `numerical`: sum of the relative errors of the three curves.
     """
 
     model: str
@@ -200,6 +200,33 @@ def paired(keys: Sequence[Key]) -> Iterator[tuple[Key, Key]]:
     for place in dict.fromkeys(key[1:] for key in keys):
         yield from combinations([key for key in keys if key[1:] == place], 2)
 
+
+class TableFile(NamedTuple):
+    """A CSV table of a results folder: its file, the attribute of `Results`, and the kind of row.
+
+    `of_tools`: whether only scenes with rigid tools have it.
+    """
+
+    file: str
+    attribute: str
+    kind: type[Any]
+    of_tools: bool = False
+
+
+TABLES = (
+    TableFile("curves.csv", "curves", CurveSample),
+    TableFile("bands.csv", "bands", BandSample),
+    TableFile("certified.csv", "certified", CertifiedSample),
+    TableFile("tool_force.csv", "tool_forces", ToolForceSample, of_tools=True),
+    TableFile("tool_similarity.csv", "tool_scores", ToolForceScore, of_tools=True),
+    TableFile("similarity.csv", "scores", SimilarityScore),
+    TableFile("iso_18571.csv", "ratings", Iso18571Rating),
+    TableFile("score_errors.csv", "score_errors", ScoreError),
+    TableFile("score_differences.csv", "score_differences", ScoreDifference),
+    TableFile("errors.csv", "field_differences", FieldDifference),
+    TableFile("sensitivity.csv", "sensitivity", SensitivityEntry),
+)
+"""All CSV tables; a table is written, read and summed up by its line here."""
 
 Entry = TypeVar("Entry", bound=NamedTuple)
 

@@ -1,4 +1,4 @@
-"""A block of draws: stiffness that each fuzzy system gives, motions, and scores."""
+"""A block of draws: the stiffness that each fuzzy system gives, motions, and scores."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Floats = NDArray[np.float64]
 SAMPLES = 201
 KINDS = {"step": STEP, "ramp-hold-release": RAMP, "sinusoid": SINUSOID}
 CORNERS = (0.1, 0.7, 0.8)
-"""Of the span: ends of ramp, hold and release. The built-in scenes have the same shares."""
+"""Ends of ramp, hold and release over the time span, as in the built-in scenes."""
 PERIODS = 2.0
-"""Of a sinusoid in the span."""
+"""Periods of a sinusoid in the time span."""
 TABLE_II, RATIO = BasafaConstants(), Damping().ratio
 
 
@@ -44,7 +44,7 @@ def run(seed: int, size: int, first: int, count: int) -> dict[str, Plain]:
 
 
 def plain(found: Block) -> dict[str, Plain]:
-    """A block as lists that JSON can say; None for a score that there is none of."""
+    """A block as JSON lists; None for a score that does not exist."""
     scored = np.round(found.scores.reshape(len(found.scores), -1), 8)
     return {
         "estimates": np.round(found.estimates, 2).tolist(),
@@ -53,7 +53,7 @@ def plain(found: Block) -> dict[str, Plain]:
 
 
 def evaluated(drawn: Sequence[Draw]) -> Block:
-    """Estimates and scores of draws; a score is NaN where a motion diverged or cannot be scored."""
+    """Estimates and scores of draws; NaN where a motion diverged or cannot be scored."""
     moduli = estimates(drawn)
     found = np.full((len(drawn), len(SYSTEMS), len(COLUMNS)), np.nan)
     for i, draw in enumerate(drawn):

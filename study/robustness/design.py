@@ -1,4 +1,4 @@
-"""The draws: Saltelli's design for Sobol's indices, on SciPy's scrambled Sobol points."""
+"""The draws: Saltelli's design for Sobol indices, on SciPy's scrambled Sobol points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 def check_size(size: int) -> None:
-    """ValueError unless a size is a power of two, as the points are even only so."""
+    """Raise ValueError unless the size is a power of two, as balanced Sobol points need."""
     if size < 2 or size & (size - 1):
         raise ValueError(f"size: {size} is no power of two; give 256, 4096 or the like")
 
@@ -21,9 +21,8 @@ def check_size(size: int) -> None:
 def shares(seed: int, size: int, unknowns: Sequence[Unknown] = UNKNOWNS) -> Floats:
     """Shares (size, groups + 2, unknowns) of the unknowns' ranges.
 
-    Of each row the first two are points A and B that have nothing to do with each other; the others
-    are A with the values of one group of unknowns taken from B. ValueError unless `size` is a power
-    of two.
+    The first two points of each row are the independent points A and B; the others are A with the
+    values of one group of unknowns taken from B. ValueError unless `size` is a power of two.
     """
     from scipy.stats import qmc
 

@@ -1,4 +1,4 @@
-"""What the coarseness of lattices does to a ranking: draws repeated on finer ones."""
+"""The effect of lattice discretisation on a ranking: draws repeated on finer lattices."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from study.robustness.summary import TIE, wilson
 Floats = NDArray[np.float64]
 
 TIMES = 2.0
-"""How many times finer: the error of the spacing falls to a quarter to a half."""
+"""Refinement factor: the discretisation error falls to between a quarter and a half."""
 
 
 def changes(
     coarse: Floats, fine: Floats, columns: Sequence[tuple[str, str]], times: float = TIMES
 ) -> Iterator[Finer]:
-    """A row a measure, of scores (draws, contenders, measures) of the same draws on both lattices.
+    """A row per measure, from scores (draws, contenders, measures) of the same draws on both.
 
-    Draws with a motion that diverged on either are left out; there are no rows without any left.
+    Draws in which a motion diverged on either lattice are omitted; there are no rows if none
+    remain.
     """
     whole = np.isfinite(coarse).all(axis=(1, 2)) & np.isfinite(fine).all(axis=(1, 2))
     for m, column in enumerate(columns):
@@ -45,6 +46,6 @@ def changes(
 
 
 def _lead(scores: Floats) -> Floats:
-    """Of the highest score over the next, (draws,)."""
+    """Highest score minus the next, (draws,)."""
     ordered = np.sort(scores, axis=1)
     return np.asarray(ordered[:, -1] - ordered[:, -2])

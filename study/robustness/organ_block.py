@@ -19,10 +19,11 @@ from study.robustness.block import Block, plain
 from study.robustness.design import shares
 from study.robustness.organ_unknowns import OrganDraw, as_drawn, draws, unknowns
 from study.robustness.patient import SYSTEMS, estimates, readings
-from study.run.stated import stated
+from study.run.scene_problem import scene_problem
 from study.scene import Place, Scene
 from study.scene.place import resolve
 from study.scene.problem import problem_of
+from study.scene.travel import OffSurfaceError, travelling
 from study.similarity.batch import COLUMNS, scores
 from study.similarity.fields import norm, relative_l2
 from study.sweep.canonical import Plain
@@ -37,19 +38,19 @@ FIELD = ("field", "relative-l2")
 MEASURED = (*COLUMNS, FIELD)
 """Curve and measure of every score: means over control points, then the field at the peak."""
 SAMPLES = 201
-"""At most: a score of more changes by less than its interval."""
+"""Largest number of samples: more change a score by less than its interval."""
 SIZES = 5.0
-"""Spacings in the cube root of the organ's volume, where none is asked for."""
+"""Default number of spacings in the cube root of the organ's volume."""
 DIVERGED = np.full(len(MEASURED), np.nan)
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A row of a design, `points` of it, on an organ.
+    """A row of a design, with `points` draws, on an organ.
 
-    `spacing` [m] about which the lattices' are drawn; `finer`: how many times finer each draw's own
-    is taken. How many rows the design has is not asked: those of a smaller one are among them, so
-    that a study is made larger without drawing them again.
+    `spacing` [m] about which the lattices' are drawn; `finer`: refinement factor on each draw's own
+    spacing. The size of the design is not part of it: the rows of a smaller design are among those
+    of a larger one, so that a study can be enlarged without repeating them.
     """
 
     seed: int
@@ -67,7 +68,7 @@ class Asked:
 
 
 def prepared(scene: Scene) -> Scene:
-    """The scene as every draw has it: the models that are compared, on cubic lattices.
+    """The scene as used by every draw: the models that are compared, on cubic lattices.
 
     ValueError naming the key of a scene that has nothing to draw.
     """
@@ -92,7 +93,7 @@ def prepared(scene: Scene) -> Scene:
 
 
 def _direction(scene: Scene) -> tuple[float, float, float]:
-    """The push of the scene, which a tool that is moved keeps."""
+    """The push of the scene, which a moved tool keeps."""
     x, y, z = map(float, problem_of(scene).tool.direction)
     return x, y, z
 
@@ -104,21 +105,21 @@ def usual_spacing(problem: Problem) -> float:
 
 def run(asked: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
     """Estimates and scores of a row of the design, as plain lists."""
-    given = stated(scene, mesh_sha256)
+    given = scene_problem(scene, mesh_sha256)
     return plain(evaluated(Asked(**asked).draws(), given.scene, _seen(given.problem)))
 
 
 def _seen(problem: Problem) -> Problem:
-    """The problem with next to nothing of the surface looked at."""
+    """The problem with almost no observation of the surface."""
     surface = problem.observation.surface_points[:1]
     return replace(problem, observation=replace(problem.observation, surface_points=surface))
 
 
 def evaluated(drawn: Sequence[OrganDraw], scene: Scene, problem: Problem) -> Block:
-    """Estimates and scores of draws; NaN where a motion diverged, or its cells are inside out.
+    """Estimates and scores of draws; NaN where a motion diverged or cells inverted.
 
-    Or where a body finds no rest under its weight. Gravity, weights and further loads are those of
-    the scene in every draw.
+    Also where a body has no rest under its weight, or the path of a tool that travels leaves the
+    surface. Gravity, weights and further loads are those of the scene in every draw.
     """
     moduli = estimates(drawn)
     found = [
@@ -131,11 +132,11 @@ def evaluated(drawn: Sequence[OrganDraw], scene: Scene, problem: Problem) -> Blo
 def _scores(draw: OrganDraw, moduli: Mapping[str, float], scene: Scene, problem: Problem) -> Floats:
     """Scores (contenders, measures) of a draw."""
     drawn = as_drawn(replace(scene, patient=replace(scene.patient, **_patient(draw))), draw)
-    posed = _posed(draw, drawn, problem)
     models = models_of(drawn, {name: _estimate(name, e) for name, e in moduli.items()})
     try:
+        posed = _posed(draw, drawn, problem)
         found = {model.name: model.prepare(posed).simulate() for model in models}
-    except NoEquilibriumError:
+    except (NoEquilibriumError, OffSurfaceError):
         return np.tile(DIVERGED, (len(CONTENDERS), 1))
     truth = found.pop("basafa")
     named = {READING: found[READING]} | {name: found[f"msm-{name}"] for name in SYSTEMS}
@@ -147,32 +148,34 @@ def _patient(draw: OrganDraw) -> dict[str, float | None]:
 
 
 def _estimate(system: str, modulus: float) -> StiffnessEstimate:
-    """Without its interval, at whose ends nothing is moved."""
+    """Without its interval, since the bounds are not run."""
     return StiffnessEstimate(system, modulus, None, 0.0, (), "")
 
 
 def _posed(draw: OrganDraw, drawn: Scene, problem: Problem) -> Problem:
     """The problem with tool, support and tissue of a draw."""
-    tool, tissue = problem.tool, drawn.tissue
-    return replace(
+    own, tissue = drawn.tool, drawn.tissue
+    centre = _moved(draw, problem)
+    tool = replace(problem.tool, centre=centre, radius=own.radius, force=own.force)
+    posed = replace(
         problem,
         foundation=problem.foundation.scaled(draw.support),
-        tool=replace(
-            tool,
-            centre=_moved(draw, problem),
-            radius=drawn.tool.radius,
-            force=drawn.tool.force,
-        ),
+        tool=tool,
         tissue=replace(
             problem.tissue,
             youngs_modulus=tissue.youngs_modulus,
             poisson_ratio=tissue.poisson_ratio,
         ),
     )
+    if not own.travels:
+        return posed
+    first, *others = travelling(own, tool, problem.geometry.surface)
+    further = (load for load in problem.loads if load.tool.name != tool.name)
+    return replace(posed, tool=first.tool, factor=first.factor, loads=(*others, *further))
 
 
 def _moved(draw: OrganDraw, problem: Problem) -> Floats:
-    """Centre [m] (3,) of the tool, moved across its push and back onto the surface."""
+    """Centre [m] (3,) of the tool, shifted across its push and projected onto the surface."""
     tool = problem.tool
     first = np.cross(tool.direction, np.eye(3)[int(np.abs(tool.direction).argmin())])
     first /= np.linalg.norm(first)
@@ -182,7 +185,7 @@ def _moved(draw: OrganDraw, problem: Problem) -> Floats:
 
 
 def _compared(problem: Problem, found: Simulation, truth: Simulation) -> Floats:
-    """Scores (measures,) of a motion, NaN unless both are whole."""
+    """Scores (measures,) of a motion, NaN unless both motions finished."""
     runs = found.trajectory, truth.trajectory
     if found.inverted_cells or truth.inverted_cells or not all(map(_is_whole, runs)):
         return DIVERGED

@@ -1,4 +1,4 @@
-"""`robustness SCENE`: draws of an organ run in blocks, kept, and summed up."""
+"""`robustness SCENE`: draws of an organ, run in blocks, stored and summarised."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from study.robustness.organ_block import (
 from study.robustness.organ_unknowns import unknowns
 from study.robustness.ranges import write_ranges
 from study.robustness.unknowns import groups
-from study.run.stated import arguments, stated
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.canonical import Plain
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 from study.sweep.task import Task
 
 Floats = NDArray[np.float64]
@@ -45,15 +45,15 @@ NEAREST, DIFFERENCES, INDICES, FINER, RANGES = FILES = (
     "organ_unknowns.csv",
 )
 POINTS_APART = 2
-"""Of a row, those that have no unknown in common."""
+"""Number of points of a row that share no unknown."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OrganRequest:
-    """A scene with overrides, the size of the design and its seed, and where to write and run.
+    """A scene with overrides, the size and seed of the design, and where to write and run.
 
-    `spacing` [m]: about which those of the lattices are drawn; `again`: how many draws are repeated
-    on lattices twice as fine.
+    `spacing` [m]: about which those of the lattices are drawn; `again`: number of draws that are
+    repeated on lattices twice as fine.
     """
 
     scene: str
@@ -77,30 +77,30 @@ class OrganRequest:
         return Store(self.folder.with_name(f"{self.folder.name}-runs"))
 
     @property
-    def how(self) -> How:
+    def backend(self) -> Backend:
         """Where to run."""
-        return How(self.workers, self.scheduler)
+        return Backend(self.workers, self.scheduler)
 
     @cached_property
     def given(self) -> Plain:
-        """The scene as every draw has it, as plain values. ValueError of one that will not do."""
+        """The scene as used by every draw, as plain values. ValueError if it is unsuitable."""
         scene = read_suited(self.scene, self.overrides)
         _refuse_moved(scene)
-        return arguments(prepared(scene))
+        return scene_arguments(prepared(scene))
 
     @cached_property
     def about(self) -> float:
-        """Spacing [m] that the lattices have about."""
-        return self.spacing or usual_spacing(stated(**self.given).problem)
+        """Spacing [m] about which the lattices' are drawn."""
+        return self.spacing or usual_spacing(scene_problem(**self.given).problem)
 
     def tasks(self) -> list[Task]:
-        """A task a row of the design. ValueError unless the size is a power of two."""
+        """A task per row of the design. ValueError unless the size is a power of two."""
         check_size(self.size)
         points = len(groups(unknowns(self.about))) + POINTS_APART
         return [self._task(row, points) for row in range(self.size)]
 
     def again_tasks(self) -> list[Task]:
-        """The first draw of the first rows once more, on finer lattices. ValueError below none."""
+        """The first draw of the first rows again, on finer lattices. ValueError if negative."""
         if self.again < 0:
             raise ValueError(f"again: {self.again} is negative; give how many draws are repeated")
         return [self._task(row, 1, TIMES) for row in range(min(self.again, self.size))]
@@ -111,12 +111,7 @@ class OrganRequest:
 
 
 def _refuse_moved(scene: Scene) -> None:
-    """ValueError for tools that are moved, whose force or place a draw cannot change."""
-    if "travelling-loads" in scene.features:
-        raise ValueError(
-            "robustness: a draw changes place and radius of a tool, and the scene has one that "
-            "travels; leave out its path, or use run"
-        )
+    """Raise ValueError for moved tools, whose force a draw cannot change."""
     if "moved-tools" in scene.features:
         raise ValueError(
             "robustness: a draw changes place and force of a blunt tool, and the scene has rigid "
@@ -125,36 +120,36 @@ def _refuse_moved(scene: Scene) -> None:
 
 
 def planned(request: OrganRequest) -> str:
-    """What a request would run, and for how long. ValueError of one that cannot be run."""
-    _ = request.how
+    """What a request would run, and for how long. ValueError if it cannot be run."""
+    _ = request.backend
     return str(plan([*request.tasks(), *request.again_tasks()], request.store))
 
 
 @dataclass(frozen=True)
 class Found:
-    """The draws over the design, and what finer lattices change of some."""
+    """The draws over the design, and the changes of some on finer lattices."""
 
     draws: summary.Draws
     finer: tuple[rows.Finer, ...]
 
 
-def study(request: OrganRequest, progress: Tell = silent) -> Found:
-    """Who is nearest to the benchmark in each draw; all tables are written to the folder.
+def study(request: OrganRequest, progress: ReportStatus = silent) -> Found:
+    """The nearest contender to the benchmark in each draw; all tables are written to the folder.
 
     Raises ValueError for a scene with nothing to draw, a size that is no power of two, a folder
     that cannot be written, or a block that failed.
     """
-    how = request.how
+    backend = request.backend
     tasks, again = request.tasks(), request.again_tasks()
     request.folder.mkdir(parents=True, exist_ok=True)
-    outcomes = run([*tasks, *again], request.store, how, progress)
+    outcomes = run([*tasks, *again], request.store, backend, progress)
     found = _found(gathered(outcomes), len(tasks), request.about)
     _write(found, request)
     return found
 
 
 def gathered(outcomes: Sequence[Outcome]) -> list[Plain]:
-    """What every block found. ValueError of the first that failed."""
+    """The values of every block. ValueError for the first that failed."""
     values = [outcome.value for outcome in outcomes if outcome.value is not None]
     failed = [outcome for outcome in outcomes if outcome.value is None]
     if failed:
@@ -193,13 +188,13 @@ def _write(found: Found, request: OrganRequest) -> None:
 
 
 def lines(found: Found, request: OrganRequest) -> list[str]:
-    """What is printed beside the sentences of the tables: the lattices, and what diverged."""
+    """What is printed beside the sentences of the tables: the lattices, and divergences."""
     draws = found.draws
     size = len(draws.scores) * draws.scores.shape[1]
     told = [f"{size} draws on lattices of about {1e3 * request.about:.3g} mm"]
     if draws.lost:
         told.append(
-            f"in {100 * draws.lost:.1f} % a motion diverged or cells turned inside out: they count "
-            "for no one"
+            f"in {100 * draws.lost:.1f} % a motion diverged, cells turned inside out or a way left "
+            "the surface: they count for no one"
         )
     return told

@@ -1,4 +1,4 @@
-"""What is open of an organ under a tool, each with a range about its scene and a reason."""
+"""The unknowns of an organ under a tool, each with a range about its scene and a reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from study.scene import Scene
 Floats = NDArray[np.float64]
 
 TABLE_II, EVALUATION, PLACE = "table_ii", "evaluation", "tool_place"
-"""Groups of unknowns that change together: printed digits, how systems are evaluated, the tool."""
+"""Groups of unknowns that vary together: printed digits, evaluation of the systems, the tool."""
 OF_PATIENT = ("stiffness", "disagreement", "aetiologies", "knowledge")
 OF_SYSTEMS = (
     "placed",
@@ -29,15 +29,15 @@ OF_SYSTEMS = (
     "reducer",
 )
 ABOUT = 0.2
-"""Share of the spacing by which a draw's is finer or coarser."""
+"""Share by which the spacing of a draw is finer or coarser."""
 NEARLY_INCOMPRESSIBLE = 0.49
 
 
 class OrganDraw(NamedTuple):
     """A value of every unknown, in SI units; see `unknowns`.
 
-    `force`, `radius`, `support` and `damping` are factors on the scene's, and `k1` to `gamma_1` on
-    Table II; `across` and `along` move the tool by shares of its radius.
+    `force`, `radius`, `support` and `damping` are factors on the scene's values, and `k1` to
+    `gamma_1` on Table II; `across` and `along` shift the tool by shares of its radius.
     """
 
     stiffness: float
@@ -69,7 +69,7 @@ class OrganDraw(NamedTuple):
 
 
 def unknowns(spacing: float) -> tuple[Unknown, ...]:
-    """All of them for lattices of about a spacing [m], in the order of OrganDraw."""
+    """All unknowns for lattices of about a spacing [m], in the order of OrganDraw."""
     shared = {one.name: one for one in UNKNOWNS}
     return (
         *(shared[name] for name in OF_PATIENT),
@@ -107,7 +107,7 @@ def unknowns(spacing: float) -> tuple[Unknown, ...]:
 
 
 def _table_ii() -> tuple[Range, ...]:
-    """Its constants within the rounding of the digits that the paper prints of them."""
+    """The constants of Table II within the rounding of their printed digits."""
     rounding = {"k1": 0.1, "k2": 0.5, "x_c": 0.25, "gamma_0": 0.25, "gamma_1": 0.5}
     return tuple(
         Range(
@@ -130,7 +130,7 @@ def draws(shares: Floats, of: Sequence[Unknown]) -> list[OrganDraw]:
 
 
 def as_drawn(scene: Scene, draw: OrganDraw) -> Scene:
-    """The scene of a draw but for the tool's place and what depends on the patient."""
+    """The scene of a draw, except for the tool's place and what depends on the patient."""
     table, damping = scene.basafa, scene.damping
     return replace(
         scene,

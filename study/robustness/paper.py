@@ -1,4 +1,4 @@
-"""What the paper prints of its rules and its ranking, and the sources of what it leaves out."""
+"""The paper's printed rules and ranking, and the sources of what it leaves out."""
 
 from fuzzy.liver.knowledge import rows
 

@@ -23,7 +23,7 @@ SYSTEMS = ("mamdani", "sugeno", "interval-type-2")
 
 
 Drawn = Draw | OrganDraw
-"""What says the same of patient and fuzzy systems, under the same names."""
+"""Draws that have patient and fuzzy systems under the same names."""
 
 
 def estimates(drawn: Sequence[Drawn]) -> Floats:
@@ -32,7 +32,7 @@ def estimates(drawn: Sequence[Drawn]) -> Floats:
 
 
 def _estimates(drawn: Sequence[Drawn], system: str) -> Floats:
-    """Stiffness [Pa] (n,); draws with the same settings are answered together."""
+    """Stiffness [Pa] (n,); draws with the same settings are evaluated together."""
     groups = defaultdict[tuple[LiverSettings, tuple[str, ...]], list[int]](list)
     for i, draw in enumerate(drawn):
         settings = _settings(draw, system)
@@ -80,7 +80,7 @@ def _readings(draw: Drawn) -> list[float]:
 
 
 def readings(draw: Drawn) -> dict[str, float]:
-    """The readings [Pa] there are: every other one larger or smaller by the disagreement."""
+    """The existing readings [Pa], alternately larger and smaller by the disagreement."""
     low, high = (parameters()[key] * 1e3 for key in ("input_low", "input_high"))
     names = draw.aetiologies
     off = [

@@ -1,4 +1,4 @@
-"""The table of unknowns: what is drawn, and from where."""
+"""The table of unknowns: their ranges and sources."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from study.robustness.unknowns import Unknown
 
 
 def write_ranges(path: Path, unknowns: Iterable[Unknown]) -> None:
-    """Write a row an unknown: its name, range and meaning."""
+    """Write a row per unknown: its name, range and meaning."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file)
         table.writerow(("unknown", "range", "meaning"))

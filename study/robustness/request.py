@@ -1,4 +1,4 @@
-"""`robustness` as the command line asks for it: draws run in blocks, kept, and summed up."""
+"""The command `robustness` on the control point: draws run in blocks, stored and summarised."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from study.robustness.unknowns import UNKNOWNS, Draw, draws
 from study.scene.file import read_scene
 from study.similarity.batch import COLUMNS
 from study.sweep.plan import plan
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
+from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tell, silent
 from study.sweep.task import Task
 
 SCENE = "paper"
-"""Whose reference spacing is varied alone."""
+"""The scene whose reference spacing is varied alone."""
 BLOCK = 32
-"""Rows of the design in a block: some seconds."""
+"""Rows of the design per block, which take some seconds."""
 NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES, SPACING = (
     "ranking_nearest.csv",
     "ranking_differences.csv",
@@ -41,7 +41,7 @@ FILES = (NEAREST, DIFFERENCES, TABLE_III, INDICES, DRAWN, RANGES, SPACING)
 
 @dataclass(frozen=True, kw_only=True)
 class RobustnessRequest:
-    """How many rows the design has, a power of two, its seed, the folder to write, where to run."""
+    """Rows of the design, a power of two, its seed, the folder to write, where to run."""
 
     size: int = 4096
     seed: int = 0
@@ -60,7 +60,7 @@ class RobustnessRequest:
         return Store(self.folder.with_name(f"{self.folder.name}-runs"))
 
     def tasks(self) -> list[Task]:
-        """A task a block. ValueError unless the size is a power of two."""
+        """A task per block. ValueError unless the size is a power of two."""
         check_size(self.size)
         return [
             Task(
@@ -81,16 +81,16 @@ def planned(request: RobustnessRequest) -> str:
     return str(plan(request.tasks(), request.store))
 
 
-def study(request: RobustnessRequest, progress: Tell = silent) -> list[rows.Nearest]:
+def study(request: RobustnessRequest, progress: ReportStatus = silent) -> list[rows.Nearest]:
     """How often each system is nearest to the benchmark; all tables are written to the folder.
 
     Raises ValueError for a size that is no power of two, a folder that cannot be written, or a
     block that failed.
     """
-    how = How(request.workers, request.scheduler)
+    backend = Backend(request.workers, request.scheduler)
     tasks = request.tasks()
     request.folder.mkdir(parents=True, exist_ok=True)
-    found = _gathered(run(tasks, request.store, how, progress))
+    found = _gathered(run(tasks, request.store, backend, progress))
     nearest, table_iii = list(summary.nearest(found)), list(summary.table_three(found))
     write_table(request.folder / NEAREST, rows.Nearest, nearest)
     write_table(request.folder / DIFFERENCES, rows.Difference, summary.differences(found))
@@ -131,14 +131,14 @@ def _drawn(
 
 
 def in_words(value: object) -> str:
-    """A drawn value, those of several parts joined."""
+    """A drawn value as text, joined if it has several parts."""
     if isinstance(value, tuple):
         return " ".join(map(str, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def lines(found: Sequence[rows.Nearest]) -> list[str]:
-    """A line a measure: the share of draws in which each system is nearest to the benchmark."""
+    """A line per measure: the share of draws in which each system is nearest to the benchmark."""
     count = found[0].draws
     told = [f"nearest to the benchmark in {count} draws of {len(UNKNOWNS)} unknowns:"]
     for curve, measure in COLUMNS:

@@ -1,4 +1,4 @@
-"""Rows of the tables that the study of the unknowns writes."""
+"""Rows of the tables of the robustness study."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 
 class Nearest(NamedTuple):
-    """How often a system has the highest score by a measure, as a share of draws.
+    """Share of draws in which a system has the highest score by a measure.
 
     `low`, `high`: its 95 % interval by Wilson's formula. `tied`: share of all draws in which the
-    two highest scores are closer than TIE, which count for no system.
+    two highest scores differ by less than TIE, which count for no system.
     """
 
     curve: str
@@ -23,10 +23,10 @@ class Nearest(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """Distribution of the score of one system less that of another over the draws.
+    """Distribution of the score of one system minus that of another over the draws.
 
-    Percentiles; then the share of draws in which they lie no further apart than the paper's own
-    difference of these two, and that in which they have the paper's sign.
+    Percentiles; then the share of draws in which the difference does not exceed the paper's own,
+    and the share in which it has the paper's sign.
     """
 
     curve: str
@@ -44,11 +44,11 @@ class Difference(NamedTuple):
 
 
 class TableThree(NamedTuple):
-    """How near draws come to all three scores of Table III at once, by a measure.
+    """How closely draws reproduce all three scores of Table III at once, by a measure.
 
     `nearest`: largest deviation of the best draw, whose number is `draw`; then counts of draws
     whose largest deviation is at most what the name says, and how many of the last have the paper's
-    order of systems.
+    order.
     """
 
     curve: str
@@ -63,7 +63,7 @@ class TableThree(NamedTuple):
 
 
 class Index(NamedTuple):
-    """Sobol's first-order and total index of an output on an unknown, with 95 % intervals."""
+    """First-order and total Sobol index of an output for an unknown, with 95 % intervals."""
 
     curve: str
     measure: str
@@ -100,9 +100,9 @@ class AtSpacing(NamedTuple):
 
 
 class Finer(NamedTuple):
-    """What finer lattices change, by a measure, over draws repeated on them.
+    """Changes on finer lattices, by a measure, over draws repeated on them.
 
-    `changed`: share of the draws in which another contender is nearest, ties left out on either
+    `changed`: share of the draws in which another contender is nearest, without ties on either
     side, with its 95 % interval; `lead` and `moved`: medians of the lead of the nearest, and of the
     largest change of any contender's score.
     """

@@ -1,1 +1,1 @@
-"""Wiring: from a scene through every model it names to results."""
+"""The run of a scene: its stages, models, comparisons and results."""

@@ -1,16 +1,16 @@
-"""The readings adopted where the paper is silent or cannot be taken literally, as sentences."""
+"""The interpretations adopted where the paper is silent or ambiguous, as sentences."""
 
 from __future__ import annotations
 
 from study.models import table
 from study.problem.supports import CLAMPED, FOUNDATION
-from study.problem.way import APART, MEASURED
+from study.problem.tool_travel import APART, MEASURED
 from study.results.records import ControlPoint
 from study.scene import Scene, Support
 
 
 def assumptions(scene: Scene, point: ControlPoint | None) -> tuple[str, ...]:
-    """Every reading in force in a scene, one sentence each: of the scene, then of its models."""
+    """Every interpretation in force, one sentence each: of the scene, then of its models."""
     own = _organ(scene) if point is None else _point(scene, point.mass_kg)
     return (*own, *table.assumptions(scene), *_similarity())
 
@@ -43,7 +43,7 @@ def _organ(scene: Scene) -> list[str]:
 
 
 def _travelling(scene: Scene) -> list[str]:
-    """On tools that travel, and what stands for them."""
+    """On tools that travel, and the loads that represent them."""
     if not any(tool.travels for tool in scene.tools):
         return []
     return [
@@ -70,7 +70,7 @@ def _given(scene: Scene) -> str:
 
 
 def _held(support: Support) -> str:
-    """On what holds the organ, and what each model makes of it."""
+    """On what holds the organ, and how each model represents it."""
     where = (
         f"its {support.side} surface"
         if support.place is None
@@ -90,7 +90,7 @@ def _held(support: Support) -> str:
 
 
 def _tissue(scene: Scene) -> list[str]:
-    """On tissue that differs from place to place."""
+    """On heterogeneous tissue."""
     if "inclusions" not in scene.features:
         return []
     found = [

@@ -1,8 +1,9 @@
-"""What the difference of a lattice from its references is made of: an error budget.
+"""Error budget: what the difference of a lattice from its references consists of.
 
-One thing after another is mended in the lattice, and each motion compared with the one before. The
-differences are vectors and add up to the whole; what one has to do with the size of the whole is
-its projection on it, and these add up too. What nothing named explains is left as a remainder.
+The causes of error are removed from the lattice one after another, and each motion is compared with
+the one before. The differences are vectors that add up to the total difference. The contribution of
+a cause is the projection of its difference on the total; contributions add up to the norm of the
+total. What no named cause explains remains as a remainder.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ SPACING, TIME_STEP, DAMPING, REMAINDER = "lattice spacing", "time step", "dampin
 class Difference:
     """A part [m] (q, 3) of the difference of two displacement fields, by its cause.
 
-    `error`: of this part, relative to the reference's norm, None where it is not known.
+    `error`: of this part, relative to the norm of the reference, None where it is unknown.
     """
 
     cause: str
@@ -50,12 +51,13 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Mending:
-    """Displacement [m] (q, 3) at the peak as a lattice is mended: the stiffness first, then causes.
+class Attribution:
+    """Displacement fields [m] (q, 3) at the peak as causes of error are removed from a lattice.
 
-    `last`: what is left of the way to the reference once these are mended, at rest for finite
-    elements, at the peak, with its damping, for a lattice. `nodes`: how many it has; one of others
-    differs by its cells too.
+    `fields`: with the reference's stiffness, then after removing each of the `causes` in turn.
+    `last`: the lattice without any of them, at rest when the reference is finite elements; with the
+    damping of the reference, at the peak, when it is a lattice. `nodes`: number of nodes; the
+    budget of a lattice with another number would have an additional cause, its cells.
     """
 
     causes: tuple[str, ...]
@@ -65,184 +67,195 @@ class Mending:
 
     @property
     def finished(self) -> bool:
-        """Whether the lattice did not diverge as it was mended."""
+        """Whether none of the modified lattices diverged."""
         return all(np.isfinite(field).all() for field in (*self.fields, self.last))
 
 
 @dataclass(frozen=True)
-class Mended:
-    """The displacement (q, 3) at the peak once the stiffness is right, and the other parts."""
+class Decomposition:
+    """The displacement (q, 3) at the peak with the correct stiffness, and the remaining parts."""
 
     field: Floats
     others: tuple[Difference, ...]
 
 
-def mending(lattice: PreparedLattice, reference: Prepared) -> Mending:
-    """A lattice mended toward a reference, a lattice or else finite elements.
+def attribution(lattice: PreparedLattice, reference: Prepared) -> Attribution:
+    """Remove the causes of error of a lattice toward a reference, a lattice or finite elements.
 
-    ValueError for a lattice that there cannot be.
+    ValueError for a modified lattice that cannot be built.
     """
-    short = replace(lattice, problem=_until_peak(lattice.problem))
+    short = replace(lattice, problem=_until_peak_load(lattice.problem))
     if isinstance(reference, PreparedLattice):
         return _toward_benchmark(short, reference)
     return _toward_elements(short)
 
 
 def error_budgets(
-    mendings: Mapping[str, Mending],
+    attributions: Mapping[str, Attribution],
     runs: Mapping[str, ModelRun],
     rest: Mapping[str, Floats],
     volumes: Floats,
 ) -> tuple[ErrorBudget, ...]:
-    """Budgets of the lattices that are no reference, against those that a lattice is mended toward.
+    """Error budgets of the lattices, against each reference that has an attribution.
 
-    Of the models that finished and have the nodes of the one that was mended; there is none where a
-    lattice diverges as it is mended. `rest`: displacement [m] (q, 3) of finite elements at rest, by
-    name.
+    Lattices that are references have none, nor do models that did not finish, lattices with other
+    nodes than the attributed one, or attributions in which a lattice diverged. `rest`: displacement
+    [m] (q, 3) of the finite elements at rest, by name.
     """
     sound = {n: run for n, run in runs.items() if run.trajectory.status == "finished"}
     found = list[ErrorBudget]()
-    for name in (n for n, way in mendings.items() if n in sound and way.finished):
-        reference, way = sound[name], mendings[name]
-        mended = Mended(way.fields[0], (*_differences(way), *_last(way, reference, rest.get(name))))
+    for name in (n for n, way in attributions.items() if n in sound and way.finished):
+        reference, way = sound[name], attributions[name]
+        decomposition = Decomposition(
+            way.fields[0], (*_differences(way), *_final_parts(way, reference, rest.get(name)))
+        )
         found += [
-            _budget(run, reference, mended, volumes)
+            _budget(run, reference, decomposition, volumes)
             for n, run in sound.items()
-            if run.record.lattice is not None and n not in mendings
+            if run.record.lattice is not None and n not in attributions
             if run.record.nodes == way.nodes
         ]
     return tuple(found)
 
 
-def _until_peak(problem: Problem) -> Problem:
-    """The same problem as far as the peak of its load, the only frame that is kept."""
+def _until_peak_load(problem: Problem) -> Problem:
+    """The same problem up to the peak of its load, the only frame that is recorded."""
     seen = problem.observation
     peak = seen.frames[0]
     return replace(problem, observation=replace(seen, times=seen.times[: peak + 1], frames=(peak,)))
 
 
-def _peak(run: ModelRun) -> Floats:
+def _peak_field(run: ModelRun) -> Floats:
     return np.asarray(run.trajectory.volume_field[0])
 
 
-def _moved(lattice: PreparedLattice) -> Floats:
+def _peak_displacement(lattice: PreparedLattice) -> Floats:
     """Displacement (q, 3) at the peak."""
     return np.asarray(lattice.simulate().trajectory.volume_field[0])
 
 
 Changes = dict[str, dict[str, Any]]
-"""Keys of a scene's table `lattice` that mend a cause."""
+"""Changed keys of the scene's table `lattice`, by the cause that they remove."""
 
 
-def _steps(lattice: PreparedLattice, modulus: float, changes: Changes) -> Iterator[PreparedLattice]:
+def _modified_lattices(
+    lattice: PreparedLattice, modulus: float, changes: Changes
+) -> Iterator[PreparedLattice]:
     """The lattice with linear springs of a modulus [Pa], then with one change after another.
 
-    The damping stays that of the scene, which eq. (2) would change with the Poisson ratio.
+    The damping is that of the scene throughout; by eq. (2) it would change with the Poisson ratio.
     """
     scene = lattice.model.scene
     damping = nodal_damping(scene, modulus)
-    asked = scene.lattice
+    table = scene.lattice
     for change in ({}, *changes.values()):
-        asked = replace(asked, **change)
-        changed = replace(scene, lattice=asked)
+        table = replace(table, **change)
+        changed = replace(scene, lattice=table)
         made = of_modulus(changed, lattice.assembly.lattice, modulus=modulus)
         springs = replace(made, material=replace(made.material, damping=damping))
         model = replace(lattice.model, scene=changed)
         yield on_lattice(model, lattice.problem, lattice.plain, springs)
 
 
-def _differences(way: Mending) -> Iterator[Difference]:
-    """What each change did; the steps' errors cancel in part, and are not told for a difference."""
+def _differences(way: Attribution) -> Iterator[Difference]:
+    """The effect of each change; time-step errors largely cancel, so none is stated."""
     for cause, (before, after) in zip(way.causes, pairwise(way.fields), strict=True):
         yield Difference(cause, before - after, None)
 
 
-def _last(way: Mending, reference: ModelRun, rest: Floats | None) -> Iterator[Difference]:
+def _final_parts(
+    way: Attribution, reference: ModelRun, rest: Floats | None
+) -> Iterator[Difference]:
     """The parts that need the reference's own motion, or its displacement at rest."""
     if rest is not None:
         yield Difference(SPACING, way.last - rest, _own_error(reference))
     else:
         yield Difference(DAMPING, way.fields[-1] - way.last, None)
-        yield Difference(LAW, way.last - _peak(reference), None)
+        yield Difference(LAW, way.last - _peak_field(reference), None)
 
 
-def _toward_elements(lattice: PreparedLattice) -> Mending:
-    """As the lattice gets the tissue's constants and becomes linear; then at rest.
+def _toward_elements(lattice: PreparedLattice) -> Attribution:
+    """Give the lattice the tissue's constants, make it linear, then compare it at rest.
 
-    What the spacing costs is told at rest, where both solve the same equations.
+    The effect of the spacing is evaluated at rest, where both methods solve the same equations.
     """
-    tissue, asked = lattice.problem.tissue, lattice.model.lattice
+    tissue, table = lattice.problem.tissue, lattice.model.lattice
     changes: Changes = {}
-    if asked.law is not None:
+    if table.law is not None:
         changes[LAW] = {"law": None}
-    if not asked.volume_term and _can_have_term(asked, tissue.poisson_ratio):
+    if not table.volume_term and _allows_volume_term(table, tissue.poisson_ratio):
         changes[POISSON] = {"volume_term": True}
-    if asked.geometry == "nonlinear":
+    if table.geometry == "nonlinear":
         changes[GEOMETRY] = {"geometry": "linear"}
-    steps = list(_steps(lattice, tissue.youngs_modulus, changes))
-    moved, nodes = tuple(map(_moved, steps)), len(lattice.assembly.mass)
-    return Mending(tuple(changes), moved, steps[-1].rest(), nodes)
+    steps = list(_modified_lattices(lattice, tissue.youngs_modulus, changes))
+    moved, nodes = tuple(map(_peak_displacement, steps)), len(lattice.assembly.mass)
+    return Attribution(tuple(changes), moved, steps[-1].rest(), nodes)
 
 
-def _toward_benchmark(lattice: PreparedLattice, benchmark: PreparedLattice) -> Mending:
-    """As the lattice gets the benchmark's modulus, then its damping and its law."""
+def _toward_benchmark(lattice: PreparedLattice, benchmark: PreparedLattice) -> Attribution:
+    """Give the lattice the benchmark's modulus, then its damping, then its law."""
     changes: Changes = {}
     if lattice.model.lattice.volume_term:
         changes[POISSON] = {"volume_term": False}
     if lattice.model.lattice.law is not None:
         changes[LAW] = {"law": None}
-    steps = list(_steps(lattice, benchmark.springs.modulus, changes))
-    damped = _damped_as(steps[-1], benchmark)
-    moved, nodes = tuple(map(_moved, steps)), len(lattice.assembly.mass)
-    return Mending(tuple(changes), moved, _moved(damped), nodes)
+    steps = list(_modified_lattices(lattice, benchmark.springs.modulus, changes))
+    damped = _with_damping_of(steps[-1], benchmark)
+    moved, nodes = tuple(map(_peak_displacement, steps)), len(lattice.assembly.mass)
+    return Attribution(tuple(changes), moved, _peak_displacement(damped), nodes)
 
 
-def _damped_as(lattice: PreparedLattice, other: PreparedLattice) -> PreparedLattice:
+def _with_damping_of(lattice: PreparedLattice, other: PreparedLattice) -> PreparedLattice:
     damping = other.springs.material.damping
     material = replace(lattice.springs.material, damping=damping)
     return replace(lattice, springs=SpringMaterial(lattice.springs.modulus, material))
 
 
-def _can_have_term(lattice: Lattice, poisson_ratio: float) -> bool:
+def _allows_volume_term(lattice: Lattice, poisson_ratio: float) -> bool:
     return lattice.springs == "lattice" and poisson_ratio > SPRING_POISSON_RATIO
 
 
 def _own_error(run: ModelRun) -> float | None:
-    """Estimated error of the reference's field at the peak by its mesh."""
+    """Estimated discretisation error of the reference's field at the peak."""
     error = run.record.mesh_error
     return None if error is None else error.field_peak
 
 
-def _budget(run: ModelRun, reference: ModelRun, mended: Mended, volumes: Floats) -> ErrorBudget:
+def _budget(
+    run: ModelRun, reference: ModelRun, decomposition: Decomposition, volumes: Floats
+) -> ErrorBudget:
     """The parts of one lattice's difference, the remainder last."""
-    whole = _peak(run) - _peak(reference)
-    parts = [Difference(ESTIMATE, _peak(run) - mended.field, None), *mended.others]
-    if reference.record.lattice is None:  # a lattice has much the same error by its steps
-        parts = [*_by_time_step(run), *parts]
+    whole = _peak_field(run) - _peak_field(reference)
+    parts = [
+        Difference(ESTIMATE, _peak_field(run) - decomposition.field, None),
+        *decomposition.others,
+    ]
+    if reference.record.lattice is None:  # two lattices have nearly the same time-step error
+        parts = [*_time_step_part(run), *parts]
     left = whole - np.sum([part.field for part in parts], axis=0)
     parts.append(Difference(REMAINDER, left, _own_error(reference)))
     return ErrorBudget(
         model=run.record.name,
         reference=reference.record.name,
-        total=norm(whole, volumes) / norm(_peak(reference), volumes),
+        total=norm(whole, volumes) / norm(_peak_field(reference), volumes),
         total_error=_own_error(reference),
-        parts=tuple(_shares(parts, whole, _peak(reference), volumes)),
+        parts=tuple(_shares(parts, whole, _peak_field(reference), volumes)),
     )
 
 
-def _by_time_step(run: ModelRun) -> Iterator[Difference]:
-    """What steps cost a run that was repeated with half as long ones, by Richardson."""
+def _time_step_part(run: ModelRun) -> Iterator[Difference]:
+    """The time-step error by Richardson extrapolation, for a run repeated with half the step."""
     record = run.record.lattice
     if run.halved is None or record is None:
         return
     share = 1.0 / (1.0 - 0.5 ** INTEGRATORS[record.integrator].order)
-    yield Difference(TIME_STEP, share * (_peak(run) - run.halved.volume_field[0]), None)
+    yield Difference(TIME_STEP, share * (_peak_field(run) - run.halved.volume_field[0]), None)
 
 
 def _shares(
     parts: Sequence[Difference], whole: Floats, truth: Floats, volumes: Floats
 ) -> Iterator[BudgetPart]:
-    """Size, contribution and what is left once this part and those before are mended."""
+    """For each part its norm, its contribution, and the norm of what remains after removing it."""
     scale, size = norm(truth, volumes), norm(whole, volumes)
     left = whole
     for part in parts:

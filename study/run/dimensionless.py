@@ -1,4 +1,4 @@
-"""Numbers that show a mistaken unit before anything is run."""
+"""Dimensionless numbers that reveal a wrong unit before anything is run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GRAVITY = 9.81
 
 
 def dimensionless(scene: Scene, problem: Problem) -> Dimensionless:
-    """Size, sag and tool of a problem, set against its stiffness and its spacing."""
+    """Size, self-weight deflection and tool of a problem, relative to stiffness and spacing."""
     extent = float(np.ptp(problem.geometry.surface.points, axis=0).max())
     modulus, radius = problem.tissue.youngs_modulus, problem.tool.radius
     return Dimensionless(
@@ -27,7 +27,7 @@ def dimensionless(scene: Scene, problem: Problem) -> Dimensionless:
 
 
 def _spacing(scene: Scene, problem: Problem) -> float:
-    """Of the lattice, or the mean edge of the mesh that springs run along [m]."""
+    """Spacing of the lattice, or mean edge of the mesh along whose edges the springs run [m]."""
     if scene.lattice.springs == "tetrahedra":
         return mean_edge(problem.geometry.mesh)
     return scene.lattice.spacing

@@ -1,4 +1,4 @@
-"""What the spring lattice cannot do, whatever stiffness it is given."""
+"""Limits of a spring lattice: the error that remains whatever stiffness it is given."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LatticeAtRest:
-    """Displacement [m] (q, 3) at rest of linear springs of the tissue's modulus.
+    """Displacement [m] (q, 3) at rest of linear springs with the tissue's modulus.
 
-    At a `spacing` [m], and with the volume term where there can be one.
+    `spacing` [m]; `with_volume_term`: with the volume term, None where the lattice cannot have one.
     """
 
     spacing: float
@@ -33,22 +33,22 @@ class LatticeAtRest:
 
 @dataclass(frozen=True)
 class ReferenceAtRest:
-    """Displacement [m] (q, 3) of a reference at rest: the tissue's, and of Poisson ratio 1/4."""
+    """Displacement [m] (q, 3) of a reference at rest; `at_quarter`: with Poisson ratio 1/4."""
 
     field: Floats
     at_quarter: Floats | None = None
 
 
 @runtime_checkable
-class OfAnyRatio(Protocol):
-    """A prepared model of an isotropic solid, which can be asked for another Poisson ratio."""
+class HasVariablePoissonRatio(Protocol):
+    """A prepared model of an isotropic solid that can be solved for another Poisson ratio."""
 
     def rest_at(self, poisson_ratio: float) -> Floats:
-        """Displacement [m] (q, 3) at rest under the full load, after a run on its mesh."""
+        """Displacement [m] (q, 3) at rest under the full load, after a run and on its mesh."""
 
 
 def lattice_at_rest(scene: Scene, problem: Problem) -> LatticeAtRest:
-    """Springs at rest. ValueError for a lattice that there cannot be, beside those of the scene."""
+    """Solve the springs at rest. ValueError for a lattice that cannot be built."""
     nu = problem.tissue.poisson_ratio
     is_cubic = scene.lattice.springs == "lattice"
     can_have_term = is_cubic and SPRING_POISSON_RATIO < nu <= LARGEST_POISSON_RATIO
@@ -58,8 +58,11 @@ def lattice_at_rest(scene: Scene, problem: Problem) -> LatticeAtRest:
 
 
 def reference_at_rest(reference: Prepared, *, at_quarter: bool) -> ReferenceAtRest:
-    """A reference at rest after a run, on the mesh of that run; if asked at 1/4, if it can."""
-    if at_quarter and isinstance(reference, OfAnyRatio):
+    """Solve a reference at rest, after a run and on its mesh.
+
+    Also with Poisson ratio 1/4 if `at_quarter` is set and the model supports it.
+    """
+    if at_quarter and isinstance(reference, HasVariablePoissonRatio):
         return ReferenceAtRest(reference.rest(), reference.rest_at(SPRING_POISSON_RATIO))
     return ReferenceAtRest(reference.rest())
 
@@ -69,9 +72,10 @@ def lattice_limits(
 ) -> LatticeLimits:
     """Compare lattice and reference at rest, both with the tissue's modulus.
 
-    Against a reference with nu = 1/4 only the lattice's discretisation differs; against the
-    tissue's nu the springs' fixed Poisson ratio comes on top; the best factor on the field then
-    shows what is left after the best possible stiffness, and the volume term what is left with it.
+    Against a reference with nu = 1/4 only the discretisation of the lattice differs. Against the
+    tissue's nu the fixed Poisson ratio of the springs comes on top. The best scale factor on the
+    field shows what remains at the best possible stiffness, and the volume term what remains with
+    it.
     """
     field, truth, term = lattice.field, reference.field, lattice.with_volume_term
     assert reference.at_quarter is not None  # noqa: S101 - as was asked
@@ -88,7 +92,7 @@ def lattice_limits(
 
 
 def _at_rest(scene: Scene, problem: Problem, *, volume_term: bool) -> tuple[float, Floats]:
-    """Spacing [m] and displacement [m] (q, 3) of linear springs of the tissue's modulus."""
+    """Spacing [m], and displacement [m] (q, 3) of linear springs of the tissue's modulus."""
     lattice = replace(scene.lattice, volume_term=volume_term, law=None)
     (model,) = models(replace(scene, lattice=lattice), {})
     prepared = model.prepare(problem)

@@ -1,4 +1,4 @@
-"""A scene that says what it requires: planned, and where rest alone is wanted, solved at rest."""
+"""Scenes with a `[require]` table: planned, and solved at rest where no motion is required."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from study.scene.file import write_scene
 
 
 def planned(scene: Scene, progress: Progress) -> Plan:
-    """What is modelled of a scene, which will stand among the notes of its results.
+    """The plan of a scene; its sentences become remarks of the results.
 
-    ValueError for what no model is expected to keep.
+    ValueError if no model is expected to meet the requirement.
     """
     with progress.stage("plan"):
         found = plan(suited(scene, progress))
@@ -28,17 +28,17 @@ def planned(scene: Scene, progress: Progress) -> Plan:
 
 
 def at_rest(found: Plan, folder: Path, progress: Progress) -> list[str]:
-    """Solve a plan at rest and write a folder of that, which has no curves; lines on it."""
+    """Solve a plan at rest, write its results folder, and return lines for a terminal."""
     required = found.scene.require
     with results.replacing(folder) as partial:
         solved = rest_of(found.scene, progress, large=found.large)
         results.write(solved.rows, write_scene(found.scene), partial)
         if required is not None and FIELD in required.quantities:
             results.write_field(solved.mesh, solved.displacement, partial)
-    return [*_told(solved.rows), f"results in {folder}"]
+    return [*_rest_lines(solved.rows), f"results in {folder}"]
 
 
-def _told(rows: tuple[RestRow, ...]) -> Iterator[str]:
+def _rest_lines(rows: tuple[RestRow, ...]) -> Iterator[str]:
     for row in rows:
         errors = (row.mesh_error, row.large_displacement_error)
         known = " and ".join("unknown" if e is None else f"{100.0 * e:.2g} %" for e in errors)

@@ -1,8 +1,9 @@
-"""Whether a run keeps the error that its scene requires, by the errors that the run states itself.
+"""Checks of a run against the error that its scene requires, by the run's own error estimates.
 
-These are estimates, with their factors of safety, and no bounds. A model that does not know its own
-error, a lattice, is told by its difference from finite elements that do; under moved tools and more
-than one load it knows that by its spacing, and what springs cannot do is left out.
+These are estimates with their factors of safety, not bounds. A lattice under a single load of given
+force has no error estimate of its own; it is checked by its difference from finite elements that
+have one. Under moved tools or several loads it has an estimate of its discretisation error; the
+error of the spring model itself is then not included.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def _check(name: str, error: float, required: Require) -> Check:
 
 
 def _force_check(name: str, run: ModelRun, required: Require) -> Iterator[Check]:
-    """Of the largest force of any tool, where its error by the spacing and the steps is known."""
+    """A check of the largest force of any tool, where its error by spacing and steps is known."""
     by_spacing, by_steps = run.record.spacing_errors, run.record.tool_force_errors
     lost = run.trajectory.status != "finished"
     if not lost and (by_spacing is None or not by_steps):
@@ -61,7 +62,7 @@ def _force_check(name: str, run: ModelRun, required: Require) -> Iterator[Check]
 
 
 def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) -> dict[str, float]:
-    """Sum of the estimated errors of displacement by control point; empty where it is unknown."""
+    """Sum of the estimated displacement errors by control point; empty where they are unknown."""
     if run.trajectory.status != "finished":
         return dict.fromkeys(probes, float("inf"))
     record = run.record
@@ -75,13 +76,13 @@ def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) 
         curves, truth = run.trajectory.displacement, reference.trajectory.displacement
         apart = relative_l2_of_curves(curves - truth, truth)
         return {p: own[p] + float(apart[i]) for i, p in enumerate(probes) if p in own}
-    return {}  # linear elements alone do not know what large displacements would change
+    return {}  # linear elements have no estimate of the effect of large displacements
 
 
 def _stated(
     record: ModelRecord, remainder: dict[str, CurveErrors] | None, probes: tuple[str, ...]
 ) -> dict[str, float]:
-    """Errors by mesh, by steps and, of a corrected lattice, by its spacing, where all are known."""
+    """Errors by mesh, by steps and, of a corrected lattice, by spacing, where all are known."""
     mesh = record.mesh_error
     parts = [None if mesh is None else mesh.by_probe, record.time_step_errors]
     parts += [] if remainder is None else [remainder]

@@ -1,4 +1,4 @@
-"""A scene of which only the rest is wanted: solved under the full load, with no step in time."""
+"""A scene of which only the state at rest is required, solved under the full load."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from study.scene.problem import problem_of
 Floats = NDArray[np.float64]
 
 LEVELS = (-2, -1, 0)
-"""Of meshes, the last the scene's own; the others, where there are such, tell its error."""
+"""Mesh levels, the last one the scene's own; the coarser ones, where they exist, give its error."""
 COARSE = 2.0
-"""Spacing of the lattice that tells the error of large displacements, times that of the scene."""
+"""Spacing of the lattice that gives the error of the nonlinear part, over that of the scene."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class AtRest:
 
 @dataclass(frozen=True)
 class _Solved:
-    """Finite elements at rest, from coarse to fine: sizes, and displacements [m] (p, 3)."""
+    """Finite elements at rest: element sizes, coarse to fine, and displacements [m] (p, 3)."""
 
     body: Body
     u: Floats
@@ -51,9 +51,9 @@ class _Solved:
 
 
 def rest_of(scene: Scene, progress: Progress, *, large: bool) -> AtRest:
-    """Solve a scene at rest, with large displacements or small ones alone.
+    """Solve a scene at rest, with large displacements (`large`) or linear.
 
-    ValueError for a scene whose support or tool misses the organ, or whose lattice finds no rest.
+    ValueError for a support or tool that misses the organ, or a lattice that has no rest state.
     """
     with progress.stage("organ"):
         problem = problem_of(scene)
@@ -86,7 +86,7 @@ def _solved(scene: Scene, problem: Problem) -> _Solved:
 def _large_displacements(
     coarse: LatticeLook, fine: LatticeLook, *, large: bool
 ) -> tuple[Floats, Floats]:
-    """What large displacements change [m] (p, 3), and the error [m] (p,) that is left."""
+    """Effect of large displacements [m] (p, 3), and the error [m] (p,) that remains."""
     if coarse.nonlinear is None or fine.nonlinear is None:
         raise ValueError(
             "the lattice finds no rest under the full load; reduce tool.force or enlarge "

@@ -1,4 +1,4 @@
-"""Rows on what scores are made of and how well they are known: parts, errors and ranks."""
+"""Rows on the parts of scores, their uncertainty, and the ranks that these leave."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from study.similarity.ranks import rank_ranges
 from study.similarity.uncertainty import Variants, spread, variants
 
 Place = tuple[str, str, str, str]
-"""Reference, control point, curve and measure: where scores are compared with each other."""
+"""Reference, control point, curve and measure: scores are ranked within one place."""
 Ranks = dict[tuple[str, Place], tuple[int, int]]
 ISO = "iso-18571"
 
@@ -31,7 +31,7 @@ ISO = "iso-18571"
 def rating_rows(
     response: Response, runs: Mapping[str, Trajectory], scores: Sequence[SimilarityScore]
 ) -> Iterator[Iso18571Rating]:
-    """Parts of each score by ISO/TS 18571."""
+    """The parts of each ISO/TS 18571 score."""
     for row in scores:
         if row.measure == ISO:
             found = (_motion(response, runs, name, row.probe) for name in row[:2])
@@ -45,7 +45,7 @@ def error_rows(
     records: Sequence[ModelRecord],
     scores: Sequence[SimilarityScore],
 ) -> tuple[tuple[ScoreError, ...], tuple[ScoreDifference, ...]]:
-    """What each score depends on with the ranks it leaves, and each difference of two models."""
+    """The uncertainty and ranks of each score, and each difference between two models."""
     named, rows = {record.name: record for record in records}, dict[Key, list[SimilarityScore]]()
     for row in scores:
         rows.setdefault(row[:3], []).append(row)
@@ -128,7 +128,7 @@ def _numerical(records: Mapping[str, ModelRecord], *rows: SimilarityScore) -> fl
 
 
 def _ranks(scores: Sequence[SimilarityScore], differences: Sequence[ScoreDifference]) -> Ranks:
-    """First and last rank of each score among those of the same place."""
+    """First and last possible rank of each score within its place."""
     better = {
         (row.model, row.other, row[2:6])
         if row.difference > 0.0

@@ -1,7 +1,7 @@
-"""The stages of a run: each is taken from the store if it is there, else computed and kept.
+"""The stages of a run: each result is taken from the store if present, else computed and stored.
 
-A stage is a function with the key of all that it depends on. Those that depend on no other run side
-by side.
+A stage is a function, with a key of everything that it depends on. Stages that do not depend on
+each other run side by side.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from typing import Any, Generic, TypeVar
 from study.folders import tell
 from study.progress import Progress
 from study.results.records import StageRecord
-from study.stages.flat import flattened, restored
-from study.stages.lanes import Job, Lanes
+from study.stages.job_pool import Job, JobPool
+from study.stages.serialisation import flattened, restored
 from study.stages.store import Entry, Store, shown_size
-from study.sweep.tally import duration
+from study.sweep.status import duration
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Means:
-    """What a run may use: a store, read unless `fresh`, and so many processes side by side.
+class RunOptions:
+    """Resources and options of a run.
 
-    `mesh`: file to keep the tetrahedra in, if they are wanted; `minutes`: most that a model may
-    take, None for no end.
+    `store`: read unless `fresh`; `workers`: number of processes; `mesh`: file for the tetrahedra,
+    None to write none; `minutes`: time limit of each model, None for no limit.
     """
 
     store: Store | None = None
@@ -39,15 +39,16 @@ class Means:
     minutes: float | None = None
 
 
-ALONE = Means()
-"""Nothing is kept, and one stage runs after another."""
+SERIAL = RunOptions()
+"""Nothing is stored, and one stage runs after another."""
 
 
 @dataclass(frozen=True)
 class Stage(Generic[T]):
-    """What gives a value of a kind, under the key of all it depends on, None if it has no such.
+    """A function that computes a value of type `kind`, with the key of everything it depends on.
 
-    `readable`: whether what is kept will do; `lasting`: whether a value is worth keeping.
+    `key`: None for a stage that cannot be stored; `readable`: whether a stored value will do;
+    `lasting`: whether a value is worth storing.
     """
 
     name: str
@@ -60,23 +61,23 @@ class Stage(Generic[T]):
 
 @dataclass(frozen=True)
 class _Found:
-    """What a stage gave, and the record of it."""
+    """The value of a stage, and the record of how it was obtained."""
 
     value: Any
     record: StageRecord
 
 
 class Stages:
-    """Stages of one run, on the lanes that it has."""
+    """The stages of one run, on its pool of processes."""
 
-    def __init__(self, means: Means, lanes: Lanes, progress: Progress) -> None:
-        self.means, self.lanes, self.progress = means, lanes, progress
+    def __init__(self, options: RunOptions, job_pool: JobPool, progress: Progress) -> None:
+        self.options, self.job_pool, self.progress = options, job_pool, progress
         self.found: dict[str, _Found] = {}
 
-    def kept(self, stage: Stage[T]) -> T | None:
-        """What the store has of a stage, None if nothing, or if it must not be read."""
-        store = self.means.store
-        if store is None or stage.key is None or self.means.fresh or not stage.readable:
+    def cached(self, stage: Stage[T]) -> T | None:
+        """The stored value of a stage; None if there is none, or if it must not be read."""
+        store = self.options.store
+        if store is None or stage.key is None or self.options.fresh or not stage.readable:
             return None
         entry = store.get(stage.key)
         if entry is None:
@@ -88,31 +89,31 @@ class Stages:
         self.found[stage.name] = _Found(value, _record(stage.name, entry, kept=True))
         return value
 
-    def now(self, stage: Stage[T]) -> T:
-        """The value of a stage, kept or computed here and now."""
-        value = self.kept(stage)
+    def compute(self, stage: Stage[T]) -> T:
+        """The value of a stage, stored or computed in this process."""
+        value = self.cached(stage)
         if value is None:
-            self.found[stage.name] = found = _computed(stage, self.means.store, self.progress)
+            self.found[stage.name] = found = _computed(stage, self.options.store, self.progress)
             value = found.value
         return value
 
     def start(self, stage: Stage[T]) -> None:
-        """Compute a stage, beside others if there are lanes, and keep it."""
-        store = self.means.store
-        self.lanes.start(Job(stage.name, lambda progress: _computed(stage, store, progress)))
+        """Compute a stage in the pool, and store it."""
+        store = self.options.store
+        self.job_pool.start(Job(stage.name, lambda progress: _computed(stage, store, progress)))
 
-    def beside(self, name: str, work: Callable[[], None]) -> None:
-        """Let something be done on a lane that is free, by which what follows takes less time."""
-        self.lanes.start(Job(name, lambda _: work()))
+    def start_background(self, name: str, work: Callable[[], None]) -> None:
+        """Let a free process do work whose only effect is to make later stages faster."""
+        self.job_pool.start(Job(name, lambda _: work()))
 
     def results(self) -> dict[str, Any]:
-        """Values of all stages by name, once those that were started have ended."""
-        given = self.lanes.results()
+        """Values of all stages by name, after those that were started have ended."""
+        given = self.job_pool.results()
         self.found |= {name: one for name, one in given.items() if isinstance(one, _Found)}
         return {name: found.value for name, found in self.found.items()}
 
     def records(self) -> tuple[StageRecord, ...]:
-        """Of all stages, how long each took, and when."""
+        """Records of all stages: how long each took, and when."""
         return tuple(found.record for found in self.found.values())
 
 
@@ -126,7 +127,7 @@ def _computed(stage: Stage[T], store: Store | None, progress: Progress) -> _Foun
 
 
 def _keep(stage: Stage[T], value: T, store: Store, wall: float) -> None:
-    """Keep what a stage gave; that it cannot be kept costs the next run time, and not this one."""
+    """Store the value of a stage; a failure costs the next run time, and does not end this one."""
     assert stage.key is not None  # noqa: S101 - as was asked
     try:
         store.put(stage.key, *flattened(value), wall)
@@ -139,8 +140,8 @@ def _record(name: str, entry: Entry, *, kept: bool) -> StageRecord:
     return StageRecord(name=name, wall_s=entry.wall, measured_at=at, kept=kept)
 
 
-def told(records: Sequence[StageRecord], store: Store) -> str:
-    """For a person: which stages were kept from earlier runs, and how large the store is."""
+def store_summary(records: Sequence[StageRecord], store: Store) -> str:
+    """One line: the stages that were taken from the store, and the size of the store."""
     kept = [one.name for one in records if one.kept]
     seconds = sum(one.wall_s for one in records if one.kept)
     what = f"kept from earlier runs, {duration(seconds)} of work: {', '.join(kept)}"

@@ -1,9 +1,8 @@
-"""A scene made for one organ, suited to another: sizes follow the organ, the force its strain.
+"""Adapting a scene to another organ: lengths follow the organ's size, the force its strain.
 
-Lengths keep their share of the cube root of the volume and the tool its pressure, so that an organ
-of the same shape has the same strains at any size. A support also holds no smaller share of the
-surface on its side, and the force is lessened until the linear reference at rest stays well within
-what it is trusted for.
+Lengths scale with the cube root of the volume and the tool keeps its pressure, so that an organ of
+the same shape has the same strains at any size. A support also keeps its share of the surface on
+its side, and the force is reduced until the linear reference at rest stays well within its limits.
 """
 
 from __future__ import annotations
@@ -27,30 +26,31 @@ from study.scene.problem import geometry_of, problem_of
 Floats = NDArray[np.float64]
 
 MARGIN = 0.7
-"""Share of the limits of strain and rotation aimed at: the reference's finer meshes find more."""
+"""Share of the limits of strain and rotation that is aimed at: finer meshes find larger values."""
 DIGITS = 2
 POWERS = {
     "support.depth": 1,
     "support.stiffness": -1,
     "tool.radius": 1,
     "tool.force": 2,
+    "tool.displacement": 1,
     "lattice.spacing": 1,
     "reference.element_size": 1,
 }
-"""Of the organ's size, by which each of the keys follows it."""
+"""Exponent of the organ's size with which each key scales."""
 UNITS = {"support.stiffness": (1e-6, "MPa/m"), "tool.force": (1.0, "N")}
 MILLIMETRES = (1e3, "mm")
 
 
 def read_suited(name: str, overrides: Sequence[str], progress: Progress | None = None) -> Scene:
-    """The scene of `read_scene`, suited to its organ. ValueError as of it, and for a bad mesh."""
+    """The scene of `read_scene`, adapted to its organ. ValueError as there, or for a bad mesh."""
     return suited(read_scene(name, overrides), progress or Silent())
 
 
 def suited(scene: Scene, progress: Progress) -> Scene:
-    """The scene with the keys of `organ.suit` chosen for its organ, and a remark that says so.
+    """The scene with the keys of `organ.suit` adapted to its organ, and a remark that says so.
 
-    ValueError if the organ cannot be used, or support or tool misses it all the same.
+    ValueError if the organ cannot be used, or if the support or the tool misses it nevertheless.
     """
     keys = [key for key in scene.organ.suit if key in POWERS]
     if not keys or scene.organ.mesh is None:
@@ -60,27 +60,27 @@ def suited(scene: Scene, progress: Progress) -> Scene:
         size = _size(scene.organ, own)
         found = scene
         for key in keys:
-            found = _with(found, key, _rounded(_value(scene, key) * size ** POWERS[key]))
+            found = _with_value(found, key, _rounded(_value(scene, key) * size ** POWERS[key]))
         geometry = geometry_of(found.organ, found.reference.element_size)
         if "support.depth" in keys:
-            held = _held(own.surface, scene.support.side, scene.support.depth)
-            depth = _depth(geometry.surface, found.support.side, held)
-            found = _with(found, "support.depth", max(found.support.depth, _rounded(depth)))
+            held = _supported_share(own.surface, scene.support.side, scene.support.depth)
+            depth = _depth_of_share(geometry.surface, found.support.side, held)
+            found = _with_value(found, "support.depth", max(found.support.depth, _rounded(depth)))
         if "tool.force" in keys:
-            found = _with(found, "tool.force", _rounded(_bearable(found), down=True))
+            found = _with_value(found, "tool.force", _rounded(_admissible_force(found), down=True))
     remark = _remark(found, keys, geometry.volume, own.volume)
     organ = replace(found.organ, suit=())
     return replace(found, organ=organ, remarks=(*found.remarks, remark))
 
 
 def _size(organ: Organ, own: Geometry) -> float:
-    """Of the organ, as a multiple of the one that the scene was made for."""
+    """Size of the organ relative to the one that the scene was made for."""
     report = load_mesh(str(organ.mesh), organ.unit, organ.axes, organ.pieces)[1]
     return float(np.cbrt(report.volume / own.volume))
 
 
 def _facing(surface: SurfaceMesh, side: Side) -> tuple[Floats, Floats]:
-    """Depth [m] below the extreme point and area seen from a side [m^2] of what faces it."""
+    """Depth [m] below the extreme point, and projected area [m^2], of faces toward a side."""
     corner = surface.points[surface.triangles]
     seen = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) @ OUTWARD[side]
     height = corner.mean(axis=1) @ OUTWARD[side]
@@ -88,22 +88,22 @@ def _facing(surface: SurfaceMesh, side: Side) -> tuple[Floats, Floats]:
     return (top - height)[seen > 0], seen[seen > 0]
 
 
-def _held(surface: SurfaceMesh, side: Side, depth: float) -> float:
-    """Share of the area seen from a side down to a depth [m]."""
+def _supported_share(surface: SurfaceMesh, side: Side, depth: float) -> float:
+    """Share of the projected area on a side that lies within a depth [m]."""
     below, area = _facing(surface, side)
     return float(area[below <= depth].sum() / area.sum())
 
 
-def _depth(surface: SurfaceMesh, side: Side, share: float) -> float:
-    """Depth [m] down to which so much of the area seen from a side lies."""
+def _depth_of_share(surface: SurfaceMesh, side: Side, share: float) -> float:
+    """Depth [m] within which a share of the projected area on a side lies."""
     below, area = _facing(surface, side)
     order = np.argsort(below)
     reached = np.cumsum(area[order]) >= share * area.sum() * (1.0 - 1e-9)
     return float(below[order][reached.argmax()])
 
 
-def _bearable(scene: Scene) -> float:
-    """The tool's force [N], less where strain or rotation at rest would leave the margin."""
+def _admissible_force(scene: Scene) -> float:
+    """The tool's force [N], reduced where strain or rotation at rest would exceed the margin."""
     from fem_reference.observation import largest_rotation, largest_strain
     from fem_reference.solvers import solve_static
     from study.models.finite_elements import reference_of
@@ -123,14 +123,14 @@ def _value(scene: Scene, key: str) -> float:
     return float(getattr(getattr(scene, table), name))
 
 
-def _with(scene: Scene, key: str, value: float) -> Scene:
+def _with_value(scene: Scene, key: str, value: float) -> Scene:
     table, name = key.split(".")
     changed = replace(getattr(scene, table), **{name: value})
     return replace(scene, **{table: changed})
 
 
 def _rounded(value: float, *, down: bool = False) -> float:
-    """To two digits, as it would be written in a scene."""
+    """Round to two digits, as one would write the value in a scene."""
     step = 10.0 ** (np.floor(np.log10(value)) - DIGITS + 1)
     count = np.floor(value / step + 1e-9) if down else np.round(value / step)
     return float(f"{count * step:.{DIGITS}g}")

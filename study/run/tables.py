@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 def curve_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[CurveSample]:
-    """Finite samples of each model at each probe."""
+    """The finite samples of each model at each control point."""
     for model, trajectory in runs.items():
         for i, probe in enumerate(response.probes):
             motion = response.motion(trajectory, i)
@@ -34,7 +34,7 @@ def curve_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[C
 
 
 def band_rows(response: Response, model: str, bounds: Sequence[Trajectory]) -> Iterator[BandSample]:
-    """Samples of the runs at the lower and at the upper bound of the stiffness interval."""
+    """Samples of the runs at the lower and the upper bound of the stiffness interval."""
     for i, probe in enumerate(response.probes):
         lower, upper = (response.motion(bound, i) for bound in bounds)
         columns = (lower.displacement, upper.displacement, lower.velocity, upper.velocity)

@@ -1,4 +1,4 @@
-"""What rigid tools do to the bodies of the models: rows, scores and the largest force."""
+"""Forces of rigid tools on each model: rows, scores and the largest force."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from study.results.tables import ToolForceSample, ToolForceScore, pairs
 from study.similarity.score import TIME_HISTORY
 
 FORCE = "force"
-"""Name of the curve that is scored."""
+"""Name of the scored curve."""
 
 
 def force_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[ToolForceSample]:
-    """Finite samples of each model and tool."""
+    """The finite samples of each model and tool."""
     for model, trajectory in runs.items():
         for number, tool in enumerate(response.tools):
             curve = response.tool_curve(trajectory, number)
@@ -31,12 +31,12 @@ def force_rows(response: Response, runs: Mapping[str, Trajectory]) -> Iterator[T
 def force_scores(
     response: Response, runs: Mapping[str, Trajectory], references: Sequence[str]
 ) -> tuple[tuple[ToolForceScore, ...], tuple[str, ...]]:
-    """Scores of the force over time of all that finished, and a note on what has none."""
+    """Scores of the force over time for all pairs that finished, and a note on the others."""
     rows, notes = list[ToolForceScore](), list[str]()
     for model, reference in pairs(list(runs), references):
         for number, tool in enumerate(response.tools):
             one, other = (response.tool_curve(runs[n], number).force for n in (model, reference))
-            why = _unfit(one, other)
+            why = _why_unscored(one, other)
             if why:
                 notes.append(
                     f"No score of the force of {tool.name} in {model} against {reference}: {why}."
@@ -48,18 +48,18 @@ def force_scores(
     return tuple(rows), tuple(notes)
 
 
-def _unfit(one: np.ndarray, other: np.ndarray) -> str:
+def _why_unscored(one: np.ndarray, other: np.ndarray) -> str:
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         return "one of the two has no force up to the end"
     return "" if other.any() else "the reference feels none"
 
 
 def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator[ToolForce]:
-    """The largest force of each tool in each model, of what it has of a motion."""
+    """The largest force of each tool in each model, over the part of the motion that exists."""
     for model, run in runs.items():
         for number, tool in enumerate(response.tools):
             curve = response.tool_curve(run.trajectory, number)
-            if np.isnan(curve.force).all():  # lost before it was looked at
+            if np.isnan(curve.force).all():  # the run ended before the first sample
                 continue
             peak = int(np.nanargmax(np.abs(curve.force)))
             yield ToolForce(
@@ -75,7 +75,7 @@ def largest_forces(response: Response, runs: Mapping[str, ModelRun]) -> Iterator
 
 
 def _relative_error(record: ModelRecord, tool: str) -> float | None:
-    """Of a force over time: by steps of a lattice, by all that is estimated of elements."""
+    """Relative error of a force over time: by steps of a lattice, by all parts of elements."""
     contact = None if record.elements is None else record.elements.contact
     if contact is None or tool not in contact.forces:
         return record.tool_force_errors.get(tool)
@@ -91,7 +91,7 @@ def _spacing_error(record: ModelRecord, tool: str) -> float | None:
 
 
 def _work(curve: ToolCurve) -> float:
-    """By the trapezoidal rule over the samples, along the axis, up to the last finite one."""
+    """Work along the axis up to the last finite sample, by the trapezoidal rule."""
     force, travel = curve.force, curve.travel
     kept = np.isfinite(force)
     return float(np.trapezoid(force[kept], travel[kept]))

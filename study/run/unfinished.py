@@ -1,4 +1,4 @@
-"""Models that find in their run that they cannot: a result of each, and the others go on."""
+"""Models that cannot finish their run: each is a result with a reason, and the others go on."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ NO_MEMORY = UnfinishedError(
 )
 
 
-def within(progress: Progress, minutes: float | None) -> Progress:
-    """What is told of a model, which ends it once it has taken so long; None for no end."""
-    return progress if minutes is None else _Timed(progress, minutes)
+def with_time_limit(progress: Progress, minutes: float | None) -> Progress:
+    """Progress that ends a model once it has taken so many minutes; None for no limit."""
+    return progress if minutes is None else _TimeLimited(progress, minutes)
 
 
-class _Timed:
-    """Raises an UnfinishedError when a model tells how far it is, and is late."""
+class _TimeLimited:
+    """Raises an UnfinishedError when a model reports progress after its time limit."""
 
     def __init__(self, progress: Progress, minutes: float) -> None:
         self.progress, self.minutes = progress, minutes
@@ -56,8 +56,8 @@ class _Timed:
             )
 
 
-def moved(model: Model, prepared: Prepared, problem: Problem, watch: Watch) -> ModelRun:
-    """The run of a model, or that it is not finished and why."""
+def run_or_unfinished(model: Model, prepared: Prepared, problem: Problem, watch: Watch) -> ModelRun:
+    """Run a model; if it cannot finish, a run that states the reason and a remedy."""
     try:
         return prepared.run(watch)
     except UnfinishedError as error:
@@ -67,7 +67,7 @@ def moved(model: Model, prepared: Prepared, problem: Problem, watch: Watch) -> M
 
 
 def unfinished(model: Model, problem: Problem, why: UnfinishedError) -> ModelRun:
-    """A run that never came to a motion: no number in it, and no score of it."""
+    """A run without a motion, whose record states the reason; it has no numbers and no scores."""
     seen = problem.observation
     nothing = empty_trajectory(seen, len(problem.rigid_tools))
     record = ModelRecord(

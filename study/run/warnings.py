@@ -1,4 +1,4 @@
-"""What a reader of the results must be told before the numbers."""
+"""Warnings that a reader of the results needs before the numbers."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from study.scene import Scene
 from study.scene.schema import Tool
 
 OVERLAP = 0.01
-"""Of a tool's travel, above which an overlap is told."""
+"""Overlap of a body and a tool, relative to the tool's travel, above which it is reported."""
 UNKNOWN = 0.25
-"""Stated error of the elements' meshes, above which it tells that they are too coarse."""
+"""Stated discretisation error of the finite elements above which a warning is given."""
 FINE = 2.0
-"""Spacings to a tool's radius, below which contact is told to be coarse."""
+"""Tool radius over lattice spacing below which contact is reported as coarse."""
 
 
 def warnings(
     scene: Scene, models: Sequence[ModelRecord], checks: Sequence[Check]
 ) -> tuple[str, ...]:
-    """Sentences on models outside what they are good for, and on checks that failed."""
-    of_models = (text for record in models for text in _of_model(scene, record))
+    """Sentences on models outside their range of validity, and on checks that failed."""
+    of_models = (text for record in models for text in _model_warnings(scene, record))
     failed = (
         f"Check failed: {check.name} is {check.value:.2g}, its limit {check.limit:g}."
         for check in checks
         if not check.passed
     )
-    return tuple(dict.fromkeys((*of_models, *failed)))  # two may stand on one mesh
+    return tuple(dict.fromkeys((*of_models, *failed)))  # models on one mesh share warnings
 
 
-def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
+def _model_warnings(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.elements is not None:
-        if record.lattice is None:  # which adds what is not linear
-            yield from _of_linear(scene, record, record.elements)
-        yield from _of_mesh(scene, record.elements)
+        if record.lattice is None:  # a corrected lattice adds the nonlinear part
+            yield from _linear_limit_warnings(scene, record, record.elements)
+        yield from _mesh_warnings(scene, record.elements)
     if record.status == "diverged":
         yield (
             f"{record.name} diverged at {record.ended_at_s:g} s: it has no scores. "
@@ -49,31 +49,31 @@ def _of_model(scene: Scene, record: ModelRecord) -> Iterator[str]:
     if record.inverted_cells:
         yield (
             f"{record.inverted_cells} cells of {record.name} turned inside out: springs "
-            f"do not resist that, so it has no scores. {_less(scene)}"
+            f"do not resist that, so it has no scores. {_smaller_load(scene)}"
         )
-    yield from _of_tools(scene, record)
+    yield from _tool_warnings(scene, record)
 
 
-def _less(scene: Scene) -> str:
-    """What deforms a lattice less."""
-    return "Move the tools less far." if _moved(scene) else "Reduce tool.force."
+def _smaller_load(scene: Scene) -> str:
+    """The remedy that deforms a lattice less."""
+    return "Move the tools less far." if _moved_tools(scene) else "Reduce tool.force."
 
 
-def _moved(scene: Scene) -> list[Tool]:
+def _moved_tools(scene: Scene) -> list[Tool]:
     return [tool for tool in scene.tools if tool.is_moved]
 
 
 def _travel(tool: Tool) -> float:
-    """How far a tool is moved at most [m]."""
+    """Largest displacement of a tool [m]."""
     if tool.displacement is not None:
         return abs(tool.displacement)
     ways = ((point.travel,) if point.offset is None else point.offset for point in tool.path)
     return max(math.hypot(*(part or 0.0 for part in way)) for way in ways)
 
 
-def _of_tools(scene: Scene, record: ModelRecord) -> Iterator[str]:
-    """Tools that the body overlaps, or that a lattice is too coarse for."""
-    for tool in _moved(scene):
+def _tool_warnings(scene: Scene, record: ModelRecord) -> Iterator[str]:
+    """On tools that the body overlaps, and on tools that a lattice is too coarse for."""
+    for tool in _moved_tools(scene):
         travel, overlap = _travel(tool) or tool.radius, record.tool_overlap_m or 0.0
         if overlap > OVERLAP * travel:
             yield (
@@ -82,10 +82,10 @@ def _of_tools(scene: Scene, record: ModelRecord) -> Iterator[str]:
                 "(lattice.step_fraction), or give the tool more time."
             )
         if record.lattice is not None and scene.lattice.springs == "lattice":
-            yield from _of_coarse(scene, tool)
+            yield from _coarse_contact_warnings(scene, tool)
 
 
-def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
+def _coarse_contact_warnings(scene: Scene, tool: Tool) -> Iterator[str]:
     cells = tool.radius / scene.lattice.spacing
     if tool.shape != "plate" and cells < FINE:
         yield (
@@ -95,7 +95,9 @@ def _of_coarse(scene: Scene, tool: Tool) -> Iterator[str]:
         )
 
 
-def _of_linear(scene: Scene, record: ModelRecord, elements: ElementsRecord) -> Iterator[str]:
+def _linear_limit_warnings(
+    scene: Scene, record: ModelRecord, elements: ElementsRecord
+) -> Iterator[str]:
     if elements.law is not None:
         return
     strain, rotation = record.largest_strain, elements.largest_rotation_rad
@@ -103,16 +105,16 @@ def _of_linear(scene: Scene, record: ModelRecord, elements: ElementsRecord) -> I
         yield (
             f"The largest strain of {_name(record)} is {100 * strain:.1f} %; above "
             f"{100 * STRAIN_LIMIT:.0f} % it should not be trusted{_at_large_strain(elements)}. "
-            f"{_less(scene)[:-1]} or enlarge tool.radius."
+            f"{_smaller_load(scene)[:-1]} or enlarge tool.radius."
         )
     if rotation is not None and rotation > ROTATION_LIMIT:
         yield (
             f"The linear reference turns by up to {rotation:.2f} rad; above {ROTATION_LIMIT:g} "
-            f"it should not be trusted. {_less(scene)[:-1]} or hold the organ better."
+            f"it should not be trusted. {_smaller_load(scene)[:-1]} or hold the organ better."
         )
 
 
-def _of_mesh(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
+def _mesh_warnings(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
     if elements.accuracy_missed and elements.mesh_error:
         yield (
             f"reference.accuracy asks for {100 * elements.accuracy_missed:.2g} %; the finest "
@@ -128,7 +130,7 @@ def _of_mesh(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
 
 
 def _more_accurate(scene: Scene) -> str:
-    """What brings the reference nearer to the accuracy that is asked for."""
+    """The remedies that bring the reference closer to the requested accuracy."""
     graded = "" if scene.is_graded else 'set reference.refinement to "graded", '
     return f"Ask for less, {graded}enlarge tool.radius, or give the run more free memory."
 
@@ -146,8 +148,10 @@ def _at_large_strain(elements: ElementsRecord) -> str:
 
 
 def _remedy(scene: Scene, record: ModelRecord) -> str:
-    """What keeps a run from diverging."""
-    if record.lattice is None and _moved(scene):  # elements, whose contact did not settle
+    """The remedy for a run that diverged."""
+    if record.lattice is None and _moved_tools(
+        scene
+    ):  # finite elements whose contact iteration failed
         return "Move the tools less far, or reduce reference.element_size."
     lattice = scene.lattice
     for key, value in (("time_step", lattice.time_step), ("step_rate", lattice.step_rate)):
@@ -155,7 +159,7 @@ def _remedy(scene: Scene, record: ModelRecord) -> str:
             verb = "Shorten" if key == "time_step" else "Raise"
             return f"{verb} lattice.{key}, or leave it out so that steps follow the limit."
     return (
-        f"Reduce lattice.step_fraction. {_less(scene)}"
-        if _moved(scene)
+        f"Reduce lattice.step_fraction. {_smaller_load(scene)}"
+        if _moved_tools(scene)
         else "Reduce lattice.step_fraction or the load."
     )

@@ -15,6 +15,7 @@ from study.problem.rigid import SLIDING
 from study.scene import graded
 from study.scene.law import SpringLaw
 from study.scene.schema import Inclusion, Lattice, Require, Scene, Tool, Waypoint
+from study.scene.unused import LIVER_ONLY, has_effect
 
 if TYPE_CHECKING:
     from study.models.model import ModelKind
@@ -51,13 +52,6 @@ MESH_ONLY = (
     ("tissue", "inclusion"),
     ("tissue", "stiffness_map"),
 )
-
-
-LIVER_ONLY = (
-    *("knowledge", "reading", "consequent", "placement", "footprint", "footprint_factor"),
-    *("absent", "surface", "sensitivity_readings"),
-)
-"""Keys of the table fuzzy that only the liver's knowledge bases have."""
 
 
 def contradictions(scene: Scene, table: Table) -> Iterator[str]:
@@ -124,6 +118,9 @@ def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for key in ("unit", "axes", "pieces", "suit"):
         if organ.mesh is None and _has(table, ("organ", key)):
             yield f"organ.{key}: has no effect without organ.mesh; remove it"
+    for key in organ.suit:
+        if not has_effect(scene, key):
+            yield f"organ.suit: {key} has no effect in this scene; leave it out"
     if organ.axes is not None:
         yield from _axes_problems(organ.axes, "organ.axes")
 
@@ -375,7 +372,7 @@ def _place_of_inclusion(name: str, one: Inclusion) -> Iterator[str]:
 def _feature_contradictions(scene: Scene) -> Iterator[str]:
     """Models that cannot follow what the scene asks."""
     for feature in scene.features:
-        able = [name for name in MODELS.names() if feature in _kind(name).able]
+        able = [name for name in MODELS.names() if feature in _kind(name).supported_features]
         for name in scene.models:
             if name not in able:
                 yield (

@@ -6,18 +6,19 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args, get_origin, get_type_hints
 
 from study.annotation.quantity import Quantity
-from study.scene import Organ, Scene, SpringLaw, Support, Tool
-from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
+from study.scene import Scene, SpringLaw
+from study.scene.consistency import MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
-from study.scene.graded import has_graded
 from study.scene.schema import SuitedKey
 from study.scene.text import key_lines, parsed, read_text
+from study.scene.unused import has_effect, unused
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -49,9 +50,8 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     for override in overrides:
         lines[_apply(table, override)] = 0  # on no line
     _resolve_files(table, Path.cwd())
-    if name in BUILT_IN:
-        _suit_the_rest(table, overrides)
-    return validate(table, name, lines)
+    scene = validate(table, name, lines)
+    return _suiting_the_rest(scene, overrides) if name in BUILT_IN else scene
 
 
 def _split_lists(table: Table) -> None:
@@ -72,15 +72,15 @@ def _join_lists(table: Table) -> None:
             table[name] = [table[name], *further]
 
 
-def _suit_the_rest(table: Table, overrides: Sequence[str]) -> None:
+def _suiting_the_rest(scene: Scene, overrides: Sequence[str]) -> Scene:
     """A built-in scene is made for its own organ: what is not overridden follows another one."""
-    organ = table.get("organ")
-    if isinstance(organ, dict) and "mesh" in organ and "suit" not in organ:
-        given = {override.partition("=")[0].strip() for override in overrides}
-        whole = {key.partition(".")[0] for key in given if "." not in key}
-        organ["suit"] = [
-            key for key in SUITED if key not in given and key.partition(".")[0] not in whole
-        ]
+    given = {override.partition("=")[0].strip().lower() for override in overrides}
+    whole = {key.partition(".")[0] for key in given if "." not in key}
+    if scene.organ.mesh is None or scene.organ.suit or "organ.suit" in given:
+        return scene
+    keys = (key for key in SUITED if key not in given and key.partition(".")[0] not in whole)
+    suit = tuple(key for key in keys if has_effect(scene, key))
+    return replace(scene, organ=replace(scene.organ, suit=cast(tuple[SuitedKey, ...], suit)))
 
 
 def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) -> Scene:
@@ -150,111 +150,13 @@ def write_scene(scene: Scene) -> str:
 def resolved(scene: Scene) -> Table:
     """Plain table of every value in use, quantities as text with unit."""
     table = _plain(scene)
-    for key in _unused(scene):
+    for key in unused(scene):
         _remove(table, key)
     if scene.is_point:
         for key in MESH_ONLY:
             _remove(table, key)
     _join_lists(table)
     return table
-
-
-def _unused(scene: Scene) -> Iterator[tuple[str | int, ...]]:
-    """Keys that mean nothing for the shape, history, springs and damping in use."""
-    yield from _unused_of_organ(scene.organ)
-    if not scene.remarks:
-        yield ("remarks",)
-    own = ("rule_base", "inputs", "unit")
-    for key in own if scene.fuzzy.rule_base is None else LIVER_ONLY:
-        yield "fuzzy", key
-    yield from _unused_of_load(scene)
-    yield from _unused_of_supports(scene)
-    yield from _unused_of_tissue(scene)
-    if scene.lattice.springs == "tetrahedra":
-        for key in ("spacing", "flexion", "body_diagonals"):
-            yield "lattice", key
-    for key in ("mass", "stiffness") if scene.damping.kind == "eq-2" else ("ratio",):
-        yield "damping", key
-    if scene.reference.method != "modal":
-        yield "reference", "modes"
-    for name in ("superposition", "corrected"):
-        if name not in scene.models:
-            yield (name,)
-    if not has_graded(scene):
-        yield ("region",)
-
-
-def _unused_of_load(scene: Scene) -> Iterator[tuple[str | int, ...]]:
-    for one in _unused_of_tool(scene.tool):
-        yield "tool", *one
-    for n, tool in enumerate(scene.further_tools):
-        for one in _unused_of_tool(tool):
-            yield "further_tools", n, *one
-    if not scene.further_tools:
-        yield ("further_tools",)
-    if not scene.weight:
-        yield ("weight",)
-    if not scene.gravity.acceleration:
-        yield ("gravity",)
-
-
-def _unused_of_tissue(scene: Scene) -> Iterator[tuple[str | int, ...]]:
-    if not scene.tissue.inclusion:
-        yield "tissue", "inclusion"
-
-
-def _unused_of_supports(scene: Scene) -> Iterator[tuple[str | int, ...]]:
-    for one in _unused_of_support(scene.support):
-        yield "support", one
-    for n, support in enumerate(scene.further_supports):
-        for one in _unused_of_support(support):
-            yield "further_supports", n, one
-    if not scene.further_supports:
-        yield ("further_supports",)
-
-
-def _unused_of_support(support: Support) -> Iterator[str]:
-    """Keys of the other kinds, and of a side where it is at a place."""
-    if support.kind == "foundation":
-        yield "kind"
-    else:
-        yield "stiffness"
-    if support.place is not None:
-        yield "depth"
-        if support.kind != "sliding":
-            yield "side"
-
-
-def _unused_of_tool(tool: Tool) -> Iterator[tuple[str | int, ...]]:
-    """Keys of the other kinds of tool and history."""
-    unused = ["force"] if tool.is_moved else ["shape", "clearance", "contact", "friction"]
-    unused += [] if tool.path else ["path"]
-    timed = tool.path and tool.is_moved  # its path says when
-    unused += ["history"] if timed else []
-    for key in unused:
-        yield (key,)
-    if timed:
-        return
-    for key, kind in (
-        ("ramp", "ramp-hold-release"),
-        ("hold", "ramp-hold-release"),
-        ("release", "ramp-hold-release"),
-        ("frequency", "sinusoid"),
-    ):
-        if tool.history.kind != kind:
-            yield "history", key
-
-
-def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
-    if organ.mesh is not None:
-        yield "organ", "shape"
-    else:
-        yield "organ", "pieces"
-    if not organ.suit:
-        yield "organ", "suit"
-    for key, shape in (("size", "block"), ("volume", "liver")):
-        if organ.mesh is not None or organ.shape != shape:
-            yield "organ", key
 
 
 def _refuse_mesh(name: str) -> None:

@@ -26,8 +26,8 @@ from study.problem.supports import (
     Supports,
     free_motion,
 )
+from study.problem.tool_travel import full_share
 from study.problem.trajectory import Observation
-from study.problem.way import full_share
 from study.scene.obstacles import notes_on_misses, refuse_blocked
 from study.scene.place import OUTWARD, refuse_far, resolve
 from study.scene.schema import END_POINT, TOOL_POINT, Organ, Place, Scene, Tool

@@ -37,6 +37,7 @@ SuitedKey = Literal[
     "support.stiffness",
     "tool.radius",
     "tool.force",
+    "tool.displacement",
     "lattice.spacing",
     "reference.element_size",
 ]

@@ -15,8 +15,15 @@ from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.signed_distance import SignedDistance
 from study.mesh.tetrahedra import boundary, volumes
 from study.organ.geometry import Geometry
+from study.problem.heterogeneous import (
+    OUTLINE,
+    SAMPLES,
+    Ellipsoid,
+    HeterogeneousTissue,
+    Region,
+    of_tetrahedra,
+)
 from study.problem.tissue import Tissue
-from study.problem.varied import OUTLINE, SAMPLES, Ellipsoid, Region, VariedTissue, of_tetrahedra
 from study.scene.place import resolve
 from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
 
@@ -48,7 +55,7 @@ def tissue_of(table: OrganTissue, geometry: Geometry) -> Tissue:
     )
     if not table.inclusion and table.stiffness_map is None:
         return base
-    found = VariedTissue(
+    found = HeterogeneousTissue(
         youngs_modulus=base.youngs_modulus,
         poisson_ratio=base.poisson_ratio,
         density=base.density,
@@ -108,7 +115,7 @@ def _unmoved(place: Place) -> Place:
     return Place(fraction=place.fraction, point=place.point, snap=False)
 
 
-def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> None:
+def _check(tissue: HeterogeneousTissue, table: OrganTissue, mesh: TetrahedralMesh) -> None:
     made = of_tetrahedra(mesh, tissue)
     assert made is not None  # noqa: S101 - of varied tissue
     for number, (region, share) in enumerate(zip(tissue.regions, made.share.T, strict=True)):
@@ -139,7 +146,7 @@ def _check(tissue: VariedTissue, table: OrganTissue, mesh: TetrahedralMesh) -> N
         )
 
 
-def _lies_in(mesh: TetrahedralMesh, tissue: VariedTissue) -> bool:
+def _lies_in(mesh: TetrahedralMesh, tissue: HeterogeneousTissue) -> bool:
     made = of_tetrahedra(mesh, tissue)
     return made is not None and bool(made.share.sum() * SAMPLES >= FEWEST)
 

@@ -9,18 +9,22 @@ from numpy.typing import NDArray
 
 from study.mesh.kinds import SurfaceMesh
 from study.problem.contact import Load, ToolPatch
-from study.problem.way import APART, SAME, stations, turns
+from study.problem.tool_travel import APART, SAME, station_loads, stations
 from study.scene.place import depths
 from study.scene.schema import Tool
 
 Floats = NDArray[np.float64]
 
 
+class OffSurfaceError(ValueError):
+    """A way that leaves the surface facing its tool."""
+
+
 def travelling(tool: Tool, patch: ToolPatch, surface: SurfaceMesh) -> tuple[Load, ...]:
     """A load at each station of a tool's path, the first one at its place.
 
-    ValueError naming the path where it leaves the surface, has no length across the push, or takes
-    too many stations.
+    ValueError naming the path where it leaves the surface, an OffSurfaceError, has no length across
+    the push, or takes too many stations.
     """
     offsets = np.array([point.offset or (0.0, 0.0, 0.0) for point in tool.path])
     across = offsets - np.outer(offsets @ patch.direction, patch.direction)
@@ -33,7 +37,7 @@ def travelling(tool: Tool, patch: ToolPatch, surface: SurfaceMesh) -> tuple[Load
     places = _on_surface(patch, found.away, reached, surface)
     return tuple(
         Load(replace(patch, centre=place), turn)
-        for place, turn in turns(
+        for place, turn in station_loads(
             found, places, times, marks, tool.history.factor, SAME * tool.radius
         )
     )
@@ -48,7 +52,7 @@ def _on_surface(patch: ToolPatch, away: Floats, reached: Floats, surface: Surfac
     for offset, time in zip(away, reached, strict=True):
         met = depths(patch.centre + offset, patch.direction, surface)
         if not met.size or np.abs(met - before).min() > patch.radius:
-            raise ValueError(
+            raise OffSurfaceError(
                 f"{patch.name}.path: leaves the surface that faces the tool, "
                 f"{1e3 * np.linalg.norm(offset):.3g} mm across from {patch.name}.place at "
                 f"{time:.3g} s; end it before, or move the place"

@@ -1,8 +1,8 @@
-"""How alike two motions of one control point are, each measure a score in [0, 1].
+"""Similarity of two motions of one control point; each measure is a score in [0, 1].
 
-`study.similarity.score` holds the table of measures; every other module is one measure or one step
-of it. The phase plane is scored by its shape and the time histories by their timing, so no single
-number stands for likeness: scores of different measures must not be compared with each other.
+`study.similarity.score` holds the table of measures; every other module is one measure or a step of
+one. The phase plane is scored by its shape and the time histories by their timing. No single number
+expresses similarity: scores of different measures must not be compared with each other.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ Floats = NDArray[np.float64]
 def area_between(one: Floats, other: Floats) -> float:
     """Area between polygonal curves (n, 2) and (m, 2), closed by joining their starts and ends.
 
-    It is the integral of |w| over the plane, w the winding number of the way out along one curve
-    and back along the other: of two graphs over the same abscissae the integral of |f - g|, of two
-    loops run in the same sense what lies in one of them only.
+    It is the integral of |w| over the plane, with w the winding number of the closed path out along
+    one curve and back along the other: for two graphs over the same abscissae the integral of |f -
+    g|, for two loops of the same sense the area inside only one of them.
     """
     start, end = _edges(np.concatenate([one, other[::-1]]))
     if not len(start):
@@ -23,7 +23,7 @@ def area_between(one: Floats, other: Floats) -> float:
 
 
 def _edges(polygon: Floats) -> tuple[Floats, Floats]:
-    """Starts and ends of the edges of a closed polygon that are not level: the others have no w."""
+    """Start and end points of the edges of a closed polygon that are not horizontal."""
     start, end = polygon, np.roll(polygon, -1, axis=0)
     rising = start[:, 1] != end[:, 1]
     return start[rising], end[rising]
@@ -46,9 +46,10 @@ def _crossing_ordinates(start: Floats, end: Floats) -> Floats:
 
 
 def _between_levels(start: Floats, end: Floats, levels: Floats) -> float:
-    """Integral of |w| by the slabs between levels (s,), in none of which edges begin, end or cross.
+    """Integral of |w| over the horizontal slabs between levels (s,).
 
-    In a slab the edges part it into trapezoids, whose width half way up is their mean width.
+    No edges begin, end or cross within a slab. The edges divide it into trapezoids, whose width at
+    half height is their mean width.
     """
     rising = end[:, 1] > start[:, 1]
     lower = np.searchsorted(levels, np.where(rising, start[:, 1], end[:, 1]))

@@ -1,4 +1,4 @@
-"""How far apart two displacements are, over the volume of the organ or of a motion."""
+"""Norms and differences of displacement fields over the organ, and of curves over time."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 TINY = 1e-300
-"""In place of the size of curves that do not move."""
+"""Replaces the norm of curves that do not move."""
 
 
 def norm(field: Floats, volumes: Floats) -> float:
-    """L2 norm over the organ of a field (q, 3) at points that stand for `volumes` [m^3] (q,)."""
+    """L2 norm over the organ of a field (q, 3) at points with weights `volumes` [m^3] (q,)."""
     return float(np.sqrt(volumes @ (field**2).sum(axis=1)))
 
 
@@ -22,16 +22,16 @@ def relative_l2(field: Floats, reference: Floats, volumes: Floats) -> float:
 
 
 def best_factor(field: Floats, reference: Floats, volumes: Floats) -> float:
-    """Factor on a field that brings it nearest to the reference.
+    """Factor on a field that minimises its distance from the reference.
 
-    A linear model at rest is softer by this factor if its stiffness is divided by it, so what is
-    left at the best factor is what no estimate of one stiffness can remove.
+    Dividing the stiffness of a linear model at rest by this factor multiplies its displacement by
+    it, so what remains at the best factor is what no estimate of one stiffness can remove.
     """
     product = volumes @ (field * reference).sum(axis=1)
     return float(product / norm(field, volumes) ** 2)
 
 
 def relative_l2_of_curves(difference: Floats, of: Floats) -> Floats:
-    """L2 norm over the samples of curves (samples, probes, 3) over that of others, (probes,)."""
+    """L2 norm over time of curves (samples, probes, 3) over that of others, (probes,)."""
     sizes = [np.sqrt((x**2).sum(axis=(0, 2))) for x in (difference, of)]
     return np.asarray(sizes[0] / np.maximum(sizes[1], TINY))

@@ -1,4 +1,4 @@
-"""What makes two motions of a control point comparable."""
+"""Conditions under which two motions of a control point can be compared."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LARGEST, SMALLEST = 1e30, 1e-30
 
 
 def check_pair(candidate: Motion, reference: Motion) -> None:
-    """Raise ValueError, saying which curve is at fault, unless the pair can be scored."""
+    """Raise ValueError, naming the curve at fault, unless the pair can be scored."""
     for role, motion in (("candidate", candidate), ("reference", reference)):
         _check_samples(role, motion)
     _check_times(candidate.time, reference.time)

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 
 def rank_ranges(better: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last rank that each of n models may have, 1 the best; `better` (n, n).
+    """First and last possible rank of n models, 1 the best; `better` (n, n).
 
-    `better[i, j]`: model i is known to be better than j. A model has the first rank left by those
-    known to be better and the last one left by those known to be worse, so two that are not known
-    to differ share a rank, and nothing is rounded into groups. Who is better than one that is
-    better than a third is better than the third.
+    `better[i, j]`: model i is known to be better than j. The first rank of a model follows the
+    models known to be better, and its last rank precedes those known to be worse, so that two
+    models not known to differ share ranks. The relation is completed transitively.
     """
     closed = better.copy()
     for k in range(len(closed)):

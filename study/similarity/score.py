@@ -1,10 +1,10 @@
-"""Which measure scores which curve, and the scores of one motion against another.
+"""The measures by curve, and the scores of one motion against another.
 
-Correlation and cosine are not among the measures and never rank: both are blind to amplitude. A
-candidate in millimetres where the reference is in metres correlates perfectly with it, and a damped
-oscillator that is 20 % too stiff still does to 0.994.
+Correlation and cosine are not among the measures: both are blind to amplitude. A candidate in
+millimetres correlates perfectly with a reference in metres, and a damped oscillator that is 20 %
+too stiff still reaches 0.994.
 
-To add a measure: write one function of (candidate, reference) with values in [0, 1] and add one
+To add a measure, write one function of (candidate, reference) with values in [0, 1] and add one
 line to `TIME_HISTORY` or `PHASE_PLANE`.
 """
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Measure:
-    """`score` maps candidate and reference to [0, 1]; `formula` says how, for a reader."""
+    """`score` maps candidate and reference to [0, 1]; `formula` states it for a reader."""
 
     name: str
     formula: str
@@ -36,7 +36,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Score:
-    """`value` in [0, 1], 1 = same curve, of one measure on one curve kind."""
+    """`value` in [0, 1], 1 for equal curves, of one measure on one kind of curve."""
 
     curve: str
     measure: str
@@ -64,7 +64,7 @@ FORMULAS: dict[str, str] = {m.name: m.formula for m in TIME_HISTORY + PHASE_PLAN
 
 
 def scores(candidate: Motion, reference: Motion) -> tuple[Score, ...]:
-    """Score of every measure on every curve kind, in the order of `MEASURES`.
+    """Scores of every measure on every kind of curve, in the order of `MEASURES`.
 
     Raises ValueError if the motions cannot be compared: samples that are not finite, different
     times, fewer than 8 samples, or a reference that does not move.
@@ -78,7 +78,7 @@ def scores(candidate: Motion, reference: Motion) -> tuple[Score, ...]:
 
 
 def curve(motion: Motion, kind: str) -> Floats:
-    """Samples of one curve kind: shape (samples,), or (samples, 2) for "phase-plane"."""
+    """Samples of one kind of curve: shape (samples,), or (samples, 2) for "phase-plane"."""
     if kind == "phase-plane":
         return np.column_stack([motion.displacement, motion.velocity])
     return motion.displacement if kind == "displacement" else motion.velocity

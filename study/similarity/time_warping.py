@@ -1,4 +1,4 @@
-"""Dynamic time warping inside a band, as ISO/TS 18571 uses it to compare magnitudes."""
+"""Dynamic time warping within a band, as ISO/TS 18571 uses it to compare magnitudes."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ Indices = NDArray[np.int64]
 Choices = NDArray[np.uint8]
 
 STEPS = ((1, 0), (0, 1), (1, 1))
-"""Of (i, j) along a path; of equally cheap ones the first is taken."""
+"""Steps of (i, j) along a path; of equally cheap ones the first is taken."""
 
 
 def warping_path(x: Floats, y: Floats, half_width: int) -> tuple[Indices, Indices]:
-    """Pairs (i, j) from both starts to both ends of least summed (x_i - y_j)^2.
+    """Pairs (i, j) from both starts to both ends with the least sum of (x_i - y_j)^2.
 
-    `x`, `y` have shape (n,); pairs keep |i - j| <= `half_width`. Steps are (1, 0), (0, 1) and
-    (1, 1), all of weight one; of equally cheap steps the first named is taken, so the path is
-    unique.
+    `x`, `y` have shape (n,); pairs keep |i - j| <= `half_width`. Steps are (1, 0), (0, 1) and (1,
+    1), all with weight one; of equally cheap steps the first named is taken, so the path is unique.
     """
     steps, first = _cheapest_steps(x, y, half_width)
     return _trace_back(steps, first)
 
 
 def _cheapest_steps(x: Floats, y: Floats, half_width: int) -> tuple[Choices, Indices]:
-    """Number in `STEPS` of the best step into each cell (i, j), of i + j = k in row k.
+    """Number in `STEPS` of the best step into each cell (i, j), with i + j = k in row k.
 
-    Row k begins with the cell of i = first[k]. Its cells need the two rows before only, so the
-    costs are kept of three rows and memory grows with the band: a byte for each of its cells.
+    Row k begins at i = first[k]. Its cells depend on the two previous rows only, so costs are kept
+    for three rows, and memory grows with the band: one byte per cell.
     """
     n = len(x)
     rank = np.arange(2 * n - 1)

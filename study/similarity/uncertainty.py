@@ -1,21 +1,21 @@
-"""How far the scores of a pair of motions depend on how the motion was observed.
+"""How much the scores of a pair of motions depend on how the motion was observed.
 
-Scores are computed once more without each block of the motion, from every second sample, over
-shorter windows and on other axes of the phase plane. The same is done for every pair, so that two
-models can be compared block by block: the difference of their scores is then far better known than
-either score.
+Scores are computed again without each block of the motion, from every second sample, over shorter
+windows, and on other axes of the phase plane. The same variations are applied to every pair, so
+that two models can be compared block by block: the difference of their scores is then known far
+better than either score.
 
 Interval. It is the delete-block jackknife (Kuensch 1989, doi 10.1214/aos/1176347265): the motion is
-cut into equal blocks, a score is computed without each in turn, and what these differ by, scaled to
-the whole, times Student's t, is half the interval. Five and ten blocks are tried and the wider
-interval is kept, for how long a deviation lasts is not known. A bootstrap would lay blocks behind
-each other in random order, and a loop, a slope or a time warping across their joints is none; what
-is left out here leaves one joint. It says how evenly a score is borne by the motion: how far it
-would move had another stretch of the same kind been recorded. A push and its release are no
-stationary process, so it is a yardstick of 95 % and no probability, and it knows nothing of the
-errors of the models. Scores that are held at 0 or 1 have none.
+cut into equal blocks and a score computed without each in turn; half the interval is Student's t
+times the resulting standard error. Five and ten blocks are tried and the wider interval kept,
+because the correlation length of deviations is unknown. A bootstrap would join blocks in random
+order, and a loop, slope or time warping across those joints is meaningless; deleting a block leaves
+one joint. The interval shows how evenly the score is spread over the motion: how far it would move
+had another stretch of the same kind been recorded. A push and its release are not a stationary
+process, so it is a 95 % yardstick and not a probability, and it does not include the errors of the
+models. Scores that are clipped at 0 or 1 have none.
 
-Curves of more than LONGEST samples are thinned first, to bound the cost.
+Curves of more than LONGEST samples are thinned first, to limit the cost.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ BLOCK_COUNTS = (5, 10)
 LEVEL = 0.95
 LONGEST = 401
 CUTS = ((0.1, 0.0), (0.0, 0.1), (0.2, 0.0), (0.1, 0.1), (0.0, 0.2))
-"""Shares of the samples that the windows leave out at the start and at the end."""
+"""Shares of the samples that the windows omit at the start and at the end."""
 WHOLE_RANGE = 1.0
-"""Of a score, for what is not defined on a part of the motion and so is not known."""
+"""Stated where a score is not defined on part of the motion: the full range of a score."""
 
 
 @dataclass(frozen=True)
 class Variants:
-    """Scores of a pair computed in other ways, or differences of such scores, by m measures.
+    """Scores of a pair computed in other ways, or differences of such scores, for m measures.
 
     `whole` (m,); `blocks` (k, m) without each of k blocks, for every entry of BLOCK_COUNTS;
     `halved` (m,) from every second sample; `windows` (5, m) over those of CUTS; `axes` (2, m) with
-    the phase plane divided by the larger reach of both curves, and by the reference's root mean
-    square. NaN where the reference does not move in what is left.
+    the phase plane scaled by the larger range of both curves, and by the reference's root mean
+    square. NaN where the reference does not move in the part that is used.
     """
 
     whole: Floats
@@ -61,7 +61,7 @@ class Variants:
     axes: Floats
 
     def __sub__(self, other: Variants) -> Variants:
-        """Differences, each of the same blocks, samples, window and axes of both."""
+        """Differences, each with the same blocks, samples, window and axes for both."""
         return Variants(
             self.whole - other.whole,
             tuple(a - b for a, b in zip(self.blocks, other.blocks, strict=True)),
@@ -72,11 +72,12 @@ class Variants:
 
 
 class Spread(NamedTuple):
-    """What scores or differences of two depend on, (m,) each, in units of the score.
+    """The uncertainty of scores, or of differences of two, (m,) each, in units of the score.
 
     `interval`: half the 95 % block interval; `resampled`: change with every second sample;
     `window`: range over windows of at least 80 % of the samples; `axes`: largest change with other
-    axes of the phase plane. An interval is infinite, and another part 1, where it is not defined.
+    axes of the phase plane. Where a part is not defined, an interval is infinite and another part
+    1.
     """
 
     interval: Floats
@@ -86,7 +87,7 @@ class Spread(NamedTuple):
 
 
 def variants(candidate: Motion, reference: Motion) -> Variants:
-    """Scores of a pair that `study.similarity.motion.check_pair` accepts, in all these ways."""
+    """All variants of the scores of a pair that `study.similarity.motion.check_pair` accepts."""
     every = -(-(len(reference.time) - 1) // (LONGEST - 1))
     pair = _of((candidate, reference), slice(None, None, every))
     n, whole = len(pair[0].time), _scores(pair)
@@ -100,7 +101,7 @@ def variants(candidate: Motion, reference: Motion) -> Variants:
 
 
 def spread(found: Variants) -> Spread:
-    """The parts of what scores or differences depend on."""
+    """The parts of the uncertainty of scores or of their differences."""
     windows = np.vstack([found.whole, found.windows])
     return Spread(
         np.max([_half_interval(table) for table in found.blocks], axis=0),
@@ -126,7 +127,7 @@ def _known(change: Floats) -> Floats:
 
 
 def _without_block(n: int, count: int) -> Iterable[NDArray[np.int64]]:
-    """Indices of the samples that are left without each block."""
+    """Indices of the remaining samples without each block."""
     index = np.arange(n)
     return (np.setdiff1d(index, block) for block in np.array_split(index, min(count, n)))
 
@@ -162,7 +163,7 @@ def _scores(pair: Pair) -> Floats:
 
 
 def _on_other_axes(pair: Pair, whole: Floats) -> Floats:
-    """Scores (2, m), those of anything but the phase plane as they are."""
+    """Scores (2, m) on other axes; those of other curves than the phase plane are unchanged."""
     own, true = pair
     both = ((own.displacement, true.displacement), (own.velocity, true.velocity))
     reach = [max(np.abs(a).max(), np.abs(b).max()) for a, b in both]

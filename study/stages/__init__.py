@@ -1,1 +1,1 @@
-"""Stages of a run: what each depends on, kept on disk once computed, and run side by side."""
+"""Stages of a run: their keys, the store of their results, and the pool that runs them."""

@@ -1,9 +1,9 @@
-"""What stages gave, on disk: a file for each under its key, the oldest removed when they are many.
+"""Results of stages on disk: one file per key, the least recently used removed beyond a size limit.
 
-A file is written aside and moved into place, so it is whole or absent, whenever a run is killed and
-however many run at once: two that write the same stage write equal files. It is an .npz of plain
-arrays, read without unpickling anything, and is held against its own SHA-256 and its key. One that
-fails is as good as none, and is removed.
+A file is written under a temporary name and moved into place, so that it is complete or absent
+however a run ends and however many run at once; two runs of the same stage write equal files. It is
+an .npz of plain arrays, read without unpickling, and is verified against its own SHA-256 and its
+key. A file that fails is treated as missing, and removed.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from study.folders import FolderError, naming, refusal, tell
 from study.sweep.canonical import Plain, canonical, digest
 
 if TYPE_CHECKING:
-    from study.stages.flat import Arrays
+    from study.stages.serialisation import Arrays
 
 FOLDER, LIMIT = "LIVER_STUDY_STORE", "LIVER_STUDY_STORE_LIMIT"
-"""Environment variables: the folder of stages, and its limit with a unit, such as "4 GB"."""
+"""Environment variables: the folder of the store, and its limit with a unit, such as "4 GB"."""
 DEFAULT_LIMIT = 2_000_000_000
 UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 SUFFIX = ".npz"
-RECORD, SEAL = "record", "sha256"
-LEFT_ASIDE = 3600.0
-"""Seconds after which a file that is being written aside is one of a killed run."""
+RECORD, CHECKSUM = "record", "sha256"
+STALE_AFTER = 3600.0
+"""Age [s] beyond which a temporary file is taken for that of a killed run."""
 DAMAGED = (
     *(OSError, ValueError, EOFError, KeyError, TypeError, NotImplementedError, RuntimeError),
     *(MemoryError, RecursionError, AttributeError, zipfile.BadZipFile, zlib.error, struct.error),
 )
-"""What numpy, zipfile and json raise for files that are cut or altered."""
+"""Exceptions of numpy, zipfile and json for truncated or altered files."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What a stage gave: a plain value, its arrays, seconds of work, and when it ended [s, UTC]."""
+    """A stored result: a plain value, its arrays, seconds of work, and when it ended [s, UTC]."""
 
     value: Any
     arrays: Arrays
@@ -56,15 +56,16 @@ class Entry:
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of stages, of at most `limit` bytes once a stage has been put there."""
+    """A folder of results, limited to `limit` bytes after each addition."""
 
     folder: Path
     limit: int = DEFAULT_LIMIT
 
     def prepare(self) -> None:
-        """Make the folder, for its owner alone.
+        """Create the folder, accessible to its owner only.
 
-        FolderError if it cannot be written, or others may write what would be believed here.
+        FolderError if it is not writable, or if others could write to it, whose content would be
+        trusted.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -80,7 +81,7 @@ class Store:
             )
 
     def get(self, key: str) -> Entry | None:
-        """What the stage of a key gave, None if there is nothing that can be believed."""
+        """The result stored under a key, None if there is no valid one."""
         path = self._path(key)
         if not path.exists():
             return None
@@ -93,7 +94,7 @@ class Store:
         return found
 
     def put(self, key: str, value: Any, arrays: Arrays, wall: float) -> Entry:
-        """Keep what a stage gave. OSError naming the folder if it cannot be written."""
+        """Store a result. OSError naming the folder if it cannot be written."""
         entry = Entry(value, arrays, wall, time.time())
         path = self._path(key)
         aside = path.with_name(f".{uuid.uuid4().hex}{SUFFIX}")
@@ -108,7 +109,7 @@ class Store:
         return entry
 
     def size(self) -> int:
-        """Bytes of all stages."""
+        """Total size of all results in bytes."""
         return sum(state.st_size for _, state in self._files())
 
     def _path(self, key: str) -> Path:
@@ -120,14 +121,14 @@ class Store:
                 yield path, path.stat()
 
     def _evict(self, newest: Path) -> None:
-        """Remove what was not used for longest until the limit is kept, and what killed runs left.
+        """Remove the least recently used results beyond the limit, and files of killed runs.
 
-        The newest stays: a stage larger than the limit would else be computed for nothing.
+        The newest stays: otherwise a result larger than the limit would be computed for nothing.
         """
         files = sorted(self._files(), key=lambda file: file[1].st_mtime)
         excess = sum(state.st_size for _, state in files) - self.limit
         for path, state in files:
-            is_left = path.name.startswith(".") and state.st_mtime < time.time() - LEFT_ASIDE
+            is_left = path.name.startswith(".") and state.st_mtime < time.time() - STALE_AFTER
             if is_left or (excess > 0 and path != newest and not path.name.startswith(".")):
                 excess -= state.st_size
                 with suppress(OSError):
@@ -135,10 +136,10 @@ class Store:
 
 
 def user_store() -> Store | None:
-    """The store of this user, as the environment names it, ready to be used.
+    """The store of this user, as the environment names it, ready for use.
 
-    ValueError for a folder or a limit named there that will not do; where the user's own cache will
-    not, there is no store, and a person is told.
+    ValueError for an unsuitable folder or limit in the environment. If the user's own cache folder
+    is unsuitable, there is no store, and a message says so.
     """
     named = os.environ.get(FOLDER)
     store = Store(Path(named).absolute() if named else _user_cache(), _limit())
@@ -153,7 +154,7 @@ def user_store() -> Store | None:
 
 
 def _user_cache() -> Path:
-    """The folder for what a program may make again, as this system has it."""
+    """The operating system's folder for data that a program can recompute."""
     given = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     if given and Path(given).is_absolute():
         return Path(given) / "liver-study"
@@ -175,7 +176,7 @@ def _limit() -> int:
 
 
 def shown_size(count: int) -> str:
-    """A number of bytes for a person: "12 MB"."""
+    """A number of bytes as text: "12 MB"."""
     unit = max((u for u in UNITS if UNITS[u] <= max(count, 1)), key=UNITS.__getitem__)
     return f"{count / UNITS[unit]:.3g} {unit}"
 
@@ -184,19 +185,19 @@ def shown_size(count: int) -> str:
 
 
 def _is_open_to_others(state: os.stat_result) -> bool:
-    """Whether another user may write a folder; only systems that know such users tell."""
+    """Whether another user may write to a folder, where the system has such permissions."""
     if not hasattr(os, "geteuid"):
         return False
     return state.st_uid != os.geteuid() or bool(state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def _write(path: Path, key: str, entry: Entry) -> None:
-    """To the disk itself, so that a power cut leaves no empty file under a key."""
+    """Write and flush to the disk, so that a power cut leaves no empty file under a key."""
     import numpy as np
 
     text = canonical({"key": key, "value": entry.value, "wall": entry.wall, "at": entry.measured})
     arrays = entry.arrays
-    marks = {RECORD: np.array(text), SEAL: np.array(_seal(text, arrays))}
+    marks = {RECORD: np.array(text), CHECKSUM: np.array(_checksum(text, arrays))}
     with path.open("xb") as file:
         np.savez(file, allow_pickle=False, **marks, **arrays)
         file.flush()
@@ -209,16 +210,16 @@ def _read(path: Path, key: str) -> Entry | None:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             arrays: Arrays = {name: found[name] for name in found.files}
-        text, seal = str(arrays.pop(RECORD)), str(arrays.pop(SEAL))
+        text, seal = str(arrays.pop(RECORD)), str(arrays.pop(CHECKSUM))
         record: Plain = json.loads(text)
-        if seal != _seal(text, arrays) or record["key"] != key:
+        if seal != _checksum(text, arrays) or record["key"] != key:
             return None
         return Entry(record["value"], arrays, record["wall"], record["at"])
     except DAMAGED:
         return None
 
 
-def _seal(text: str, arrays: Arrays) -> str:
+def _checksum(text: str, arrays: Arrays) -> str:
     """SHA-256 of the record and of each array with its name, type and shape."""
     import hashlib
 

@@ -1,8 +1,8 @@
-"""Parts of a product side by side, in as many threads as a run lets a process have.
+"""Parts of a product in as many threads as a run grants to a process.
 
-A process has one thread unless it is told otherwise, so that a sweep that fills all processors with
-runs does not share each of them among threads. Who waits for a part sleeps: a part whose processor
-is busy with something else is late, and takes no time from it.
+A process has one thread unless a run grants more, so that a sweep that occupies all processors does
+not oversubscribe them. Waiting for a part sleeps: a part on a busy processor delays its caller
+without taking processor time from it.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from study.stages.lanes import available
+from study.stages.job_pool import available
 
 _ALLOWED: ContextVar[int | None] = ContextVar("allowed", default=None)
 _HELPERS: dict[int, ThreadPoolExecutor] = {}
-"""The second thread of a process by its number: a fork has none of the threads before it."""
+"""The second thread by process id: a forked child does not inherit the parent's threads."""
 
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """Let what is done in the block use so many processors, or as many as there are."""
+    """Grant `count` processors to the code in the block, at most as many as there are."""
     token = _ALLOWED.set(max(1, min(count, available())))
     try:
         yield
@@ -31,14 +31,14 @@ def threads(count: int) -> Iterator[None]:
 
 
 def allowed(otherwise: int = 1) -> int:
-    """Processors that what is done now may use, `otherwise` if it was not said."""
+    """Number of processors granted to the calling code, `otherwise` if nothing was set."""
     return _ALLOWED.get() or otherwise
 
 
 def side_by_side(*parts: Callable[[], None]) -> None:
-    """Compute parts that do not touch each other: all here, or the second in another thread.
+    """Compute independent parts, the second of two in another thread where one is granted.
 
-    They are to release the interpreter's lock. Whatever a part raises is raised here.
+    Parts should release the interpreter lock. An exception of a part is raised here.
     """
     if len(parts) != 2 or allowed() < 2:
         for part in parts:

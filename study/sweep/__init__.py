@@ -1,1 +1,1 @@
-"""Many runs: in this process, on a local cluster or on a distant one, each kept as it finishes."""
+"""Many runs: in this process, on a local cluster or a remote one, each stored as it finishes."""

@@ -1,4 +1,4 @@
-"""Call the function of one task, here or in a worker."""
+"""Call the function of one task, in this process or in a worker."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Status = Literal["done", "failed", "crashed"]
 
 
 class Attempt(NamedTuple):
-    """How one call ended, after `wall` seconds; `value` only where it is done."""
+    """How one call ended, after `wall` seconds; `value` only if it succeeded."""
 
     status: Status
     value: Plain | None
@@ -25,8 +25,8 @@ class Attempt(NamedTuple):
 def attempt(function: str, arguments: str, identity: str) -> Attempt:
     """Call a function with the arguments in a JSON text.
 
-    Whatever it raises is an outcome. ValueError only if this process has another program than the
-    one of `identity`, whose result this would not be.
+    Whatever it raises is an outcome. ValueError only if the program of this process differs from
+    that of `identity`, since the result would not belong to it.
     """
     module, _, name = function.partition(":")
     if program(module) != identity:
@@ -45,7 +45,7 @@ def attempt(function: str, arguments: str, identity: str) -> Attempt:
 
 
 def _plain(value: object) -> Plain:
-    """The value as it would come back from the store, wherever it was computed."""
+    """The value as it would be read back from the store, wherever it was computed."""
     if not isinstance(value, dict):
         raise TypeError(f"returned {type(value).__name__}, not a dictionary")
     return dict(json.loads(canonical(value)))

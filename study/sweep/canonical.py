@@ -1,4 +1,4 @@
-"""Plain values: one text for equal ones, its SHA-256, and dataclasses made of them again."""
+"""Plain values: a canonical text, its SHA-256, and dataclasses restored from them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import json
 from typing import Any, TypeVar
 
 Plain = dict[str, Any]
-"""What JSON can say, by name: arguments and values of runs that go to other processes."""
+"""JSON values by name: arguments and results of runs that go to other processes."""
 Value = TypeVar("Value")
 
 
 def canonical(thing: object) -> str:
-    """JSON with sorted keys and no spaces. ValueError if the thing is not plain, or not finite."""
+    """JSON with sorted keys and no spaces. ValueError if the value is not plain or not finite."""
     try:
         return json.dumps(thing, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
@@ -28,7 +28,7 @@ def digest(thing: object) -> str:
 
 
 def restored(kind: type[Value], value: Plain) -> Value:
-    """A dataclass from its plain values, as a run returned or a store kept them."""
+    """A dataclass from the plain values that a run returned or a store kept."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind).validate_python(value)

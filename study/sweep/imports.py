@@ -1,4 +1,4 @@
-"""Which sources a module executes, found by reading its imports and not by running them."""
+"""Which sources a module executes, found by parsing imports without running them."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from pathlib import Path
 from study.folders import write_text
 
 STATEMENTS = ("body", "orelse", "handlers", "finalbody", "cases")
-"""Where a statement holds others."""
+"""Fields of a statement that hold other statements."""
 DYNAMIC = ("import_module", "__import__", "iter_modules", "walk_packages", "run_module")
-"""A source with one of these words may load modules by a name that no source states."""
+"""A source with one of these words may load modules by names that no source states."""
 TABLED = re.compile(r"""(["'])([a-z]\w*(?:\.\w+)*):[A-Z]\w*\1""")
 """A text such as "msm.integrators:INTEGRATORS", whose module is loaded when it is resolved."""
 
 KEPT = Path(__file__).parent / "__pycache__" / "imports.json"
-"""What sources import, by what is in them: to parse them takes longer than all else here."""
+"""Imports of each source by the hash of its text: parsing is the slowest part of this module."""
 MOST = 4_000
-"""Sources that are kept; where there are more, those of this process."""
+"""Largest number of cached sources; beyond it only those of this process are kept."""
 
 
 def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
-    """Sources under these folders that a module can come to import, itself included, by name.
+    """Sources below the folders `roots` that a module can import, itself included, by name.
 
-    Imports within functions count, and texts that name an object as "module:NAME". A module that
-    may load others by name is taken to load all of its package.
+    Imports within functions count, and so do texts that name an object as "module:NAME". A module
+    that may load others by name is assumed to load its whole package.
     """
     found: dict[str, Path] = {}
     waiting = {module}
@@ -46,7 +46,7 @@ def reached(module: str, roots: Sequence[Path]) -> dict[str, Path]:
 
 @functools.cache
 def _file(name: str, roots: tuple[Path, ...]) -> Path | None:
-    """Source of a module; None for what is elsewhere, and for names that are no modules."""
+    """Source of a module; None for a module outside the roots, and for a name that is no module."""
     places = [root.joinpath(*name.split(".")) for root in roots]
     candidates = [(place / "__init__.py", place.with_name(f"{place.name}.py")) for place in places]
     return next((path for pair in candidates for path in pair if path.is_file()), None)
@@ -69,17 +69,17 @@ def _named(name: str, path: Path) -> frozenset[str]:
 
 
 def _stated(package: str, text: str, file: str) -> list[str]:
-    """Names that a source of a package states, in order."""
+    """Names that a source of a package imports, in order."""
     tree = ast.parse(text, filename=file)
     names = {found for node in _statements(tree) for found in _imported(node, package)}
     return sorted(names | {found[2] for found in TABLED.finditer(text)})
 
 
 class _Known:
-    """Names that sources state, by SHA-256 of their text, of their package and of this module.
+    """Imported names by SHA-256 of the source's text, its package and this module.
 
-    They are kept beside the compiled kernels, and made again where they are missing, unreadable or
-    of another text. A folder that cannot be written is left alone.
+    They are cached beside the compiled kernels, and computed again where the cache is missing,
+    unreadable or of another text. A read-only folder is left alone.
     """
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class _Known:
         return names
 
     def keep(self) -> None:
-        """Write what is new."""
+        """Write new entries to the cache."""
         if self.is_kept:
             return
         known = self.before | self.used
@@ -109,7 +109,7 @@ class _Known:
 
 
 def _read(path: Path) -> dict[str, list[str]]:
-    """What was kept, without what is not such."""
+    """The cached entries, without malformed ones."""
     try:
         found = json.loads(path.read_bytes())
         return {
@@ -127,7 +127,7 @@ def _known() -> _Known:
 
 
 def _statements(node: ast.AST) -> Iterator[ast.stmt]:
-    """All that are within it, without the expressions, which are most of a source."""
+    """All statements within a node, without expressions, which make up most of a source."""
     for part in STATEMENTS:
         for below in getattr(node, part, ()):
             if isinstance(below, ast.stmt):
@@ -147,7 +147,7 @@ def _imported(node: ast.stmt, package: str) -> Iterator[str]:
 
 
 def _members(package: str, folder: Path) -> Iterator[str]:
-    """Every module of a package and of those within it."""
+    """Every module of a package and of its subpackages."""
     for path in folder.rglob("*.py"):
         parts = path.relative_to(folder).with_suffix("").parts
         yield ".".join([package, *(part for part in parts if part != "__init__")])

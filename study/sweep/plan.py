@@ -1,4 +1,4 @@
-"""What a sweep would still have to run, and for how long."""
+"""What a sweep still has to run, and for how long."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import NamedTuple
 
+from study.sweep.status import duration
 from study.sweep.store import Store, Stored
-from study.sweep.tally import duration
 from study.sweep.task import Task
 
 
 class Plan(NamedTuple):
-    """Counts of tasks, and the seconds that those left need one after another, None if unknown."""
+    """Numbers of tasks, and the sequential time [s] of those that remain, None if unknown."""
 
     total: int
     stored: int
@@ -20,7 +20,7 @@ class Plan(NamedTuple):
     seconds: float | None
 
     def __str__(self) -> str:
-        """For a person."""
+        """For a reader."""
         time = "an unknown time" if self.seconds is None else f"about {duration(self.seconds)}"
         return f"{self.total} runs, {self.stored} stored, {self.left} left: {time} of work"
 
@@ -35,12 +35,12 @@ def plan(tasks: Sequence[Task], store: Store) -> Plan:
 
 
 def _walls(tasks: Sequence[Task], stored: Sequence[Stored]) -> list[float | None]:
-    """Seconds that each task will take, by the stored runs of its function most like it."""
+    """Expected time [s] of each task, from the most similar stored runs of its function."""
     return [_wall(task, [run for run in stored if run.function == task.function]) for task in tasks]
 
 
 def _wall(task: Task, runs: Sequence[Stored]) -> float | None:
-    """Mean of the runs with the most arguments in common: exact if only the program has changed."""
+    """Mean over the runs with most arguments in common; exact if only the program has changed."""
     alike = [_common(task, run) for run in runs]
     return (
         fmean(run.wall for run, common in zip(runs, alike, strict=True) if common == max(alike))

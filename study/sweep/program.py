@@ -1,4 +1,4 @@
-"""What a result depends on beside its arguments: sources, data and the libraries that compute."""
+"""What a result depends on beside its arguments: sources, data files and numerical libraries."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ LIBRARIES = (
 
 @functools.cache
 def program(module: str) -> str:
-    """SHA-256 of what a function of this module can execute and read.
+    """SHA-256 of everything that a function of this module can execute and read.
 
-    That is the module, all sources that it imports, directly or not, all data files of the
-    packages, and the versions of libraries: rather a run too many than a stale result. Found once
-    in a process, so that a sweep keeps to the program it started with. ValueError if there is no
-    such module.
+    It covers the module, all sources that it imports directly or indirectly, all data files of the
+    packages, and the versions of libraries; when in doubt a run is repeated rather than a stale
+    result used. It is computed once per process, so that a sweep keeps the program it started with.
+    ValueError if there is no such module.
     """
     sources = reached(module, (_root(module), ROOT))
     files = {name: _sha256_once(path) for name, path in sources.items()}
@@ -48,7 +48,7 @@ def program(module: str) -> str:
 def everything(*more: str) -> str:
     """SHA-256 of all sources and data files of the packages and of `more`, and of the libraries.
 
-    What has the same is the same program, whatever a module of it imports; nothing is parsed.
+    Equal hashes mean the same program, whatever a module of it imports; nothing is parsed.
     """
     paths = (path for package in (*PACKAGES, *more) for path in (ROOT / package).rglob("*"))
     files = {
@@ -60,7 +60,7 @@ def everything(*more: str) -> str:
 
 
 def _root(module: str) -> Path:
-    """The folder that a module is found in, without running it."""
+    """The folder in which a module is found, without running it."""
     try:
         found = importlib.util.find_spec(module)
     except (ImportError, ValueError):

@@ -1,4 +1,4 @@
-"""Run tasks that have no result yet, here or on workers, and keep each result as it comes."""
+"""Run the tasks that have no stored result, here or on workers, and store each as it arrives."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from study.sweep.attempt import Attempt, Status, attempt
 from study.sweep.canonical import Plain, canonical
 from study.sweep.program import program
+from study.sweep.status import ReportStatus, SweepStatus, silent
 from study.sweep.store import Store
-from study.sweep.tally import Tally, Tell, silent
 from study.sweep.task import Task
 
 
 @dataclass(frozen=True)
-class How:
-    """Where a sweep runs: in this process, on `workers` local ones, or on those of a `scheduler`.
+class Backend:
+    """Where a sweep runs: in this process, on `workers` local processes, or on a `scheduler`.
 
     `scheduler`: address of a running Dask scheduler, such as "tcp://host:8786".
     """
@@ -26,7 +26,7 @@ class How:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be meant."""
+        """Refuse contradictory settings."""
         if self.workers < 0:
             raise ValueError(f"workers: {self.workers} is negative; give 0 to run in this process")
         if self.workers and self.scheduler is not None:
@@ -48,20 +48,23 @@ class Outcome:
 
 
 def run(
-    tasks: Sequence[Task], store: Store, how: How | None = None, progress: Tell = silent
+    tasks: Sequence[Task],
+    store: Store,
+    backend: Backend | None = None,
+    progress: ReportStatus = silent,
 ) -> list[Outcome]:
     """Outcomes of all tasks, in their order; only those without a stored result are run.
 
-    A result is stored when it comes, so an interruption costs the runs in flight. Failures and
-    crashes are not stored: their cause may lie outside the task (memory, a signal, a full disk), so
-    starting the sweep again tries each once more. Within a sweep every task has one attempt. In
-    this process a task that crashes takes the sweep with it; what was stored stays.
-    ValueError if the store cannot be made or workers cannot be had; what the machine or a signal
-    ends has a note of how to go on.
+    A result is stored when it arrives, so that an interruption loses only the runs in progress.
+    Failures and crashes are not stored, since their cause may lie outside the task (memory, a
+    signal, a full disk); a new sweep tries each of them again. Within a sweep every task has one
+    attempt. A task that crashes in this process ends the sweep; stored results remain. ValueError
+    if the store cannot be created or workers are unavailable. If the machine or a signal ends the
+    sweep, the exception has a note on how to continue.
     """
     store.prepare()
     try:
-        return _run(tasks, store, how or How(), progress)
+        return _run(tasks, store, backend or Backend(), progress)
     except (KeyboardInterrupt, MemoryError, OSError) as error:
         error.add_note(store.advice())
         raise
@@ -69,19 +72,21 @@ def run(
         store.tidy()
 
 
-def _run(tasks: Sequence[Task], store: Store, how: How, progress: Tell) -> list[Outcome]:
+def _run(
+    tasks: Sequence[Task], store: Store, backend: Backend, progress: ReportStatus
+) -> list[Outcome]:
     by_key = {task.key: task for task in tasks}
     ended = {name: kept for name, task in by_key.items() if (kept := _kept(task, store))}
     left = {name: task for name, task in by_key.items() if name not in ended}
-    tally, start = Tally(len(by_key), stored=len(ended)), time.perf_counter()
-    progress(tally)
-    with _attempts(tuple(left.values()), how) as attempts:
+    status, start = SweepStatus(len(by_key), stored=len(ended)), time.perf_counter()
+    progress(status)
+    with _attempts(tuple(left.values()), backend) as attempts:
         for task, found in attempts:
             if found.value is not None:
                 store.put(task, found.value, found.wall)
             ended[task.key] = found
-            tally = tally.counting(found.status == "done", time.perf_counter() - start)
-            progress(tally)
+            status = status.counting(found.status == "done", time.perf_counter() - start)
+            progress(status)
     return [Outcome(task, *ended[task.key]) for task in tasks]
 
 
@@ -92,9 +97,9 @@ def _kept(task: Task, store: Store) -> Attempt | None:
 
 
 @contextmanager
-def _attempts(tasks: Sequence[Task], how: How) -> Iterator[Iterator[tuple[Task, Attempt]]]:
-    """Each task with how it ended, as they end; workers are gone when the block ends."""
-    if not tasks or not (how.workers or how.scheduler):
+def _attempts(tasks: Sequence[Task], backend: Backend) -> Iterator[Iterator[tuple[Task, Attempt]]]:
+    """Each task with its outcome, in the order they end; workers are gone when the block ends."""
+    if not tasks or not (backend.workers or backend.scheduler):
         yield _here(tasks)
         return
     try:
@@ -105,7 +110,9 @@ def _attempts(tasks: Sequence[Task], how: How) -> Iterator[Iterator[tuple[Task, 
             '".[workers]"'
             ", or leave them out to run in this process"
         ) from None
-    place = distant(how.scheduler) if how.scheduler else local(min(how.workers, len(tasks)))
+    place = (
+        distant(backend.scheduler) if backend.scheduler else local(min(backend.workers, len(tasks)))
+    )
     with place as client:
         yield one_each(client, tasks)
 

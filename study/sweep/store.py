@@ -1,8 +1,8 @@
-"""Results of finished runs on disk, a file for each under its key.
+"""Results of finished runs on disk, one file per key.
 
-A file is written aside and moved into place, so it is whole or absent, also when two sweeps share a
-folder: they write equal results. What it holds is checked against its name and its own SHA-256, and
-a file that fails is as good as none.
+A file is written under a temporary name and moved into place, so that it is complete or absent,
+also when two sweeps share a folder: they write equal results. Its content is verified against its
+name and its own SHA-256, and a file that fails is treated as missing.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Store:
     folder: Path
 
     def prepare(self) -> None:
-        """Make the folder. FolderError if it cannot be written, before anything is computed."""
+        """Create the folder. FolderError if it is not writable, before anything is computed."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -48,22 +48,22 @@ class Store:
             raise FolderError(f"{self.folder}: may not be written; choose another folder")
 
     def tidy(self) -> None:
-        """Remove the folder if there is nothing in it."""
+        """Remove the folder if it is empty."""
         with suppress(OSError):
             self.folder.rmdir()
 
     def advice(self) -> str:
-        """How to go on after an interruption."""
+        """How to continue after an interruption."""
         if not any(self.folder.glob("[!.]*.json")):
             return "nothing was kept yet: start again"
         return f"start again: what is kept in {self.folder} is not computed twice"
 
     def get(self, task: Task) -> Stored | None:
-        """The result of a task, or None if there is none that can be believed."""
+        """The result of a task, or None if there is no valid one."""
         return _read(self._path(task.key))
 
     def put(self, task: Task, value: Plain, wall: float) -> None:
-        """Keep the result of a task. OSError that says how to go on if it cannot be written."""
+        """Store the result of a task. OSError that says how to continue if it cannot be written."""
         stored = Stored(task.function, task.arguments, program(task.module), value, wall)
         path = self._path(task.key)
         aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
@@ -77,7 +77,7 @@ class Store:
                 aside.unlink(missing_ok=True)
 
     def __iter__(self) -> Iterator[Stored]:
-        """All results that can be believed, of any program."""
+        """All valid results, of any program."""
         paths = sorted(self.folder.glob("[!.]*.json")) if self.folder.is_dir() else []
         yield from (stored for stored in map(_read, paths) if stored is not None)
 
@@ -86,7 +86,7 @@ class Store:
 
 
 def _write(path: Path, text: str) -> None:
-    """To the disk itself, so that a power cut leaves no empty file under a result's name."""
+    """Write and flush to the disk, so that a power cut leaves no empty file under a name."""
     with path.open("x", encoding="utf-8") as file:
         file.write(text)
         file.flush()
@@ -94,7 +94,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _read(path: Path) -> Stored | None:
-    """The result in a file, None if it is missing, damaged or another's."""
+    """The result in a file, None if it is missing, damaged or of another key."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         whole = record.pop("sha256") == digest(record)

@@ -10,19 +10,19 @@ from study.sweep.program import program
 
 @dataclass(frozen=True)
 class Task:
-    """A function to call, by its name, and its keyword arguments.
+    """A function by name, and its keyword arguments.
 
-    `function`: "package.module:name", of a function at the top of a module that returns a
-    dictionary. `arguments` and that dictionary are plain: what JSON can say, without NaN. Tuples
-    arrive as lists. Of a file that a run reads, give the SHA-256 as an argument as well: a path
-    does not tell that the file has changed. ValueError if they are not plain.
+    `function`: "package.module:name" of a top-level function that returns a dictionary. `arguments`
+    and that dictionary are plain JSON values without NaN; tuples arrive as lists. For a file that a
+    run reads, the arguments should include its SHA-256, since a path does not show that the file
+    changed. ValueError if the arguments are not plain.
     """
 
     function: str
     arguments: Plain
 
     def __post_init__(self) -> None:
-        """Refuse what could not be run elsewhere."""
+        """Refuse arguments that could not be sent to another process."""
         module, _, name = self.function.partition(":")
         if not module or not name.isidentifier():
             raise ValueError(f"{self.function!r}: name a function as package.module:function")

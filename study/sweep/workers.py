@@ -1,7 +1,7 @@
 """Tasks on the workers of a Dask cluster, at most one at a time on each.
 
-A task is bound to its worker. So the task that was there when a worker died is the one to be told
-of it, whatever the scheduler would retry, and no other shares the blame.
+Each task is bound to its worker. The task that was running when a worker died is therefore known,
+whatever the scheduler would retry, and no other task is blamed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from study.sweep.program import program
 from study.sweep.task import Task
 
 THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-"""Of a local worker; each has a core, and a sum must not depend on how many are idle."""
+"""Environment of a local worker: it has one core, and sums must not depend on idle cores."""
 SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-ttl": None,  # compiled code may hold the interpreter for minutes
@@ -38,13 +38,13 @@ SETTINGS = {
     "distributed.worker.memory.terminate": 0.95,
     "distributed.worker.profile.enabled": False,
 }
-ANSWER = 10.0
+CONNECT_TIMEOUT = 10.0
 """Seconds that a scheduler has to answer."""
-LOOK = 0.5
-"""Seconds between two looks at which workers live."""
-FETCH = 10.0
+POLL = 0.5
+"""Seconds between two checks of which workers are alive."""
+RESULT_TIMEOUT = 10.0
 """Seconds to wait for the result of a finished task."""
-PATIENCE = 60.0
+NO_WORKER_TIMEOUT = 60.0
 """Seconds without any worker after which a sweep gives up."""
 DIED = (
     "its worker died: killed, out of memory, or crashed in compiled code; run the case alone to see"
@@ -52,7 +52,7 @@ DIED = (
 
 
 class Running(NamedTuple):
-    """A task on its way: on which worker, since when."""
+    """A running task: on which worker, since when."""
 
     task: Task
     worker: str
@@ -63,7 +63,7 @@ class Running(NamedTuple):
 def local(count: int) -> Iterator[Client]:
     """A cluster of `count` processes on this machine, gone when the block ends.
 
-    Each has its share of the memory; one that takes more is killed.
+    Each has its share of the memory; a process that exceeds it is killed.
     """
     with (
         _environment(THREADS),
@@ -85,7 +85,7 @@ def local(count: int) -> Iterator[Client]:
 def distant(address: str) -> Iterator[Client]:
     """The cluster of a running scheduler. ValueError if it does not answer."""
     try:
-        client = distributed.Client(address, timeout=ANSWER)
+        client = distributed.Client(address, timeout=CONNECT_TIMEOUT)
     except (OSError, ValueError) as error:
         raise ValueError(
             f"scheduler {address}: no answer ({error}); start one with `dask scheduler`, and "
@@ -108,11 +108,11 @@ def _environment(wanted: dict[str, str]) -> Iterator[None]:
 
 
 def one_each(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Task, Attempt]]:
-    """Each task with how it ended, as they end. ValueError if the cluster cannot run them."""
+    """Each task with its outcome, as they end. ValueError if the cluster cannot run them."""
     waiting = deque(tasks)
     running: dict[Future[Attempt], Running] = {}
     while waiting or running:
-        alive = _alive(client, patience=None if running else PATIENCE)
+        alive = _live_workers(client, patience=None if running else NO_WORKER_TIMEOUT)
         for worker in alive - {at.worker for at in running.values()}:
             if waiting:
                 running |= _started(client, waiting.popleft(), worker)
@@ -125,8 +125,8 @@ def one_each(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Task, Atte
                 yield at.task, found
 
 
-def _alive(client: Client, *, patience: float | None) -> set[str]:
-    """Addresses of the workers. ValueError if there is none after so many seconds, unless None."""
+def _live_workers(client: Client, *, patience: float | None) -> set[str]:
+    """Addresses of the workers. ValueError if there is none for `patience` [s], unless None."""
     try:
         if patience is not None:
             client.wait_for_workers(1, timeout=patience)
@@ -152,21 +152,21 @@ def _started(client: Client, task: Task, worker: str) -> dict[Future[Attempt], R
 
 
 def _wait(running: dict[Future[Attempt], Running]) -> None:
-    """Until a task has ended, or it is time to look which workers live."""
+    """Wait until a task has ended, or until the next check of the workers."""
     with suppress(TimeoutError, CancelledError):  # a cancelled one is told by its result
-        distributed.wait(list(running), timeout=LOOK, return_when="FIRST_COMPLETED")
+        distributed.wait(list(running), timeout=POLL, return_when="FIRST_COMPLETED")
 
 
 def _found(future: Future[Attempt], at: Running, alive: set[str]) -> Attempt | None:
     """How a task ended, None if it has not.
 
-    A worker that died on a distant cluster is not there any more, while the scheduler, which may
-    be set to retry, waits for it to come back.
+    A worker that died on a remote cluster is gone, while the scheduler, which may be set to retry,
+    waits for it to come back.
     """
     crashed = Attempt("crashed", None, DIED, time.perf_counter() - at.start)
     try:
         if future.done():
-            return Attempt(*future.result(timeout=FETCH))
+            return Attempt(*future.result(timeout=RESULT_TIMEOUT))
     except KilledWorker:
         return crashed
     except TimeoutError:  # done, but the worker died with the result

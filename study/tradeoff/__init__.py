@@ -1,1 +1,1 @@
-"""Work and precision: how accurate each model is on a scene, and what a simulated second costs."""
+"""Work-precision study: the error of each model on a scene, and the cost of a simulated second."""

@@ -1,4 +1,4 @@
-"""What is demanded of a simulation: a rate, an error, or both."""
+"""The demand on a simulation: a rate, an error, or both."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ LENGTH = Quantity("m", 1e-9, 10.0)
 
 @dataclass(frozen=True)
 class Demand:
-    """States per second [Hz] in real time, and relative error of the field; one may be open."""
+    """Rate [Hz] in real time, and relative error of the field; either may be open."""
 
     rate: float | None
     error: float | None
 
     def __str__(self) -> str:
-        """For a person."""
+        """For a reader."""
         parts = [] if self.rate is None else [f"{self.rate:g} Hz"]
         parts += [] if self.error is None else [f"an error of {100 * self.error:g} %"]
         return " and ".join(parts)
 
 
 def demand(rate: str | None, error: str | None) -> Demand:
-    """From texts such as "60 Hz", "60 fps" or 60, and "5 %".
+    """A demand from texts such as "60 Hz", "60 fps" or 60, and "5 %".
 
-    ValueError if neither is given or one cannot be.
+    ValueError if neither is given or one is invalid.
     """
     if rate is None and error is None:
         raise ValueError('give --rate, for example "60 Hz", or --error, for example "5 %", or both')
@@ -39,7 +39,7 @@ def demand(rate: str | None, error: str | None) -> Demand:
 
 
 def length(error: str | None) -> float | None:
-    """An error that is given as a length [m], such as "0.5 mm"; None for a share or none at all."""
+    """An error given as a length [m], such as "0.5 mm"; None for a share, or if none is given."""
     if error is None:
         return None
     try:
@@ -49,7 +49,7 @@ def length(error: str | None) -> float | None:
 
 
 def as_share(error: float, reach: float) -> str:
-    """An error [m] as a percentage of the largest displacement [m]. ValueError beyond that."""
+    """An error [m] as a percentage of the largest displacement [m]. ValueError if it is larger."""
     if error >= reach:
         raise ValueError(
             f"--error {1e3 * error:.3g} mm: the organ moves by {1e3 * reach:.3g} mm at most under "
@@ -66,7 +66,7 @@ def _read(flag: str, given: str, quantity: Quantity, text: str) -> float:
 
 
 def _hertz(text: str) -> str:
-    """A bare number in Hz; other text as it is."""
+    """A bare number taken in Hz; other text unchanged."""
     try:
         return f"{float(text)!r} Hz"
     except ValueError:
@@ -74,7 +74,7 @@ def _hertz(text: str) -> str:
 
 
 def _share(text: str) -> str:
-    """A percentage as a share; other text as it is."""
+    """A percentage as a fraction; other text unchanged."""
     number = text.strip().removesuffix("%").strip()
     if not text.strip().endswith("%"):
         return text

@@ -1,4 +1,4 @@
-"""How far a configuration is from what it is compared with, where that can tell."""
+"""Errors of a configuration against its reference, where they exceed the reference's own error."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.models.spacing_error import force_differences
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 
 Floats = NDArray[np.float64]
 Status = Literal[
@@ -27,10 +27,10 @@ class Errors:
     """Relative L2 errors, None where there is none or it is not resolved.
 
     Of the displacement: `field` over the organ at the peak; `tool` of the curve of the control
-    point at the tool and `worst` of any control point. Of the force on tools that are moved, the
-    largest of any: `force` over time and `peak_force`, and `discretisation` of it over time against
-    the finest lattice of the same springs. `of_force`: whether a configuration is judged by the
-    force. `status` is that of what it is judged by; `message` says what went wrong.
+    point at the tool and `worst` of any control point. Of the force on moved tools, the largest of
+    any: `force` over time and `peak_force`, and `discretisation` of it over time against the finest
+    lattice of the same springs. `of_force`: whether the force is the criterion of the
+    configuration. `status` refers to the criterion; `message` states what went wrong.
     """
 
     status: Status
@@ -45,11 +45,11 @@ class Errors:
 
     @property
     def judged(self) -> float | None:
-        """That which it is judged by."""
+        """The error that is the criterion."""
         return self.force if self.of_force else self.field
 
 
-def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
+def errors(outcome: Outcome, reference: ReferenceSolution, given: SceneProblem) -> Errors:
     """Errors of one run of `study.tradeoff.observation`."""
     if outcome.status != "done" or outcome.value is None:
         status: Status = "crashed" if outcome.status == "crashed" else "failed"
@@ -69,8 +69,10 @@ def errors(outcome: Outcome, reference: Truth, given: Stated) -> Errors:
     )
 
 
-def _of_force(measured: Errors, found: Floats, reference: Truth, given: Stated) -> Errors:
-    """With the errors of the force, by which it is then judged."""
+def _of_force(
+    measured: Errors, found: Floats, reference: ReferenceSolution, given: SceneProblem
+) -> Errors:
+    """Add the errors of the force, which is then the criterion."""
     over_time, peak = force_differences(given.problem, found, reference.force).max(axis=1)
     kept = resolved(over_time, float(reference.force_errors.max()))
     return replace(
@@ -82,7 +84,9 @@ def _of_force(measured: Errors, found: Floats, reference: Truth, given: Stated) 
     )
 
 
-def _measured(found: Floats, moved: Floats, reference: Truth, given: Stated) -> Errors:
+def _measured(
+    found: Floats, moved: Floats, reference: ReferenceSolution, given: SceneProblem
+) -> Errors:
     volumes = given.problem.volume_rule.weights
     field = relative_l2(found, reference.field, volumes)
     moved = moved.reshape(reference.curves.shape)

@@ -1,4 +1,4 @@
-"""The motion of one configuration, as a run of a sweep."""
+"""The motion of one configuration, as a task of a sweep."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.models.model import Simulation
-from study.run.stated import stated
+from study.run.scene_problem import scene_problem
 from study.sweep.canonical import Plain
-from study.tradeoff.lineup import Configuration
+from study.tradeoff.contenders import Configuration
 from study.tradeoff.problem import plain
 
 FUNCTION = f"{__name__}:observe"
@@ -17,10 +17,10 @@ FUNCTION = f"{__name__}:observe"
 
 @dataclass(frozen=True)
 class Observed:
-    """Field at the peak and curves of displacement, flat, None of a motion that is not whole.
+    """Field at the peak and displacement curves, flattened; None for a motion that did not finish.
 
-    `force` [N]: on the tools that are moved, (samples, tools, 3). `step_s`: the shortest it took;
-    `margin`: smallest ratio of the critical step to one it took, None without a critical step.
+    `force` [N]: on the moved tools, (samples, tools, 3). `step_s`: the shortest step taken;
+    `margin`: smallest ratio of the critical step to a step taken, None without a critical step.
     """
 
     ended_at_s: float | None
@@ -33,8 +33,8 @@ class Observed:
 
 
 def observe(name: str, settings: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
-    """What is observed of a contender by name, as plain values of `Observed`."""
-    given = stated(scene, mesh_sha256)
+    """The observed motion of a contender by name, as plain values of `Observed`."""
+    given = scene_problem(scene, mesh_sha256)
     configuration = Configuration(name, settings)
     return vars(_observed(configuration.model(given.scene).prepare(given.problem).simulate()))
 

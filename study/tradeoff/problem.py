@@ -1,4 +1,4 @@
-"""How the problem that all contenders solve is sampled, and how numbers of it are kept."""
+"""Sampling of the problem that all contenders solve, and storage of its numbers."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ Floats = NDArray[np.float64]
 SAMPLING = 0.05
 """Interval [s] of samples: a whole number of frames at 60 Hz and of steps at 1 kHz.
 
-Where tools are moved it is divided until it is no longer than the scene's own, which shows their
-force.
+Under moved tools it is divided until it does not exceed the scene's own, to resolve their force.
 """
 FEWEST_SAMPLES = 16
 DIGITS = 8
@@ -26,7 +25,7 @@ TIDY_DIGITS = 12
 def sampled(scene: Scene) -> Scene:
     """The scene at samples that frames and steps of the usual rates divide.
 
-    What is left of its duration beyond them is cut off. A scene too short for that keeps its own.
+    The remainder of its duration is cut off. A scene too short for that keeps its own samples.
     ValueError if it is a single mass point.
     """
     if scene.is_point:
@@ -51,7 +50,7 @@ def _parts(scene: Scene) -> int:
 
 
 def tidy(value: float) -> float:
-    """The value without the rounding of a product, as it would be written in a scene."""
+    """The value without the rounding of a product, as one would write it in a scene."""
     return float(f"{value:.{TIDY_DIGITS}g}")
 
 

@@ -13,16 +13,16 @@ from msm.timestep import whole_steps
 Floats = NDArray[np.float64]
 
 RATES = {"25hz": 25.0, "60hz": 60.0, "1khz": 1000.0}
-"""Frames per second [Hz]: of a film, of a screen, of a haptic device."""
+"""Frames per second [Hz] of a film, a screen and a haptic device."""
 SLOW = 95.0
-"""Percentile of the frames that a slow one stands at."""
+"""Percentile of the frame times that stands for a slow frame."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: steps in it, its median wall [s] and that of a slow one, if enough were taken.
+    """One frame: number of steps, median wall [s], and that of a slow frame if enough were timed.
 
-    `in_time`: whether even a slow one is ready before the next is due.
+    `in_time`: whether even a slow frame is ready before the next is due.
     """
 
     substeps: int
@@ -34,7 +34,7 @@ class Frame:
 def frame(rate: float, step: float, walls: Floats) -> Frame:
     """A frame at a rate [Hz] from the walls [s] of single steps, each of at most `step` [s].
 
-    Steps are shortened until a whole number of them makes the frame; a short one costs as much.
+    Steps are shortened until a whole number of them makes the frame; a shorter step costs as much.
     """
     substeps = whole_steps(1.0 / rate, step)
     taken = np.ravel(walls)

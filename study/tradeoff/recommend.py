@@ -1,21 +1,22 @@
-"""The configuration that meets a demand on this machine: chosen by a fit, then run and timed.
+"""The configuration that meets a demand on this machine: predicted by a fit, then run and timed.
 
-Chosen from is the lattice stepped explicitly, with the volume term where the tissue's Poisson ratio
-asks for it, by its spacing and precision. Its error is run at a few coarse spacings and fitted by
-C h^p; what single precision adds is measured at the finest of them; its cost is timed at all. For a
-rate alone the most accurate that keeps up is recommended, for an error the cheapest that promises
-it. A promise is the fit with its spread, the reference's own error and what the precision adds; the
-recommended configuration is then run and timed afresh, and the next one taken where it does not
-keep up after all.
+Candidates are explicit lattices by spacing and precision, with the volume term where the tissue's
+Poisson ratio needs it. Errors are computed at a few coarse spacings and fitted by C h^p; the error
+added by single precision is measured at the finest of them; every candidate is timed. For a rate
+alone the most accurate real-time candidate is recommended, for an error the cheapest whose
+predicted error is small enough. A prediction includes the spread of the fit, the reference's own
+error and the error of the precision. The recommended configuration is then run and timed anew, and
+the next one is taken if it does not keep up after all.
 
-Where the place of the load is known beforehand, what follows it there only is chosen from too:
-Ritz vectors, graded lattices, and lattices of either kind corrected by finite elements. There are
-few, and each promises what a run of it was off by, or the reference's own error if that is more.
-All are then judged by the reference with large displacements, `study.tradeoff.geometry`.
+Where the place of the load, or its path, is known beforehand, models that depend on it are
+candidates too: Ritz vectors of a single load, graded lattices, and lattices of either kind
+corrected by finite elements. There are few of them, and the predicted error of each is that of a
+run of it, or the reference's own error if that is larger. All are then compared with the reference
+with large displacements, `study.tradeoff.large_displacements`.
 
-Where tools are moved the error is that of their force over time. Against the finest lattice of the
-same springs every spacing is run, for errors by contact jump with how cells lie; each promises what
-its run was off by, and the finest's own error on top.
+Under moved tools the criterion is the error of their force over time. Against the finest lattice of
+the same springs every spacing is run, since contact errors vary irregularly with the placement of
+cells; the predicted error is the measured one plus that of the finest lattice.
 """
 
 from __future__ import annotations
@@ -28,24 +29,24 @@ import numpy as np
 from study.models.spacing_error import force_differences
 from study.models.tissue import FRACTION, lacks_poisson_ratio
 from study.progress import Progress
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
-from study.sweep.runner import How, Outcome
+from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.tradeoff import study
-from study.tradeoff.chosen import DOUBLE, in_words, scene_with
+from study.tradeoff.comparison import Comparison
+from study.tradeoff.contenders import Configuration, contender, fraction, may_be_single
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.geometry import with_large_displacements
-from study.tradeoff.judge import Judge
-from study.tradeoff.lineup import Configuration, fraction, may_be_single
+from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
 from study.tradeoff.problem import tidy
 from study.tradeoff.rates import Frame, frame
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
+from study.tradeoff.selection import DOUBLE, described, scene_with
 from study.tradeoff.table import Cost, is_beaten
 from study.tradeoff.timing import QUICK_REPEATS
 
@@ -53,17 +54,17 @@ FITTED = (2.5, 2.0, 1.75, 1.5, 1.25, 1.0)
 FINER = (0.9, 0.8, 0.7, 0.6, 0.5)
 """Spacings, times that of the scene: those whose errors are fitted, and those left to the fit."""
 ELEMENTS = 0.5
-"""Element size of the reference chosen by, times that of the scene, in place of its accuracy.
+"""Element size of the reference used for the choice, over the scene's; replaces its accuracy.
 
-On the built-in liver 0.75 has an error of the field of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61
-and 71 s of processor time for all of `recommend`.
+On the built-in liver 0.75 has a field error of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61 and 71 s
+of processor time for all of `recommend`.
 """
 SPREAD = 2.8
-"""Standard deviations that a promise allows for: Student's t at 95 % of a fit to six points."""
+"""Standard deviations included in a prediction: Student's t at 95 % for a fit to six points."""
 FEWEST = 3
 SINGLE = "single"
 BESIDE = (2.0, 1.5, 1.0)
-"""Spacings of corrected lattices, times that of the scene."""
+"""Spacings of corrected lattices, over that of the scene."""
 SMALL_CELLS, REACHES = 0.5, (1.0, 1.5)
 """Of graded lattices: edge of their finest cells, times the spacing of the scene, and how far these
 reach from the tool, in its radii."""
@@ -72,28 +73,28 @@ VECTORS = 16
 
 @dataclass(frozen=True)
 class Promise:
-    """A relative error and how far from it the measured one may lie, either way."""
+    """A predicted relative error, and how far the measured one may deviate either way."""
 
     error: float
     bar: float
 
     @property
     def most(self) -> float:
-        """Its upper end."""
+        """The upper end of the prediction."""
         return self.error + self.bar
 
     def rounded(self, more: float) -> Promise:
-        """With at most so much more by rounding."""
+        """The prediction with an additional rounding error."""
         return replace(self, bar=self.bar + more)
 
     def holds(self, measured: float) -> bool:
-        """Whether a measured error lies within."""
+        """Whether a measured error lies within the prediction."""
         return abs(measured - self.error) <= self.bar
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A configuration and what it is expected to give; `frame`: at the rate, if one is demanded."""
+    """A configuration with its prediction; `frame`: at the demanded rate, if there is one."""
 
     configuration: Configuration
     promise: Promise
@@ -102,21 +103,21 @@ class Candidate:
 
     @property
     def wall_per_second(self) -> float:
-        """Wall per simulated second."""
+        """Wall time per simulated second."""
         return self.cost.timing.step[1] / self.cost.step
 
     def meets(self, wanted: Demand) -> bool:
-        """Whether rate and error are promised."""
+        """Whether rate and error are predicted to meet the demand."""
         in_time = self.frame is None or self.frame.in_time
         return in_time and (wanted.error is None or self.promise.most <= wanted.error)
 
 
 @dataclass(frozen=True)
 class Recommended:
-    """A candidate, whether it meets the demand, and what it was measured to give.
+    """A candidate, whether it meets the demand, and its measured error and cost.
 
-    `others`: those that it was chosen from. `against`: what errors are against, where that is not
-    the converged reference.
+    `others`: the candidates. `against`: the reference of the errors, if it is not the converged
+    one.
     """
 
     candidate: Candidate
@@ -132,36 +133,36 @@ def recommend(
     scene: Scene,
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
     *,
     known_place: bool = False,
 ) -> Recommended:
-    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified.
+    """The best candidate for a scene of `study.tradeoff.problem.sampled`, verified by a run.
 
-    With `known_place` also among the lattices that follow one place of the load.
+    With `known_place` also among models that depend on the place of the load.
     """
     coarser = judged_by(scene)
     every = [tidy(times * scene.lattice.spacing) for times in (*FITTED, *FINER)]
     spacings = every[: len(FITTED)] if study.has_reference(scene) else every
     tried = [_configuration(scene, h) for h in spacings]
     single = [_configuration(scene, spacings[-1], SINGLE)] if may_be_single(scene) else []
-    judge, outcomes = study.judged(coarser, [*tried, *single], store, how)
-    given, followed = judge.given, None
-    if known_place and judge.reference is not None:
-        followed = _followed(given, judge.reference, store, how)
-        judge = replace(judge, reference=followed.known)
+    comparison, outcomes = study.judged(coarser, [*tried, *single], store, backend)
+    given, followed = comparison.given, None
+    if known_place and comparison.reference is not None:
+        followed = _followed(given, comparison.reference, store, backend)
+        comparison = replace(comparison, reference=followed.known)
     added = {DOUBLE: 0.0, **_added_by_single(outcomes[len(spacings) - 1 :], given)}
-    promises = _promises(judge, tried, outcomes, every)
+    promises = _promises(comparison, tried, outcomes, every)
     candidates = _candidates(given, promises, added, wanted, progress)
     if followed is not None:
         candidates += _bound(given, followed, wanted, progress)
-    found = _verified(judge, candidates, wanted, store, how, progress)
-    return replace(found, against=judge.words if judge.finest else "")
+    found = _verified(comparison, candidates, wanted, store, backend, progress)
+    return replace(found, against=comparison.words if comparison.finest else "")
 
 
 def judged_by(scene: Scene) -> Scene:
-    """The scene with a reference of elements half as large, whatever accuracy it asks for."""
+    """The scene with a reference of elements half as large, whatever accuracy it requests."""
     chosen = scene.reference
     size = tidy(ELEMENTS * chosen.element_size)
     return replace(scene, reference=replace(chosen, element_size=size, accuracy=None))
@@ -177,23 +178,23 @@ class Fit:
     reference_error: float
 
     def promise(self, spacing: float) -> Promise:
-        """The error at a spacing [m]."""
+        """The predicted error at a spacing [m]."""
         error = self.constant * spacing**self.order
         return Promise(error, self.reference_error + self.spread * error)
 
 
 def _promises(
-    judge: Judge,
+    comparison: Comparison,
     tried: Sequence[Configuration],
     outcomes: Sequence[Outcome],
     every: Sequence[float],
 ) -> dict[float, Promise]:
-    """What a spacing [m] promises, in double precision."""
+    """The prediction for each spacing [m], in double precision."""
     spacings = [float(one.settings["spacing"]) for one in tried]
-    if judge.reference is None:
-        return dict(_measured_promises(judge, tried, outcomes))
-    known = judge.reference
-    found = [errors(one, known, judge.given) for one in outcomes[: len(tried)]]
+    if comparison.reference is None:
+        return dict(_measured_promises(comparison, tried, outcomes))
+    known = comparison.reference
+    found = [errors(one, known, comparison.given) for one in outcomes[: len(tried)]]
     kept = [(h, e.judged) for h, e in zip(spacings, found, strict=True) if e.judged is not None]
     own = known.field_error if known.force_bar is None else known.force_bar
     curve = fitted([h for h, _ in kept], [error for _, error in kept], own)
@@ -201,20 +202,20 @@ def _promises(
 
 
 def _measured_promises(
-    judge: Judge, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
+    comparison: Comparison, tried: Sequence[Configuration], outcomes: Sequence[Outcome]
 ) -> Iterator[tuple[float, Promise]]:
-    """What each run was off the finest lattice by, and the own error of that."""
+    """The measured error of each run, plus the own error of the finest lattice."""
     for one, outcome in zip(tried, outcomes, strict=False):
-        known = judge.truth(one)
+        known = comparison.truth(one)
         alike = replace(known, force_errors=np.zeros_like(known.force_errors))
-        found = errors(outcome, alike, judge.given)
+        found = errors(outcome, alike, comparison.given)
         if found.status in {"resolved", "not resolved"}:
             promise = Promise(found.force or 0.0, known.force_bar or 0.0)
             yield float(one.settings["spacing"]), promise
 
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
-    """By least squares in logarithms. ValueError if too few errors are resolved."""
+    """Least squares in logarithms. ValueError if too few errors are resolved."""
     if len(found) < FEWEST:
         raise ValueError(
             f"only {len(found)} of the spacings have an error above the reference's own "
@@ -237,10 +238,10 @@ def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Con
     return Configuration("volume-springs" if lacks else "springs", settings)
 
 
-def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, float]:
-    """What single precision changes of the field or the force, of a run in double and in single.
+def _added_by_single(outcomes: Sequence[Outcome], given: SceneProblem) -> dict[str, float]:
+    """Change of the field or the force by single precision, from runs in both precisions.
 
-    Relative L2; nothing where there is no such run, or it was not whole.
+    Relative L2; empty where such a run is missing or did not finish.
     """
     seen = [restored(Observed, one.value) for one in outcomes[:2] if one.value is not None]
     whole = [one for one in seen if one.field is not None]
@@ -256,13 +257,13 @@ def _added_by_single(outcomes: Sequence[Outcome], given: Stated) -> dict[str, fl
 
 
 def _candidates(
-    given: Stated,
+    given: SceneProblem,
     promises: Mapping[float, Promise],
     added: Mapping[str, float],
     wanted: Demand,
     progress: Progress,
 ) -> list[Candidate]:
-    """All spacings in each precision, which adds so much to the error, timed in turns."""
+    """All spacings in each precision with its rounding error, timed in turns."""
     pairs = [(h, precision) for h in promises for precision in added]
     chosen = [_configuration(given.scene, *pair) for pair in pairs]
     return [
@@ -275,31 +276,35 @@ def _candidates(
 
 @dataclass(frozen=True)
 class Followers:
-    """What follows one place of the load only, run; `known`: what all are then judged by."""
+    """Runs of models that depend on the place of the load; `known`: their reference."""
 
     chosen: tuple[Configuration, ...]
     outcomes: tuple[Outcome, ...]
-    known: Truth
+    known: ReferenceSolution
 
 
-def _followed(given: Stated, known: Truth, store: Store, how: How) -> Followers:
+def _followed(
+    given: SceneProblem, known: ReferenceSolution, store: Store, backend: Backend
+) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
-    Without runs that tell what geometry changes, those of small displacements are left out.
+    Without runs that show the effect of large displacements, models of small displacements are left
+    out. So are the linear elements alone where `superposition` does not support the scene: they are
+    no contender there.
     """
     chosen = list(bound(given.scene))
-    _, outcomes = study.judged(given.scene, chosen, store, how)
+    _, outcomes = study.judged(given.scene, chosen, store, backend)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
-    first = 0 if whole is not None else 1
+    first = 0 if whole is not None and chosen[0].contender == "superposition" else 1
     return Followers(tuple(chosen[first:]), tuple(outcomes[first:]), whole or known)
 
 
 def _bound(
-    given: Stated, followed: Followers, wanted: Demand, progress: Progress
+    given: SceneProblem, followed: Followers, wanted: Demand, progress: Progress
 ) -> list[Candidate]:
-    """Candidates of those that were run, timed in turns."""
+    """Candidates among those that were run, timed in turns."""
     known = followed.known
     found = [errors(one, known, given) for one in followed.outcomes]
     costed = _costs(given, followed.chosen, progress)
@@ -311,8 +316,14 @@ def _bound(
 
 
 def bound(scene: Scene) -> Iterator[Configuration]:
-    """What follows one place of the load only: a subspace, graded and corrected lattices."""
-    yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
+    """Models that depend on the place of the load, or its path: graded and corrected lattices.
+
+    First linear elements alone: a subspace, or as many vectors as several loads need.
+    """
+    if contender("superposition").lacks(scene):
+        yield Configuration("fem", {"method": "ritz-vectors", "level": 0})
+    else:
+        yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
     step = {"step_fraction": FRACTION}
     for times in BESIDE:
         h = tidy(times * scene.lattice.spacing)
@@ -325,11 +336,11 @@ def bound(scene: Scene) -> Iterator[Configuration]:
 
 
 def _as_measured(found: Errors, own: float) -> Promise:
-    """What a run was off by, with the reference's own error; that alone if it hides the other."""
+    """The measured error with the reference's own error; the latter alone if it is larger."""
     return Promise(found.field or 0.0, own)
 
 
-def _costs(given: Stated, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
+def _costs(given: SceneProblem, chosen: Sequence[Configuration], progress: Progress) -> list[Cost]:
     longest = [float("inf")] * len(chosen)  # that at rest is less
     return study.costs(given, chosen, longest, QUICK_REPEATS, progress, sized=True)
 
@@ -339,7 +350,7 @@ def _frame(cost: Cost, wanted: Demand) -> Frame | None:
 
 
 def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
-    """The one to take, or the nearest where none meets the demand.
+    """The best candidate, or the nearest where none meets the demand.
 
     Nearest is the most accurate that keeps up; where none does, the fastest.
     """
@@ -353,17 +364,17 @@ def best(candidates: Sequence[Candidate], wanted: Demand) -> Candidate:
 
 
 def _verified(
-    judge: Judge,
+    comparison: Comparison,
     candidates: Sequence[Candidate],
     wanted: Demand,
     store: Store,
-    how: How,
+    backend: Backend,
     progress: Progress,
 ) -> Recommended:
-    """The best candidate run and timed afresh, or the best of the others if it fails that."""
-    given, chosen = judge.given, best(candidates, wanted)
-    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, how)
-    measured = judge.errors(chosen.configuration, outcome)
+    """The best candidate run and timed anew, or the best of the others if it fails."""
+    given, chosen = comparison.given, best(candidates, wanted)
+    _, (outcome,) = study.judged(given.scene, [chosen.configuration], store, backend)
+    measured = comparison.errors(chosen.configuration, outcome)
     (cost,) = _costs(given, [chosen.configuration], progress)
     if outcome.value is not None:
         cost = replace(cost, step=min(cost.step, study.step_of(outcome)))
@@ -373,22 +384,22 @@ def _verified(
     met = met and (wanted.error is None or (measured.judged or 0.0) <= wanted.error)
     others = [one for one in candidates if one is not chosen]
     if not met and chosen.meets(wanted) and others:
-        return _verified(judge, others, wanted, store, how, progress)
+        return _verified(comparison, others, wanted, store, backend, progress)
     wall = cost.timing.step[1] / cost.step
     return Recommended(chosen, met, measured, again, wall, tuple(candidates))
 
 
 def recommended_scene(scene: Scene, found: Recommended) -> str:
-    """TOML text of the scene with the recommended lattice, promise and measurement above it.
+    """TOML text of the scene with the recommended lattice, its prediction and measurement.
 
-    It names the model that was measured, springs of the tissue's own modulus, and the reference.
+    It names the measured model, with springs of the tissue's own modulus, and the reference.
     """
     head = "".join(f"# {line}\n" for line in lines(found))
     return head + "\n" + write_scene(scene_with(scene, found.candidate.configuration))
 
 
 def lines(found: Recommended) -> list[str]:
-    """What is recommended, promised and measured, for a person."""
+    """The recommendation, its prediction and measurement, for a reader."""
     one, measured = found.candidate, found.measured
     promise = one.promise
     error = (
@@ -404,7 +415,7 @@ def lines(found: Recommended) -> list[str]:
     if measured.judged is not None:
         verdict = ", as promised" if promise.holds(measured.judged) else ", not as promised"
     text = [
-        in_words(one.configuration),
+        described(one.configuration),
         f"{_quantity(measured)} error promised {100 * promise.error:.1f} +- "
         f"{100 * promise.bar:.1f} %, measured {error}" + verdict,
     ]
@@ -421,8 +432,8 @@ def lines(found: Recommended) -> list[str]:
         text.append(f"{_in_mb(one.cost.memory)} kept while it steps, on top of the program's")
     if not one.configuration.any_load:
         text.append(
-            "It follows this place of the load only. The error is that against linear elements "
-            "and what corrected lattices add to them."
+            "It follows this place of the load, or its way, only. The error is that against linear "
+            "elements and what corrected lattices add to them."
         )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
@@ -442,7 +453,7 @@ def _quantity(measured: Errors) -> str:
 
 
 def _beside_force(measured: Errors) -> Iterator[str]:
-    """What else was measured of a configuration that is judged by the force over time."""
+    """The other measured errors of a configuration whose criterion is the force over time."""
     told = {
         "the largest force": measured.peak_force,
         "the displacement at the control points": measured.worst,
@@ -458,10 +469,10 @@ def _beside_force(measured: Errors) -> Iterator[str]:
 def table_of(
     candidates: Sequence[Candidate], quantity: str = "field", taken: Candidate | None = None
 ) -> Iterator[str]:
-    """Those that none is both cheaper and more accurate than, and that taken; the cheapest first.
+    """The Pareto front of error and cost, and the candidate taken; the cheapest first.
 
-    For a rate alone a lattice in double precision is taken where it keeps up, though the same in
-    single is cheaper and promises the same but for its rounding.
+    For a rate alone a lattice in double precision is taken where it keeps up, though single
+    precision is cheaper with the same predicted error but for rounding.
     """
     places = [(one.promise.error, one.wall_per_second) for one in candidates]
     front = [
@@ -476,6 +487,6 @@ def table_of(
         memory = "" if one.cost.memory is None else _in_mb(one.cost.memory)
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
-            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {in_words(one.configuration)}"
+            f"{100 * one.promise.bar:.1f} %  {memory:>7}  {described(one.configuration)}"
             + (" <- taken" if one is taken else "")
         )

@@ -1,4 +1,4 @@
-"""The converged reference of a scene and its own error, as a run of a sweep."""
+"""The converged reference of a scene and its own error, as a task of a sweep."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study.models.finite_elements import reference_of
 from study.models.model import SILENT, ModelRun
 from study.results.records import ElementsRecord, MeshLevel
-from study.run.stated import Stated, stated
+from study.run.scene_problem import SceneProblem, scene_problem
 from study.run.tool_forces import largest_forces
 from study.sweep.canonical import Plain, restored
 from study.tradeoff.problem import plain
@@ -23,11 +23,11 @@ FUNCTION = f"{__name__}:solve"
 
 @dataclass(frozen=True)
 class SolvedReference:
-    """A reference as plain values: field at the peak and curves of displacement, flat.
+    """A reference as plain values: field at the peak and displacement curves, flattened.
 
-    An error is the sum of those by the mesh, by the subspace and by the steps of the load; None
-    where the organ has no other mesh to tell it. `force` [N] on the tools that are moved (samples,
-    tools, 3), with the error of each. Without `finished` there is nothing to compare with.
+    Each error is the sum of those due to the mesh, the subspace and the steps of the load; None
+    where the organ has no other mesh to estimate it. `force` [N] on the moved tools (samples,
+    tools, 3), with the error of each. Unless `finished`, there is nothing to compare with.
     """
 
     field: list[float]
@@ -43,12 +43,12 @@ class SolvedReference:
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferenceSolution:
     """What contenders are compared with.
 
     `field` [m] (q, 3) at the peak; `curves` [m] (samples, probes, 3); relative errors of both,
-    `field_error` and `curve_errors` (probes,). `force` [N] (samples, tools, 3) on the tools that
-    are moved, and relative errors (tools,) of it over time and of the largest.
+    `field_error` and `curve_errors` (probes,). `force` [N] (samples, tools, 3) on the moved tools,
+    and relative errors (tools,) of the force over time and of the largest force.
     """
 
     field: Floats
@@ -61,13 +61,13 @@ class Truth:
 
     @property
     def force_bar(self) -> float | None:
-        """The largest error of a force over time; None without tools that are moved."""
+        """The largest error of a force over time; None without moved tools."""
         return float(self.force_errors.max()) if len(self.force_errors) else None
 
 
 def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     """The reference of a scene, as plain values of `SolvedReference`."""
-    given = stated(scene, mesh_sha256)
+    given = scene_problem(scene, mesh_sha256)
     reference = reference_of(given.scene).varied(large_strain="none")
     run = reference.prepare(given.problem).run(SILENT)
     elements, steps = run.record.elements, run.record.time_step_errors
@@ -93,15 +93,15 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     )
 
 
-def _force_errors(given: Stated, run: ModelRun) -> list[float] | None:
-    """Of each tool's force over time by all that is estimated, None where a part is not."""
+def _force_errors(given: SceneProblem, run: ModelRun) -> list[float] | None:
+    """Error of each tool's force over time, None where a part of it is not estimated."""
     found = [one.relative_error for one in largest_forces(given.problem.response, {"fem": run})]
     known = [error for error in found if error is not None]
     return known if len(known) == len(given.problem.rigid_tools) else None
 
 
-def truth(value: Plain, given: Stated) -> Truth:
-    """The reference of a stored value. ValueError if it or its error is unknown."""
+def truth(value: Plain, given: SceneProblem) -> ReferenceSolution:
+    """The reference from a stored value. ValueError if it or its error is unknown."""
     found = restored(SolvedReference, value)
     if not found.finished:
         raise ValueError("the reference's motion was lost before its end")
@@ -114,7 +114,7 @@ def truth(value: Plain, given: Stated) -> Truth:
     if tools and found.force_errors is None:
         raise ValueError("the error of the reference's force on the tools is unknown")
     of_force = np.array(found.force_errors or [])
-    return Truth(
+    return ReferenceSolution(
         np.reshape(found.field, (-1, 3)),
         np.reshape(found.curves, (len(seen.times), len(seen.probes), 3)),
         found.field_error,

@@ -1,4 +1,4 @@
-"""`tradeoff` and `recommend` as the command line asks for them."""
+"""Requests of the commands `tradeoff` and `recommend`."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ import numpy as np
 
 from study.folders import check_file, write_text
 from study.models.table import model
-from study.problem.features import BESIDE_ONE_LOAD, FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
-from study.run.ready import set_up
-from study.run.stated import arguments, stated
+from study.run.preparation import prepare_models
+from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.sweep.plan import plan
-from study.sweep.runner import How
+from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.tradeoff import recommend, study, table
+from study.tradeoff.contenders import configurations, is_moved
 from study.tradeoff.demand import Demand, as_share, demand, length
-from study.tradeoff.lineup import configurations, is_moved
 from study.tradeoff.problem import sampled
 from study.tradeoff.timing import QUICK_REPEATS, REPEATS
 
@@ -44,17 +43,17 @@ class TradeoffRequest:
 
     @property
     def name(self) -> str:
-        """Of the scene, without its folder."""
+        """Name of the scene, without its folder."""
         return Path(self.scene).stem
 
     @property
-    def how(self) -> How:
+    def backend(self) -> Backend:
         """Where to run."""
-        return How(self.workers, self.scheduler)
+        return Backend(self.workers, self.scheduler)
 
     @property
     def folder(self) -> Path:
-        """Of the table."""
+        """Folder of the table."""
         return self.out or Path("results") / f"{self.name}-tradeoff"
 
     def read(self) -> Scene:
@@ -65,20 +64,20 @@ class TradeoffRequest:
 def _ready(request: TradeoffRequest) -> Scene:
     """The scene as the study samples it.
 
-    ValueError, before anything is run, for a scene, a folder or workers that will not do.
+    ValueError, before anything is run, for an unsuitable scene, folder or workers.
     """
     scene = sampled(request.read())
-    _ = request.how
+    _ = request.backend
     study.refuse_unwritable(request.folder)
     _set_up(scene)
     return scene
 
 
 def _set_up(scene: Scene) -> Problem:
-    """The problem of a scene on which what others are compared with can run. ValueError if not."""
-    problem = stated(**arguments(scene)).problem
+    """The problem of a scene, on which its reference can run. ValueError if it cannot."""
+    problem = scene_problem(**scene_arguments(scene)).problem
     compared_with = "fem" if study.has_reference(scene) else "tissue"
-    set_up([model(scene, compared_with)], problem)
+    prepare_models([model(scene, compared_with)], problem)
     return problem
 
 
@@ -94,23 +93,23 @@ def measure(request: TradeoffRequest, progress: Progress) -> list[str]:
     scene, folder = _ready(request), request.folder
     chosen = configurations(scene, request.contenders)
     repeats = QUICK_REPEATS if request.quick else REPEATS
-    how = request.how
+    backend = request.backend
     with study.place(folder) as partial:  # refused now, not after the work
-        found = study.study(scene, chosen, _store(folder), how, repeats, progress)
+        found = study.study(scene, chosen, _store(folder), backend, repeats, progress)
         study.write(found, scene, repeats, partial)
     return [*table.lines(found.entries), *_against(found), f"table in {folder / study.TABLE}"]
 
 
 def _against(found: study.Found) -> list[str]:
-    """What the errors are of and against, and how large its own is."""
-    judge = found.judge
-    if judge.reference is not None and not judge.finest:
-        own = 100 * judge.reference.field_error
+    """The criterion and reference of the errors, and the reference's own error."""
+    comparison = found.comparison
+    if comparison.reference is not None and not comparison.finest:
+        own = 100 * comparison.reference.field_error
         return [f"errors are for the tissue's own modulus; the reference's own is {own:.2g} %"]
     bars = [one.force_bar for one in found.entries if one.force_bar is not None]
-    why = [f"not against the scene's finite elements: {judge.why}"] if judge.why else []
+    why = [f"not against the scene's finite elements: {comparison.why}"] if comparison.why else []
     return [
-        f"errors are of the force of the tools over time, against {judge.words}; its own is "
+        f"errors are of the force of the tools over time, against {comparison.words}; its own is "
         f"{100 * min(bars):.2g} to {100 * max(bars):.2g} %",
         *why,
     ]
@@ -128,7 +127,7 @@ def advise(
 
     An `error` that is a length is taken as a share of the largest displacement at rest.
     """
-    absolute, told = length(error), list[str]()
+    absolute, preamble = length(error), list[str]()
     given = request.read()
     _refuse_demand(given, absolute, known_place=known_place)
     wanted = demand(rate, "1" if absolute else error)
@@ -137,24 +136,24 @@ def advise(
     problem = _set_up(recommend.judged_by(sampled(given)))
     lattice = model(given, "tissue").varied().prepare(problem)  # one of its spacing
     if absolute is not None:
-        at_rest = model(given, "fem").prepare(problem) if problem.is_burdened else lattice
+        at_rest = model(given, "fem").prepare(problem) if problem.has_further_loads else lattice
         reach = float(np.linalg.norm(at_rest.rest(), axis=1).max())
         share = as_share(absolute, reach)
         wanted = demand(rate, share)
-        told = [
+        at_rest_name = "elements yield" if problem.has_further_loads else YIELDS
+        preamble = [
             f"an error of {1e3 * absolute:.3g} mm is taken as {share} of the {1e3 * reach:.3g} mm "
-            f"by which the {'elements yield' if problem.is_burdened else YIELDS} at most at rest; "
-            "errors are of the whole field"
+            f"by which the {at_rest_name} at most at rest; errors are of the whole field"
         ]
     store = _store(Path("results") / f"{request.name}-tradeoff")
     if known_place:
         model(given, "corrected").prepare(problem)
     found = recommend.recommend(
-        sampled(given), wanted, store, request.how, progress, known_place=known_place
+        sampled(given), wanted, store, request.backend, progress, known_place=known_place
     )
     noted = dict.fromkeys((*given.remarks, *problem.notes))
     notes = (f"note: {note}" for note in noted)
-    lines = [*told, *notes, *recommend.lines(found), *_busy()]
+    lines = [*preamble, *notes, *recommend.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
     write_text(path, recommend.recommended_scene(given, found))
@@ -162,12 +161,11 @@ def advise(
 
 
 def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -> None:
-    """ValueError for demands that scenes of more than one load of a given force do not have."""
-    beside = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in scene.features]
-    if known_place and beside:
+    """Raise ValueError for demands that are undefined for tools that are moved."""
+    if known_place and is_moved(scene):
         raise ValueError(
-            f"--known-place: what follows one place of a load only cannot follow "
-            f"{' and '.join(beside)}; leave it out"
+            "--known-place: what follows one place is made of the vectors of a load of a given "
+            "force, and the force of a tool that is moved is a result; leave it out"
         )
     if absolute is not None and is_moved(scene):
         raise ValueError(
@@ -176,7 +174,7 @@ def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -
 
 
 def _busy() -> list[str]:
-    """A line where others had the machine too."""
+    """A line if other processes were using the machine too."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     if load <= cores:
         return []
@@ -187,7 +185,7 @@ def _busy() -> list[str]:
 
 
 def _suffix(wanted: Demand, absolute: float | None = None) -> str:
-    """Of a file name, with an error [m] as it was given."""
+    """Part of a file name, with an error [m] as it was given."""
     rate = [] if wanted.rate is None else [f"{wanted.rate:g}Hz"]
     if absolute is not None:
         return "-".join([*rate, f"{1e3 * absolute:g}mm"])

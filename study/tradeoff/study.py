@@ -1,4 +1,4 @@
-"""The study of one scene: errors through a sweep, then costs in this process."""
+"""The work-precision study of one scene: errors by a sweep, then costs in this process."""
 
 from __future__ import annotations
 
@@ -16,43 +16,43 @@ from study.folders import replacing
 from study.models.model import Stepper
 from study.progress import Progress
 from study.results.provenance import provenance
-from study.run.stated import Stated, arguments, stated
+from study.run.scene_problem import SceneProblem, scene_arguments, scene_problem
 from study.scene import Scene
 from study.scene.file import write_scene
 from study.sweep.canonical import Plain, restored
-from study.sweep.runner import How, Outcome, run
+from study.sweep.runner import Backend, Outcome, run
+from study.sweep.status import on_stderr
 from study.sweep.store import Store
-from study.sweep.tally import on_stderr
 from study.sweep.task import Task
 from study.tradeoff import observation, reference, table
-from study.tradeoff.judge import Judge, lattices, refuse_unlike, truth_of
-from study.tradeoff.lineup import Configuration, is_moved
-from study.tradeoff.reference import SolvedReference, Truth
+from study.tradeoff.comparison import Comparison, lattices, refuse_unlike, truth_of
+from study.tradeoff.contenders import Configuration, is_moved
+from study.tradeoff.reference import ReferenceSolution, SolvedReference
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import Clock, in_turns
 
 TABLE, RECORD = "tradeoff.csv", "tradeoff.json"
 PICTURES = ("tradeoff.svg", "tradeoff.pdf")
-"""Drawn into the folder afterwards."""
+"""Files that are drawn into the folder afterwards."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """Entries of the table, what they are compared with, its curves' errors by control point."""
+    """Entries of the table, their reference, and its curves' errors by control point."""
 
     entries: list[Entry]
-    judge: Judge
+    comparison: Comparison
     curve_errors: dict[str, float]
 
 
 def has_reference(scene: Scene) -> bool:
-    """Whether finite elements are compared with: of moved tools where the scene names them."""
+    """Whether finite elements are the reference: under moved tools only if the scene names them."""
     return not is_moved(scene) or "fem" in scene.models
 
 
 def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
-    """The reference's run, those of the finest lattices, and one for each configuration."""
-    same = arguments(scene)
+    """The run of the reference, those of the finest lattices, and one for each configuration."""
+    same = scene_arguments(scene)
     compared_with = [Task(reference.FUNCTION, same)] if has_reference(scene) else []
     runs: list[Plain] = [
         {"name": one.contender, "settings": dict(one.settings)}
@@ -62,24 +62,24 @@ def tasks(scene: Scene, chosen: Sequence[Configuration]) -> list[Task]:
 
 
 def _finest(scene: Scene, chosen: Sequence[Configuration]) -> list[Configuration]:
-    """Lattices that others are compared with: only where tools are moved."""
+    """Lattices that others are compared with: only under moved tools."""
     if not is_moved(scene):
         return []
     return [one for family in lattices(scene, chosen).values() for one in family]
 
 
 def judged(
-    scene: Scene, chosen: Sequence[Configuration], store: Store, how: How
-) -> tuple[Judge, list[Outcome]]:
+    scene: Scene, chosen: Sequence[Configuration], store: Store, backend: Backend
+) -> tuple[Comparison, list[Outcome]]:
     """What configurations are compared with, and the outcome of each.
 
-    ValueError where the reference, or of moved tools the finest lattices, could not be solved.
+    ValueError if the reference, or under moved tools the finest lattices, could not be solved.
     """
     if not has_reference(scene):
         refuse_unlike(scene, chosen)
     with on_stderr("errors") as tell:
-        outcomes = run(tasks(scene, chosen), store, how, tell)
-    given, known, value, why = stated(**arguments(scene)), None, None, ""
+        outcomes = run(tasks(scene, chosen), store, backend, tell)
+    given, known, value, why = scene_problem(**scene_arguments(scene)), None, None, ""
     if has_reference(scene):
         first, *outcomes = outcomes
         value = first.value
@@ -95,10 +95,10 @@ def judged(
         finest[springs] = truth_of(outcomes[: len(members)], given)
         outcomes = outcomes[len(members) :]
     solved = None if value is None else restored(SolvedReference, value)
-    return Judge(given, known, solved, finest, why), outcomes
+    return Comparison(given, known, solved, finest, why), outcomes
 
 
-def _reference(outcome: Outcome, given: Stated) -> Truth:
+def _reference(outcome: Outcome, given: SceneProblem) -> ReferenceSolution:
     if outcome.value is None:
         raise ValueError(f"the reference could not be solved: {outcome.message}")
     return reference.truth(outcome.value, given)
@@ -108,35 +108,35 @@ def study(
     scene: Scene,
     chosen: Sequence[Configuration],
     store: Store,
-    how: How,
+    backend: Backend,
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> Found:
     """Errors and costs of configurations on a scene of `study.tradeoff.problem.sampled`."""
-    judge, outcomes = judged(scene, chosen, store, how)
-    entries = compared(judge, chosen, outcomes, repeats, progress, clock)
-    known = judge.reference
+    comparison, outcomes = judged(scene, chosen, store, backend)
+    entries = compared(comparison, chosen, outcomes, repeats, progress, clock)
+    known = comparison.reference
     own = [] if known is None else map(float, known.curve_errors)
-    return Found(entries, judge, dict(zip(judge.given.problem.probes, own, strict=False)))
+    return Found(entries, comparison, dict(zip(comparison.given.problem.probes, own, strict=False)))
 
 
 def compared(
-    judge: Judge,
+    comparison: Comparison,
     chosen: Sequence[Configuration],
     outcomes: Sequence[Outcome],
     repeats: int,
     progress: Progress,
     clock: Clock = time.perf_counter,
 ) -> list[Entry]:
-    """An entry per configuration, all that ran timed in turns."""
-    given = judge.given
-    found = [judge.errors(one, outcome) for one, outcome in zip(chosen, outcomes, strict=True)]
+    """An entry per configuration; those that ran are timed in turns."""
+    given = comparison.given
+    found = [comparison.errors(one, outcome) for one, outcome in zip(chosen, outcomes, strict=True)]
     sound = [k for k, one in enumerate(found) if one.status in {"resolved", "not resolved"}]
     steps = [step_of(outcomes[k]) for k in sound]
     costed = costs(given, [chosen[k] for k in sound], steps, repeats, progress, clock)
     by_place = dict(zip(sound, costed, strict=True))
-    bars = [judge.truth(one) for one in chosen]
+    bars = [comparison.truth(one) for one in chosen]
     return [
         Entry(one, error, bar.field_error, by_place.get(k), bar.force_bar)
         for k, (one, error, bar) in enumerate(zip(chosen, found, bars, strict=True))
@@ -144,7 +144,7 @@ def compared(
 
 
 def costs(
-    given: Stated,
+    given: SceneProblem,
     chosen: Sequence[Configuration],
     steps: Sequence[float],
     repeats: int,
@@ -153,9 +153,9 @@ def costs(
     *,
     sized: bool = False,
 ) -> list[Cost]:
-    """Setup and cost of configurations, at steps [s] that their runs took.
+    """Setup time and cost of configurations, at the steps [s] that their runs took.
 
-    `sized`: with the memory that each keeps, which makes its set-up slower.
+    `sized`: with the memory that each holds, which makes the setup slower.
     """
     with progress.stage("setting up") as advance:
         for name in dict.fromkeys(one.contender for one in chosen):  # what is compiled, is now
@@ -178,8 +178,8 @@ def costs(
     ]
 
 
-def _weighed(given: Stated, one: Configuration) -> tuple[Stepper, int]:
-    """A stepper, and the bytes of arrays and objects that it keeps; not of factors in C."""
+def _weighed(given: SceneProblem, one: Configuration) -> tuple[Stepper, int]:
+    """A stepper, and the bytes of arrays and objects that it holds, without factors in C."""
     tracemalloc.start()
     try:
         stepper = _stepper(given, one)
@@ -188,23 +188,23 @@ def _weighed(given: Stated, one: Configuration) -> tuple[Stepper, int]:
         tracemalloc.stop()
 
 
-def _stepper(given: Stated, one: Configuration) -> Stepper:
-    """Set up afresh: a lattice keeps what it assembled for the same problem."""
+def _stepper(given: SceneProblem, one: Configuration) -> Stepper:
+    """Set up anew, since a lattice caches what it assembled for the same problem."""
     return one.model(given.scene).prepare(replace(given.problem)).stepper()
 
 
 def step_of(outcome: Outcome) -> float:
-    """Shortest step [s] of a run that was whole."""
+    """Shortest step [s] of a run that finished."""
     found = restored(observation.Observed, outcome.value or {})
     return float("inf") if found.step_s is None else found.step_s
 
 
 def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
     """Write table, record and scene into an empty folder; see `place`."""
-    text, judge = write_scene(scene), found.judge
+    text, comparison = write_scene(scene), found.comparison
     record = {
-        "against": judge.words,
-        "reference": None if judge.reference is None else _solved(found),
+        "against": comparison.words,
+        "reference": None if comparison.reference is None else _solved(found),
         "repeats": repeats,
         "modulus_pa": scene.tissue.youngs_modulus,
         "load_average": os.getloadavg(),
@@ -217,7 +217,7 @@ def write(found: Found, scene: Scene, repeats: int, folder: Path) -> None:
 
 
 def _solved(found: Found) -> Plain:
-    solved = found.judge.solved
+    solved = found.comparison.solved
     assert solved is not None  # noqa: S101 - where it is compared with
     return {
         "element": solved.element,
@@ -230,7 +230,7 @@ def _solved(found: Found) -> Plain:
 
 
 def place(folder: Path) -> AbstractContextManager[Path]:
-    """A folder beside `folder` that takes its place when the block ends without an exception.
+    """A folder beside `folder` that replaces it when the block ends without an exception.
 
     FolderError before the block if `folder` holds anything but a study, or cannot be written.
     """
@@ -238,7 +238,7 @@ def place(folder: Path) -> AbstractContextManager[Path]:
 
 
 def refuse_unwritable(folder: Path) -> None:
-    """FolderError if `write` would refuse the folder; nothing is left behind."""
+    """Raise FolderError if `write` would refuse the folder; nothing is left behind."""
     folders.refuse_unwritable(folder, _foreign, "trade-off study")
 
 

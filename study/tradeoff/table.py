@@ -39,15 +39,15 @@ from pathlib import Path
 
 import numpy as np
 
+from study.tradeoff.contenders import Configuration
 from study.tradeoff.errors import Errors
-from study.tradeoff.lineup import Configuration
 from study.tradeoff.rates import RATES, frame
 from study.tradeoff.timing import Timing
 
 Cell = str | float | int | bool | None
 
 SAME = 0.01
-"""Of an error: by so little no configuration is more accurate than another."""
+"""Relative difference below which two errors count as equal."""
 
 COLUMNS = (
     *("contender", "configuration", "status", "message", "any_load"),
@@ -66,9 +66,9 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Cost:
-    """What a configuration costs: set up once [s], and by the step [s].
+    """Cost of a configuration: one-time setup [s], and time per step.
 
-    `memory` [byte]: what it keeps while it steps, where that was looked at.
+    `memory` [byte]: what it holds while it steps, where that was measured.
     """
 
     unknowns: int
@@ -79,7 +79,7 @@ class Cost:
 
     @property
     def per_second(self) -> tuple[float, float, float]:
-        """Wall per simulated second: lower quartile, median and upper quartile of the turns."""
+        """Wall time per simulated second: lower quartile, median and upper quartile."""
         low, middle, high = self.timing.step
         return low / self.step, middle / self.step, high / self.step
 
@@ -88,8 +88,7 @@ class Cost:
 class Entry:
     """A configuration with its errors and, where it was timed, its cost.
 
-    `bar`: own error of the field of what it is compared with, and `force_bar` of the force on tools
-    that are moved.
+    `bar`: the reference's own error of the field, and `force_bar` of the force on moved tools.
     """
 
     configuration: Configuration
@@ -100,17 +99,17 @@ class Entry:
 
     @property
     def place(self) -> tuple[float, float] | None:
-        """Error that it is judged by, and median wall per simulated second; None without one."""
+        """Error that is the criterion, and median wall per simulated second; None if unknown."""
         if self.cost is None or not self.errors.judged:
             return None
         return self.errors.judged, self.cost.per_second[1]
 
 
 def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]]) -> bool:
-    """Whether one of the places, each an error and a cost, leaves another no place on the front.
+    """Whether one of the places, each an error and a cost, dominates another.
 
     It does if it is cheaper and as accurate, or more accurate and as cheap. Errors that differ by
-    less than SAME of themselves are the same: those of one lattice at two steps do.
+    less than SAME of their value count as equal: those of one lattice at two steps do.
     """
     error, wall = place
     return any(
@@ -119,13 +118,13 @@ def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]])
 
 
 def front(entries: Sequence[Entry]) -> list[Entry]:
-    """Entries that no other beats; one without error or cost has no place among them."""
+    """The Pareto front: entries that no other dominates, among those with error and cost."""
     places = [one.place for one in entries if one.place is not None]
     return [one for one in entries if one.place is not None and not is_beaten(one.place, places)]
 
 
 def fronts(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
-    """That of all entries, and that of those which follow any load."""
+    """The front of all entries, and that of the entries that can follow any load."""
     return front(entries), front([one for one in entries if one.configuration.any_load])
 
 
@@ -141,7 +140,7 @@ def write(entries: Sequence[Entry], path: Path) -> None:
 
 
 def _cells(one: Entry) -> Iterator[tuple[str, Cell]]:
-    """Columns and values of a row, but for its place on the fronts."""
+    """Columns and values of a row, without its place on the fronts."""
     configuration, errors = one.configuration, one.errors
     yield "contender", configuration.contender
     yield "configuration", configuration.label
@@ -183,7 +182,7 @@ def _printed(value: Cell) -> Cell:
 
 
 def lines(entries: Sequence[Entry]) -> list[str]:
-    """The fronts for a terminal, the cheapest first, and how the others ended."""
+    """The fronts for a terminal, the cheapest first, and the outcome of the others."""
     whole, any_load = fronts(entries)
     shown = [(one.place, one, one.cost) for one in entries if one in whole or one in any_load]
     found = [f"{'wall per s':>10}  {'error':>6}  60 Hz  1 kHz  setup"]

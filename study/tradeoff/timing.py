@@ -1,12 +1,12 @@
-"""What a step costs, all configurations in turns in one process.
+"""The cost of a step, with all configurations timed in turns in one process.
 
-Every turn starts from rest, under the scene's load, so that it takes the same steps again: those of
-an implicit integrator cost more while the body moves. Where tools are moved it starts where they
-are deepest, for what they touch is stopped in each step.
+Every turn starts from rest under the scene's load, and so takes the same steps again: steps of an
+implicit integrator cost more while the body moves. Under moved tools it starts at the deepest
+indentation, since contact is resolved in each step.
 
-A machine is never quite still. Turns spread what disturbs it over all configurations alike, and
-each has gone some steps before the first turn that counts, so that nothing is compiled or touched
-for the first time.
+Disturbances of the machine are spread over all configurations alike by taking turns. Each
+configuration has taken some steps before the first timed turn, so that compilation and first memory
+access are not included.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ REPEATS = 5
 QUICK_REPEATS = 3
 WARM_UP = 3
 SECONDS = 0.3
-"""About what one turn of a configuration takes at most."""
+"""Approximate upper limit of one turn of a configuration."""
 FEWEST, MOST = 20, 200
-"""Steps in a turn."""
+"""Limits of the number of steps in a turn."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of single steps (turns, steps), and of a step without what a run does between."""
+    """Seconds of single steps (turns, steps), and of a step without the work between steps."""
 
     walls: Floats
     bare: Floats | None
@@ -52,7 +52,7 @@ def in_turns(
     clock: Clock = time.perf_counter,
     on_turn: Callable[[float], None] = lambda _: None,
 ) -> list[Timing]:
-    """Timings of all, each with a fixed number of steps a turn."""
+    """Timings of all steppers, each with a fixed number of steps per turn."""
     counts = [_count(one, clock) for one in ready]
     walls: list[list[Floats]] = [[] for _ in ready]
     bare: list[list[float]] = [[] for _ in ready]
@@ -70,7 +70,7 @@ def in_turns(
 
 
 def _count(ready: Stepper, clock: Clock) -> int:
-    """Steps in a turn, after some to warm up."""
+    """Number of steps in a turn, after some warm-up steps."""
     if ready.take_bare_steps is not None:
         ready.take_bare_steps(WARM_UP)
     wall = float(np.median(_steps(ready.take_step, WARM_UP, clock)))

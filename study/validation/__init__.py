@@ -1,1 +1,1 @@
-"""Models beside measurements on bodies of known shape: silicone cylinders, a beam and a cube."""
+"""Validation: models beside measurements on silicone cylinders, a beam and a cube."""

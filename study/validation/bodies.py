@@ -1,4 +1,4 @@
-"""The bodies that were measured, by their makers' or their experimenters' data."""
+"""The measured specimens, with the data of their makers or experimenters."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Floats = NDArray[np.float64]
 
 BONDED, SLIDING = "bonded", "sliding"
 FACES = (BONDED, SLIDING)
-"""What plates do across their push: hold the faces, or nothing."""
+"""Tangential condition between plates and faces: bonded, or frictionless."""
 GRAVITY = 9.81
 """[m/s^2]"""
 SILICONE = 0.499
-"""Poisson's ratio of silicone rubber, as the makers of the beam and the cube give it."""
+"""Poisson's ratio of silicone rubber, as stated by the makers of the beam and the cube."""
 EVERYWHERE = ImplicitBody(lambda x: np.full(x.shape[:-1], -1.0))
 
 RADIUS, HEIGHT = 0.025, 0.030
@@ -35,9 +35,9 @@ CUBE_DENSITY = 980.0
 
 
 def cylinder(faces: str, parts: tuple[int, ...] = (3, 4, 6)) -> Specimen:
-    """An eighth of a silicone cylinder under plates that come together by its height.
+    """An eighth of a silicone cylinder compressed by plates; factor 1 is its whole height.
 
-    `parts`: rings and layers of the elements, and cells of the lattice in half the height.
+    `parts`: rings and layers of the elements, and cells of the lattice, in half the height.
     """
     half = 0.5 * HEIGHT
     shape = ImplicitBody(lambda x: np.hypot(x[..., 0], x[..., 1]) - RADIUS)
@@ -76,9 +76,9 @@ def cube(
     cells: tuple[int, ...] = (2, 3, 4),
     spaced: tuple[int, ...] = (3, 4, 6),
 ) -> Specimen:
-    """A quarter of the cube, held at its base at z = 0, under a plate that comes down by its edge.
+    """A quarter of the cube, held at its base z = 0, under a plate; factor 1 is its whole edge.
 
-    `watched` [m] (q, 3), folded into the quarter; `cells` of elements along half an edge, and
+    `watched` [m] (q, 3), mirrored into the quarter; `cells` of elements along half an edge, and
     those of lattices, `spaced`.
     """
     half = 0.5 * CUBE
@@ -118,8 +118,8 @@ def beam(
 ) -> Specimen:
     """Half of the beam, clamped at x = -0.1 m, under its weight and a force on the upper tip edge.
 
-    `tip_force` [N] down, on the whole beam; `cells` across half the width. y is from the plane of
-    symmetry, z from the lower side, x from the tip.
+    `tip_force` [N] downwards, on the whole beam; `cells` across half the width. x is from the tip,
+    y from the plane of symmetry, z from the lower side.
     """
     length, width, height = BEAM
     half = 0.5 * width

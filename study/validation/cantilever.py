@@ -1,14 +1,14 @@
-"""The silicone beam under its weight and with 101 g on its tip: one modulus, the rest predicted.
+"""The silicone beam under its weight and with 101 g on its tip: one modulus is fitted.
 
-The modulus is fitted to how far the tip goes down with the weight, on average of the markers; all
-else is predicted. A body at rest under dead loads depends on load over modulus alone, so the fit is
-the place on a path of growing load. Markers stand off the surface and turn with it.
+The modulus is fitted to the mean tip deflection of the markers with the weight; everything else is
+predicted. The rest state under dead loads depends on load over modulus alone, so that the fit is a
+point on a path of increasing load. Markers stand off the surface and rotate with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +16,22 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import BEAM, beam
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Markers, beam_markers
-from study.validation.rows import Comparison, own_error
+from study.validation.predictions import KINDS, Kind, Prediction
 
 Floats = NDArray[np.float64]
 
 NAME = "cantilever"
 MODULUS = 263.8e3
-"""[Pa], near which the modulus is looked for: the value of the beam's authors."""
+"""[Pa], start of the search: the value of the beam's authors."""
 FACTORS = ((0.92, 1.06), (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.6, 3.2))
-"""Times the load, which is the modulus over the one that is looked for: near, then far."""
+"""Load factors, which equal the start modulus over the modulus sought: near, then far."""
 INWARDS = 2e-3
-"""[m] over which the turn of the surface is seen."""
+"""[m] over which the rotation of the surface is evaluated."""
 FITTED = "modulus, to the tip's way with 101 g"
+NOTHING_FITTED = "nothing: the modulus is that of 101 g"
 TIP, EACH = "tip down, mean of markers", "markers, rms of the difference"
 VIBRATION, VIBRATION_SPREAD = 7.76, 0.03
 """[Hz], of free motion about the rest under its weight, after the beam was let go: of marker
@@ -53,7 +54,7 @@ class _Seen:
 
 
 def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:
-    """Of each kind of model, under the weight alone and with 101 g."""
+    """For each kind of model, under the weight alone and with 101 g."""
     cases = beam_markers()
     for name in kinds:
         kind = KINDS[name]
@@ -72,7 +73,7 @@ def _on_levels(
 
 
 def _seen(kind: Kind, cases: tuple[Markers, ...], level: int) -> _Seen:
-    """Fit the modulus with the weight on the tip, then look at both cases."""
+    """Fit the modulus with the weight on the tip, then evaluate both cases."""
     alone, weighted = cases
     target, factor, failure = -float(weighted.moved[..., 2].mean()), float("nan"), ""
     for factors in FACTORS:
@@ -96,20 +97,20 @@ def _seen(kind: Kind, cases: tuple[Markers, ...], level: int) -> _Seen:
 
 
 def _factor_at(factors: Floats, ways: Floats, target: float) -> float:
-    """Where a growing way reaches a target; nan if it does not."""
+    """The factor at which an increasing deflection reaches a target; nan if it does not."""
     if len(ways) < 2 or not ways[0] < target < ways[-1]:
         return float("nan")
     path = CubicSpline(np.concatenate([[0.0], factors]), np.concatenate([[0.0], ways]))
     return float(brentq(lambda s: float(path(s)) - target, factors[0], factors[-1]))
 
 
-def _answer(kind: Kind, case: Markers, level: int, factors: tuple[float, ...]) -> Answer:
+def _answer(kind: Kind, case: Markers, level: int, factors: tuple[float, ...]) -> Prediction:
     watched, _ = _watched(case)
     return kind.solve(beam(case.force, watched.reshape(-1, 3)), level, MODULUS, factors)
 
 
 def _watched(case: Markers) -> tuple[Floats, Floats]:
-    """Places (m, 4, 3) on the surface and inwards of it in the half computed, and the signs of y.
+    """Places (m, 4, 3) on and below the surface in the computed half, and the signs of y.
 
     Its y is from the plane of symmetry.
     """
@@ -124,7 +125,7 @@ def _watched(case: Markers) -> tuple[Floats, Floats]:
 
 
 def _moved(case: Markers, displacement: Floats) -> Floats:
-    """Displacement [m] (m, 3) of the markers, which turn with the surface they stand on."""
+    """Displacement [m] (m, 3) of the markers, which rotate with the surface they stand on."""
     watched, sign = _watched(case)
     u = displacement.reshape(watched.shape)
     rise = (u[:, 1:] - u[:, :1]) / np.diagonal(watched[:, 1:] - watched[:, :1], 0, 1, 2)[..., None]
@@ -147,9 +148,9 @@ def _apart(case: Markers, displacement: Floats) -> float:
 
 
 def _uncertainty(case: Markers) -> tuple[float, float]:
-    """Of the mean way down and of a marker [m]: half of what repeats differ by, and the clamp's.
+    """Of the mean deflection and of one marker [m]: from repeats, and from the clamp.
 
-    The clamped end is not quite still.
+    Half of the difference of the repeats; the clamped end is not perfectly still.
     """
     clamp = np.sqrt((case.base**2).sum(axis=2).mean())
     down = 0.5 * np.ptp(case.moved[..., 2].mean(axis=1))
@@ -160,9 +161,39 @@ def _uncertainty(case: Markers) -> tuple[float, float]:
 def _rows(
     kind: Kind, cases: tuple[Markers, ...], seen: list[_Seen], sizes: list[float]
 ) -> Iterator[Comparison]:
-    best = seen[-1]
+    yield _frequency_row(kind, seen, sizes)
+    for i, (case, name) in enumerate(zip(cases, ("weight alone", "101 g"), strict=True)):
+        measured = -1e3 * float(case.moved[..., 2].mean())
+        down, each = _uncertainty(case)
+        row = Comparison(
+            problem=NAME,
+            case=name,
+            faces="clamped",
+            model=kind.label,
+            quantity=TIP,
+            unit="mm",
+            measured=measured,
+            uncertainty=1e3 * down,
+            found=1e3 * seen[-1].down[i],
+            numerical=1e3 * own_error([one.down[i] for one in seen], sizes),
+            modulus=seen[-1].modulus,
+            fitted=FITTED if i else NOTHING_FITTED,
+            note=seen[-1].failure,
+        )
+        yield row
+        yield replace(
+            row,
+            quantity=EACH,
+            measured=0.0,
+            uncertainty=1e3 * each,
+            found=1e3 * seen[-1].apart[i],
+            numerical=1e3 * own_error([one.apart[i] for one in seen], sizes),
+        )
+
+
+def _frequency_row(kind: Kind, seen: list[_Seen], sizes: list[float]) -> Comparison:
     frequencies = [one.frequency for one in seen]
-    yield Comparison(
+    return Comparison(
         problem=NAME,
         case="weight alone",
         faces="clamped",
@@ -173,30 +204,7 @@ def _rows(
         uncertainty=VIBRATION_SPREAD,
         found=frequencies[-1],
         numerical=own_error(frequencies, sizes),
-        modulus=best.modulus,
-        fitted="nothing: the modulus is that of 101 g",
-        note=best.failure,
+        modulus=seen[-1].modulus,
+        fitted=NOTHING_FITTED,
+        note=seen[-1].failure,
     )
-    for i, (case, name) in enumerate(zip(cases, ("weight alone", "101 g"), strict=True)):
-        measured = -1e3 * float(case.moved[..., 2].mean())
-        quantities = (
-            (TIP, measured, [one.down[i] for one in seen]),
-            (EACH, 0.0, [one.apart[i] for one in seen]),
-        )
-        spread = _uncertainty(case)
-        for (quantity, value, found), uncertainty in zip(quantities, spread, strict=True):
-            yield Comparison(
-                problem=NAME,
-                case=name,
-                faces="clamped",
-                model=kind.label,
-                quantity=quantity,
-                unit="mm",
-                measured=value,
-                uncertainty=1e3 * uncertainty,
-                found=1e3 * float(found[-1]),
-                numerical=1e3 * own_error(found, sizes),
-                modulus=best.modulus,
-                fitted=FITTED if i else "nothing: the modulus is that of 101 g",
-                note=best.failure,
-            )

@@ -1,7 +1,7 @@
-"""The cube of silicone with beads in it under a plate: how the inside moves. There was no force.
+"""The silicone cube with embedded beads under a plate: internal displacements, without a force.
 
-The plate's nominal way is less than that of the beads below it, so it is fitted, and with it the
-rigid motion of the whole between the scans. The modulus does not matter.
+The nominal displacement of the plate is smaller than that of the beads below it, so it is fitted,
+together with the rigid motion between the scans. The modulus has no effect.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import CUBE, FACES, cube
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Beads, beads
+from study.validation.predictions import KINDS, Kind, Prediction
 from study.validation.registration import registered
-from study.validation.rows import Comparison, own_error
 from study.validation.specimen import Specimen
 
 Floats = NDArray[np.float64]
 
 NAME = "cube"
 WAYS = {"5": (3.5e-3, 7.5e-3), "18.25": (13e-3, 23e-3)}
-"""[m], between which the plate's way is looked for, by the nominal state in %."""
+"""[m], interval in which the plate's displacement is sought, by the nominal state in %."""
 SOLVED = (0.003, 0.0045, 0.006, 0.0075, 0.013, 0.0155, 0.018, 0.0205, 0.023)
 MODULUS = 15.3e3
 FITTED = "way of the plate, rigid motion"
 SLICE = 1.25e-3
 RESOLUTION = 0.2e-3
-"""[m]: of the scanner between slices, and in them, 0.1 to 0.3 mm."""
+"""[m]: of the scanner within slices, 0.1 to 0.3 mm."""
 NOISE = np.sqrt(2.0) * np.array([RESOLUTION, SLICE / np.sqrt(12.0), RESOLUTION])
-"""Of the difference of two readings along x, y and z [m]."""
+"""Standard deviation of the difference of two readings along x, y and z [m]."""
 AXES = ("x", "y, across the slices", "height")
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """What is left of the beads [m] with the best way of the plate [m]."""
+    """Residuals of the beads at the best displacement of the plate [m]."""
 
     way: float
     by_axis: Floats
@@ -48,7 +48,7 @@ class _Fit:
 
 
 def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:
-    """Residual of the beads at both states, by both conditions of the faces and each model."""
+    """Residual of the beads at both states, for both conditions of the faces and each model."""
     known = beads()
     folded, sign = _folded(known.unloaded)
     for faces in FACES:
@@ -63,21 +63,21 @@ def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iter
 
 
 def _folded(points: Floats) -> tuple[Floats, Floats]:
-    """Points in the quarter that is computed, and the signs that unfold displacements."""
+    """Points mirrored into the computed quarter, and the signs that map displacements back."""
     sign = np.where(points < 0.0, -1.0, 1.0)
     sign[:, 2] = 1.0
     return sign * points, sign
 
 
-def _answers(specimen: Specimen, kind: Kind, levels: int) -> tuple[list[Answer], list[float]]:
+def _answers(specimen: Specimen, kind: Kind, levels: int) -> tuple[list[Prediction], list[float]]:
     sizes = [mesh.size for mesh in specimen.meshes] if kind.elements else list(specimen.spacings)
     count = min(levels, len(sizes))
     factors = tuple(way / CUBE for way in SOLVED)
     return [kind.solve(specimen, n, MODULUS, factors) for n in range(count)], sizes[:count]
 
 
-def _fit(known: Beads, sign: Floats, answer: Answer, state: str) -> _Fit:
-    """The plate's way with which the least is left of the beads after a rigid motion."""
+def _fit(known: Beads, sign: Floats, answer: Prediction, state: str) -> _Fit:
+    """The plate's displacement with the least residual of the beads after a rigid motion."""
     ways = CUBE * np.concatenate([[0.0], answer.factors])
     low, high = WAYS[state]
     high = min(high, ways[-1])

@@ -1,8 +1,8 @@
-"""Silicone cylinders between plates: whether the force at 10 to 30 % follows from 1 to 5 %.
+"""Silicone cylinders between plates: prediction of the force at 10 to 30 % from that at 1 to 5 %.
 
-The modulus of each material is fitted to the rise of the force from 1 to 5 %; the forces beyond are
-predictions. Whether the plates hold the faces was not told, and both are computed. All models are
-in proportion to the modulus, so that one solution serves all materials.
+The modulus of each material is fitted to the increase of the force from 1 to 5 %; forces beyond are
+predictions. The friction of the plates was not reported, so both conditions are computed. All
+models scale with the modulus, so that one solution serves all materials.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.progress import Progress
-from study.validation.answers import KINDS, Answer, Kind
 from study.validation.bodies import BONDED, FACES, cylinder
+from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Compression, compressions
-from study.validation.rows import Comparison, own_error
+from study.validation.predictions import KINDS, Kind, Prediction
 from study.validation.specimen import Specimen
 
 Floats = NDArray[np.float64]
@@ -28,12 +28,12 @@ STRAINS = (*SLOPE, *PREDICTED)
 MODULUS = 1e4
 """[Pa], of the one solution."""
 LOAD_ZERO = 0.1
-"""[N], of the testing machine."""
+"""[N], zero error of the testing machine."""
 FITTED = "modulus, to the rise of the force from 1 to 5 %"
 
 
 def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:
-    """Of all materials, by both conditions of the faces and each kind of model."""
+    """For all materials, by both conditions of the faces and each kind of model."""
     for faces in FACES:
         specimen = cylinder(faces)
         for name in kinds:
@@ -45,8 +45,8 @@ def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iter
 
 def _curves(
     specimen: Specimen, kind: Kind, faces: str, levels: int
-) -> tuple[list[Answer], list[float]]:
-    """Answers on meshes or spacings, coarse to fine, and their sizes."""
+) -> tuple[list[Prediction], list[float]]:
+    """Predictions on meshes or spacings, coarse to fine, and their sizes."""
     whole = [mesh.size for mesh in specimen.meshes] if kind.elements else list(specimen.spacings)
     # Between sliding plates the strain is uniform, and elements of any size are exact.
     count = 2 if kind.elements and faces != BONDED else levels
@@ -55,7 +55,7 @@ def _curves(
 
 
 def _of_material(
-    measured: Compression, curves: tuple[list[Answer], list[float]], kind: Kind, faces: str
+    measured: Compression, curves: tuple[list[Prediction], list[float]], kind: Kind, faces: str
 ) -> Iterator[Comparison]:
     answers, sizes = curves
     forces = [_padded(-answer.force) for answer in answers]
@@ -84,5 +84,5 @@ def _of_material(
 
 
 def _padded(force: Floats) -> Floats:
-    """Forces at all strains, nan where the model did not get to."""
+    """Forces at all strains, nan where the model did not reach the strain."""
     return np.concatenate([force, np.full(len(STRAINS) - len(force), np.nan)])

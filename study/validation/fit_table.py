@@ -34,7 +34,7 @@ def write(fit: Fit, path: Path) -> None:
 
 
 def lines(fit: Fit) -> Iterator[str]:
-    """A line per quantity, and how well the curve is met."""
+    """A line per quantity, and the goodness of fit."""
     for one in fit.quantities:
         unit = f" {one.unit}" if one.unit else ""
         own = "" if math.isnan(one.numerical) else f"; the model's own error {one.numerical:.2g}"
@@ -48,12 +48,12 @@ def lines(fit: Fit) -> Iterator[str]:
 def _about_scatter(fit: Fit) -> str:
     if not fit.scatter_known:
         return "the intervals are by what is left: no uncertainty was given with the curve"
-    told = f"what is left is {fit.chi:.2g} times the uncertainty given"
-    return f"{told}; above 1 the intervals are widened by it" if fit.chi > 1.0 else told
+    text = f"what is left is {fit.chi:.2g} times the uncertainty given"
+    return f"{text}; above 1 the intervals are widened by it" if fit.chi > 1.0 else text
 
 
 def as_json(fit: Fit) -> str:
-    """Quantities with their intervals, and what is left."""
+    """Quantities with their intervals, and the residual."""
     quantities = [
         {
             "key": one.key,

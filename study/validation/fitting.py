@@ -1,9 +1,9 @@
-"""Quantities of a scene fitted to a measured curve, with what the curve leaves open of them.
+"""Quantities of a scene fitted to a measured curve, with their confidence intervals.
 
-Least squares in the logarithms of the quantities, by the model's motion at each; the interval is
-that of the linearised problem, with Student's t. A quantity that the curve does not determine is
-refused: one whose interval goes beyond its allowed range, that ends at a limit of it, or that
-another can take the place of.
+Least squares in the logarithms of the quantities, with the model's motion at each; the interval is
+that of the linearised problem, with Student's t. A quantity that the curve does not identify is
+refused: one whose interval exceeds its allowed range, that ends at a limit, or that is collinear
+with another.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from study.progress import Progress
 from study.scene import Scene
 from study.scene.consistency import contradictions
 from study.scene.problem import problem_of
-from study.validation.own_data import Curve
-from study.validation.own_scene import coarser, probe_number, refuse_unanswered, seen
+from study.validation.user_data import Curve
+from study.validation.user_scene import coarser, probe_number, refuse_unanswered, seen
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
@@ -38,20 +38,20 @@ Predict = Callable[[Floats], Floats]
 
 CONFIDENCE = 0.95
 STEP = 0.02
-"""Of the logarithm, for derivatives: models round to far less."""
+"""Difference of the logarithm for derivatives, far above the rounding of models."""
 AT_LIMIT = 1e-3
-"""How near a logarithm lies to a limit that it is at."""
+"""Distance of a logarithm from a limit within which it counts as being there."""
 LARGEST_CONDITION = 1e6
 MOST_RUNS = 60
 CHOSEN = ("lattice", "reference", "superposition", "corrected", "region", "time", "require")
-"""Tables of a scene whose quantities are those of a computation, and of no body."""
+"""Tables of a scene whose quantities belong to a computation, not to the body."""
 
 
 @dataclass(frozen=True)
 class Fitted:
     """A quantity [SI] of a scene: its best value and 95 % interval.
 
-    `numerical`: by how much the model's own error may shift it, nan if that is not known.
+    `numerical`: possible shift by the model's own error, nan if that is unknown.
     """
 
     key: str
@@ -66,9 +66,9 @@ class Fitted:
 class Fit:
     """Quantities fitted to a curve, and the curve with them (k,).
 
-    `rms` of what is left, in the unit of the curve; `scatter_known`: whether the interval is by the
-    measurement's stated uncertainties, or by what is left; `chi`: what is left over the stated
-    uncertainties, above 1 where the model does not follow the curve.
+    `rms`: of the residual, in the unit of the curve; `scatter_known`: whether the interval follows
+    from stated uncertainties of the measurement, or from the residual; `chi`: residual over the
+    stated uncertainties, above 1 where the model does not follow the curve.
     """
 
     quantities: tuple[Fitted, ...]
@@ -82,7 +82,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Free:
-    """A key of a scene that is free, between limits [SI], from a value."""
+    """A free key of a scene, between limits [SI], with its start value."""
 
     key: str
     unit: str
@@ -92,7 +92,7 @@ class Free:
 
 
 def free_of(scene: Scene, key: str) -> Free:
-    """What may be fitted: table.key of one positive quantity. ValueError for anything else."""
+    """A key that may be fitted: table.key of one positive quantity. ValueError for any other."""
     table, _, name = key.partition(".")
     part = getattr(scene, table, None)
     value = getattr(part, name, None) if dataclasses.is_dataclass(part) else None
@@ -137,8 +137,8 @@ def fit(
 ) -> Fit:
     """Fit quantities of a scene by one of its models.
 
-    ValueError for keys, a model or a probe that there are not, and for a curve that does not
-    determine the quantities.
+    ValueError for unknown keys, model or control point, and for a curve that does not identify the
+    quantities.
     """
     if model not in MODELS:
         raise ValueError(f"--model {model}: is not one of {', '.join(MODELS)}")
@@ -194,7 +194,7 @@ class _Runs:
         return seen(problem, found, self.curve, probe_number(problem, self.probe))
 
     def own_error(self, values: Floats) -> Floats | None:
-        """What a coarser mesh or lattice changes of the curve (k,), as an error; None if none."""
+        """Change of the curve (k,) on coarser meshes or lattices, as an error; None if unknown."""
         model, problem = self._at(values)
         at = probe_number(problem, self.probe)
 
@@ -215,9 +215,9 @@ class Solved:
 
 
 class _Left:
-    """What a prediction leaves of a curve, over its scatter, at logarithms of the quantities.
+    """Residuals of a prediction, over the scatter, at logarithms of the quantities.
 
-    Runs are counted, and none is repeated; none is beyond `limits` (2, quantities).
+    Runs are counted and never repeated; none is outside `limits` (2, quantities).
     """
 
     def __init__(self, predict: Predict, curve: Curve, scatter: Floats, limits: Floats) -> None:
@@ -226,7 +226,7 @@ class _Left:
 
     @property
     def runs(self) -> int:
-        """How many there were."""
+        """Number of runs."""
         return len(self._known)
 
     def __call__(self, logs: Floats) -> Floats:
@@ -238,9 +238,9 @@ class _Left:
         return self._known[name]
 
     def slope(self, logs: Floats, *, both_ways: bool = False) -> Floats:
-        """Derivative (k, quantities) by differences over STEP, the same in every unit.
+        """Derivative (k, quantities) by differences over STEP, independent of units.
 
-        Of first order on the way, of second where `both_ways` are looked.
+        First order during the iteration, second order with `both_ways`.
         """
         low, high = self.limits
         columns = []
@@ -253,7 +253,7 @@ class _Left:
 
 
 def solve(predict: Predict, curve: Curve, free: Sequence[Free]) -> Solved:
-    """Least squares of a prediction. ValueError if the curve does not determine the quantities."""
+    """Least squares of a prediction. ValueError if the curve does not identify the quantities."""
     scatter = np.ones_like(curve.values) if curve.uncertainty is None else curve.uncertainty
     scatter = scatter * (float(np.abs(curve.values).max()) if curve.uncertainty is None else 1.0)
     if len(curve.values) <= len(free):
@@ -313,7 +313,7 @@ def _refuse_open(logs: Floats, half: Floats, limits: Floats, free: Sequence[Free
 
 
 def _shifted(found: Solved, error: Floats | None, free: Sequence[Free]) -> tuple[Fitted, ...]:
-    """With the shift that the model's own error of the curve makes."""
+    """The fitted quantities, with the shift due to the model's own error of the curve."""
     if error is None or not np.isfinite(error).all():
         return found.fit.quantities
     logs = np.linalg.lstsq(found.slope, error / found.scatter, rcond=None)[0]

@@ -46,9 +46,9 @@ class Compression:
 
 @dataclass(frozen=True)
 class Markers:
-    """Places [m] (m, 3) of markers and how far they moved [m] (repeats, m, 3), under a force [N].
+    """Places [m] (m, 3) and displacements [m] (repeats, m, 3) of markers, under a force [N].
 
-    `base` [m] (repeats, b, 3): how far markers on the clamped end moved.
+    `base` [m] (repeats, b, 3): displacements of markers on the clamped end.
     """
 
     force: float
@@ -68,7 +68,7 @@ class Beads:
 
 @cache
 def compressions() -> tuple[Compression, ...]:
-    """Of all materials."""
+    """Compression tests of all materials."""
     lines = _lines("silicone_cylinders.csv")
     names = list(dict.fromkeys(line["material"] for line in lines))
     return tuple(
@@ -103,7 +103,7 @@ def _markers(force: str, lines: list[dict[str, str]]) -> Markers:
 
 @cache
 def beads() -> Beads:
-    """Of the cube."""
+    """The beads of the cube."""
     lines = _lines("silicone_cube.csv")
     states = {
         state: MILLI * np.array(_numbers(own, "x_mm", "y_mm", "height_mm"))

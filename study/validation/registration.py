@@ -1,4 +1,4 @@
-"""Rigid registration of points that belong together by number."""
+"""Rigid registration of corresponding points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 class Registered(NamedTuple):
-    """Points [m] (n, 3) moved onto others; rms of what is left [m], of each axis (3,) and whole."""
+    """Points [m] (n, 3) moved onto others; rms of the residual [m], by axis (3,) and in total."""
 
     points: Floats
     by_axis: Floats
@@ -19,10 +19,10 @@ class Registered(NamedTuple):
 
 
 def registered(points: Floats, onto: Floats) -> Registered:
-    """Move points (n, 3) rigidly so that their squared distances from `onto` are least.
+    """Move points (n, 3) rigidly to minimise their squared distances from `onto`.
 
-    Kabsch (1976), Acta Cryst. A32:922; no mirroring. ValueError for fewer than three points, or
-    sets that do not match.
+    Kabsch (1976), Acta Cryst. A32:922; without reflection. ValueError for fewer than three points,
+    or sets of different sizes.
     """
     if points.shape != onto.shape or len(points) < 3:
         raise ValueError(

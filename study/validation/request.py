@@ -1,4 +1,4 @@
-"""`validate` as the command line asks for it: which problems, which models, how fine."""
+"""Requests of the command `validate`: which problems, which models, how fine."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from study.progress import Progress
 from study.scene.file import read_scene
-from study.validation import cantilever, cube, cylinders, own_scene
-from study.validation.answers import KINDS
-from study.validation.rows import Comparison
+from study.validation import cantilever, cube, cylinders, user_scene
+from study.validation.comparison import Comparison
+from study.validation.predictions import KINDS
 
 Compare = Callable[[tuple[str, ...], int, Progress], Iterable[Comparison]]
 
@@ -21,14 +21,14 @@ PROBLEMS: dict[str, Compare] = {
 }
 """Measured bodies by name."""
 QUICK, ALL = 2, 3
-"""Meshes and spacings of each model."""
+"""Numbers of meshes and spacings of each model."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ValidationRequest:
-    """Problems and kinds of models by name, all by default; `quick`: on two meshes, not three.
+    """Problems and kinds of models by name, all by default; `quick`: two meshes, not three.
 
-    ValueError for a name that is none.
+    ValueError for an unknown name.
     """
 
     names: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ class ValidationRequest:
         _refuse_unknown(self.kinds, KINDS, "--models")
 
     def comparisons(self, progress: Progress) -> Iterator[Comparison]:
-        """All that was measured of the problems beside each model."""
+        """All measurements of the problems beside each model."""
         kinds = self.kinds or tuple(KINDS)
         for name in self.names or tuple(PROBLEMS):
             yield from PROBLEMS[name](kinds, QUICK if self.quick else ALL, progress)
@@ -53,11 +53,11 @@ class ValidationRequest:
 def own_comparisons(
     scene: str | None, folder: Path, overrides: Sequence[str], probe: str | None, progress: Progress
 ) -> Iterator[Comparison]:
-    """A scene by name or file beside the measurements in a folder. ValueError for unfit ones."""
+    """A scene by name or file beside the measurements in a folder. ValueError if unsuitable."""
     if scene is None or scene in PROBLEMS:
         raise ValueError("--data: give the scene that was measured too, a name or a TOML file")
-    data = own_scene.read_folder(folder)
-    return own_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
+    data = user_scene.read_folder(folder)
+    return user_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
 
 
 def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> None:
@@ -67,9 +67,9 @@ def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> No
 
 
 def all_answered(found: Sequence[Comparison]) -> bool:
-    """Whether the finite elements gave a number for all that was measured.
+    """Whether the finite elements gave a number for every measurement.
 
-    That a lattice gives way is an outcome, and stands in the table.
+    A lattice that collapses is a result, and stands in the table.
     """
     elements = {kind.label for kind in KINDS.values() if kind.elements}
     return all(one.answered for one in found if one.model in elements)

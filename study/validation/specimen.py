@@ -1,4 +1,4 @@
-"""What was measured, as a boundary-value problem: a body, what is moved, what hangs on it."""
+"""A measured specimen as a boundary-value problem: body, prescribed displacements and loads."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Floats = NDArray[np.float64]
 Projection = Callable[[Floats], Floats]
 
 PLANE = 1e-9
-"""How near [m] a node lies to a plane that it is on."""
+"""Distance [m] within which a node lies on a plane."""
 
 
 @dataclass(frozen=True)
 class Meshed:
-    """One mesh of the finite elements, and the size of its elements up to a factor of all.
+    """One finite-element mesh, and its element size up to a common factor.
 
-    `project` takes points of the mesh's boundary to the exact surface, where that is curved.
+    `project` maps points of the mesh's boundary to the exact surface, where that is curved.
     """
 
     mesh: Callable[[], TetrahedralMesh]
@@ -32,14 +32,14 @@ class Meshed:
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """As much of a body as symmetry leaves, one of `parts` alike.
+    """The part of a body that symmetry leaves, one of `parts` equal ones.
 
-    `body` in the box from `lower` to `upper` [m]. `prescribed` takes points [m] (n, 3) to their
-    displacements [m], nan where they are free, and all else grows with the same factor: the
+    `body` in the box from `lower` to `upper` [m]. `prescribed` maps points [m] (n, 3) to their
+    displacements [m], nan where they are free; everything else scales with the same factor: the
     `acceleration` [m/s^2] of its mass, of a `density` [kg/m^3], and the `forces` [N] (k, 3) at
-    points `at` [m]. `watched` [m] (q, 3): where displacements are read. `along`: the axis and the
-    coordinate [m] of the plane whose reaction is the force read. `meshes` of the finite elements
-    and `spacings` [m] of lattices, coarse to fine.
+    points `at` [m]. `watched` [m] (q, 3): where displacements are observed. `along`: the axis and
+    the coordinate [m] of the plane whose reaction is the force. `meshes` of the finite elements and
+    `spacings` [m] of lattices, coarse to fine.
     """
 
     meshes: tuple[Meshed, ...]
@@ -58,7 +58,7 @@ class Specimen:
     along: tuple[int, float] = (2, 0.0)
 
     def face(self, points: Floats) -> NDArray[np.bool_]:
-        """Which points (n, 3) lie on the plane whose reaction is read."""
+        """Which points (n, 3) lie on the plane whose reaction is evaluated."""
         axis, level = self.along
         return on_plane(points, axis, level)
 
@@ -69,5 +69,5 @@ def on_plane(points: Floats, axis: int, level: float) -> NDArray[np.bool_]:
 
 
 def free(points: Floats) -> Floats:
-    """Prescribes nothing, to be filled in."""
+    """Displacements without any prescribed component, to be filled in."""
     return np.full_like(points, np.nan)

@@ -20,14 +20,14 @@ from pathlib import Path
 import numpy as np
 
 from study.folders import write_text
-from study.validation.rows import Comparison
+from study.validation.comparison import Comparison
 
 COLUMNS = (
     *("problem", "case", "faces", "model", "quantity", "unit", "measured", "uncertainty"),
     *("found", "numerical", "modulus_pa", "fitted", "within", "note"),
 )
 MANY = 5
-"""Cases from which on a terminal is shown their median and range instead of each."""
+"""Number of cases from which the terminal shows their median and range."""
 NOTHING = 1e-6
 """An own error that is only rounding."""
 WIDTHS = (26, 33, 22, 16, 9)
@@ -42,7 +42,7 @@ def write(found: Iterable[Comparison], path: Path) -> None:
 
 
 def as_json(found: Sequence[Comparison]) -> str:
-    """Comparisons as JSON; a number that is not known is null."""
+    """Comparisons as JSON; an unknown number is null."""
     records = [
         {name: _plain(value) for name, value in zip(COLUMNS, _values(one), strict=True)}
         for one in found

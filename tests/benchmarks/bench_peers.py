@@ -39,7 +39,7 @@ from tests.benchmarks.converged import Converged
 from tests.benchmarks.machine import load, machine
 
 Floats = NDArray[np.float64]
-Truth = tuple[Converged, Floats, Floats]
+ReferenceSolution = tuple[Converged, Floats, Floats]
 """Finite elements at points [m] (q, 3) of volumes [m^3] (q,)."""
 
 TABLE = Path(__file__).parents[2] / "reports" / "data" / "peers.csv"
@@ -145,7 +145,9 @@ def step_times(found: list[Contender]) -> list[float]:
     return [timing.least / n for timing, n in zip(times, counts, strict=True)]
 
 
-def measured(case: field_error.Case, spacing: float, truths: dict[float, Truth]) -> Iterator[Row]:
+def measured(
+    case: field_error.Case, spacing: float, truths: dict[float, ReferenceSolution]
+) -> Iterator[Row]:
     """All contenders on one lattice."""
     found = [with_step(one, 0.5 * spacing) for one in contenders(case, spacing)]
     weights = interpolation(field_error.lattice(case, spacing).lattice, truths[0.25][1])[0]

@@ -90,7 +90,7 @@ def cases(scene_s: RayleighDamping) -> list[Load]:
     ]
 
 
-class Truth(NamedTuple):
+class ReferenceSolution(NamedTuple):
     """Motion in the large Krylov space: coordinates by all and by half of its vectors."""
 
     space: Subspace
@@ -137,7 +137,7 @@ def rows() -> Iterator[Row]:
         for k, one in compared.items()
     }
     for load in cases(ready.model.damping):
-        truth = Truth(space, moved(space, load), moved(space.leading(TRUTH // 2), load))
+        truth = ReferenceSolution(space, moved(space, load), moved(space.leading(TRUTH // 2), load))
         for m in VECTORS:
             given = {k: certificates[m, k] for k in CERTIFICATES}
             yield from _rows(body, probes.toarray()[0], load, truth, whole.leading(m), given)
@@ -147,7 +147,7 @@ def _rows(
     body: Body,
     at_tool: Floats,
     load: Load,
-    truth: Truth,
+    truth: ReferenceSolution,
     subspace: Subspace,
     certificates: dict[int, Certificate],
 ) -> Iterator[Row]:

@@ -36,8 +36,8 @@ from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.canonical import Plain
 from study.sweep.runner import Outcome, run
+from study.sweep.status import on_stderr
 from study.sweep.store import Store
-from study.sweep.tally import on_stderr
 from study.sweep.task import Task
 from study.tradeoff.timing import in_turns
 from tests.benchmarks.corrected_runs import FUNCTION, LEVEL, SAMPLES, SPACINGS, scene

@@ -24,7 +24,7 @@ from msm.assembly import contact
 from msm.model import Counts, Run
 from study.models.corrected import CorrectedLattice
 from study.models.damping import reference_damping
-from study.models.lattice import PreparedLattice, asked_step
+from study.models.lattice import PreparedLattice, requested_step
 from study.models.remainder import PreparedRemainder
 from study.models.table import model
 from study.problem.problem import Problem
@@ -202,7 +202,7 @@ class Parts(NamedTuple):
 def by_vectors(one: PreparedLattice) -> Parts:
     """With the linear lattice in few vectors."""
     prepared = PreparedRemainder(one, VECTORS)
-    found, linear = prepared.run(asked_step(one.model.lattice)), prepared.linear()
+    found, linear = prepared.run(requested_step(one.model.lattice)), prepared.linear()
     weights, _ = one.assembly.lattice.interpolation(one.problem.observation.probes)
     rest = weights @ linear.displacement(linear.load / linear.squares)
     return Parts(found.lattice, found.trajectory.displacement[:, 0], rest[0], found.truncation)
@@ -211,7 +211,7 @@ def by_vectors(one: PreparedLattice) -> Parts:
 def by_steps(one: PreparedLattice) -> Parts:
     """With the linear lattice stepped as the nonlinear one, where its vectors would be dear."""
     given = (one.assembly, one.springs.material, one.problem.factor, one.problem.observation)
-    whole = msm.run(*given, asked_step(one.model.lattice))
+    whole = msm.run(*given, requested_step(one.model.lattice))
     linear = msm.run(*given, Counts(whole.substeps), linear=True)
     u, below = (run.trajectory.displacement[:, 0] for run in (whole, linear))
     return Parts(whole, u - below, np.full(3, np.nan), 0.0)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from study.models.lattice import LatticeModel, PreparedLattice, asked_step
+from study.models.lattice import LatticeModel, PreparedLattice, requested_step
 from study.models.remainder import PreparedRemainder
 from study.models.table import model
 from study.problem.problem import Problem
@@ -128,7 +128,7 @@ def corrected(
     """Free nodes of a graded lattice, and the error of what it adds to its linear motion."""
     radius = reach * given.tool.radius
     one = lattice(given, "region", spacing=FINEST, radius=radius).prepare(problem)
-    remainder = PreparedRemainder(one, VECTORS).run(asked_step(one.model.lattice))
+    remainder = PreparedRemainder(one, VECTORS).run(requested_step(one.model.lattice))
     return free(one), size(at_tool(problem, remainder.trajectory.displacement) - added, truth)
 
 

@@ -37,12 +37,12 @@ from msm import model as msm
 from msm.model import Counts, Run
 from study.models.corrected import CorrectedLattice
 from study.models.deformed import superposed
-from study.models.lattice import PreparedLattice, asked_step
+from study.models.lattice import PreparedLattice, requested_step
 from study.models.model import Prepared
 from study.models.remainder import PreparedRemainder
 from study.models.table import model
 from study.problem.problem import Problem
-from study.problem.way import DEGREE, Turn
+from study.problem.tool_travel import DEGREE, StationFactor
 from study.progress import Silent
 from study.scene import LoadHistory, Scene
 from study.scene.place import depths
@@ -183,27 +183,29 @@ def watched(given: Scene) -> Problem:
     return replace(problem, observation=seen, probes=names)
 
 
-def turns(problem: Problem) -> list[Turn]:
+def station_loads(problem: Problem) -> list[StationFactor]:
     """Factors of its stations."""
     found = [problem.factor, *(one.factor for one in problem.loads)]
-    assert all(isinstance(one, Turn) for one in found)
+    assert all(isinstance(one, StationFactor) for one in found)
     return found  # type: ignore[return-value]
 
 
 def under(problem: Problem, motion: Floats) -> Floats:
     """Displacement [m] (samples, 3) under the tool, by that (samples, stations, 3) at stations."""
-    shares = np.column_stack([one.share(problem.observation.times) for one in turns(problem)])
+    shares = np.column_stack(
+        [one.share(problem.observation.times) for one in station_loads(problem)]
+    )
     return np.asarray(np.einsum("tk,tkd->td", shares, motion))
 
 
 def times_as_hard(problem: Problem, force: float) -> Problem:
     """The problem with so many times the force."""
-    (first, *rest) = [_harder(one, force) for one in turns(problem)]
+    (first, *rest) = [_harder(one, force) for one in station_loads(problem)]
     loads = tuple(replace(one, factor=turn) for one, turn in zip(problem.loads, rest, strict=True))
     return replace(problem, factor=first, loads=loads)
 
 
-def _harder(turn: Turn, force: float) -> Turn:
+def _harder(turn: StationFactor, force: float) -> StationFactor:
     def history(times: Floats) -> Floats:
         return force * turn.history(times)
 
@@ -266,7 +268,7 @@ def by_vectors(one: PreparedLattice, vectors: Floats) -> Parts:
     """With its linear part in vectors, as a corrected lattice has it."""
     prepared = PreparedRemainder(one, vectors.shape[1])
     prepared.__dict__["vectors"] = vectors  # whatever the force, the same
-    found, linear = prepared.run(asked_step(one.model.lattice)), prepared.linear()
+    found, linear = prepared.run(requested_step(one.model.lattice)), prepared.linear()
     weights, _ = one.assembly.lattice.interpolation(one.problem.observation.probes)
     loads = np.vstack([linear.load, linear.others])
     rests = [weights @ linear.displacement(load / linear.squares) for load in loads]
@@ -276,7 +278,7 @@ def by_vectors(one: PreparedLattice, vectors: Floats) -> Parts:
 def by_steps(one: PreparedLattice) -> Parts:
     """With its linear part stepped."""
     given = (one.assembly, one.springs.material, one.problem.factor, one.problem.observation)
-    whole = msm.run(*given, asked_step(one.model.lattice))
+    whole = msm.run(*given, requested_step(one.model.lattice))
     linear = msm.run(*given, Counts(whole.substeps), linear=True)
     added = whole.trajectory.displacement - linear.trajectory.displacement
     return Parts(whole, added, np.zeros(0))

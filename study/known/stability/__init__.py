@@ -1,1 +1,1 @@
-"""Where each model breaks: cases at the extremes, each held to a figure known beforehand."""
+"""Limits of each model: cases at the extremes, each compared with a figure known beforehand."""

@@ -1,4 +1,4 @@
-"""Small lattices that the cases run on."""
+"""Small lattices used by the stability cases."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Boxes:
     corners: Floats
 
     def occupancy(self, x: Floats, y: Floats, z: Floats) -> Booleans:
-        """Inside or not on the grid of three axes, as `study.organ.occupancy.SolidShape` has it."""
+        """Inside or outside on the grid of three axes, see `study.organ.occupancy.SolidShape`."""
         inside = np.zeros((x.size, y.size, z.size), dtype=np.bool_)
         for lower, upper in self.corners:
             along = [(a > lo) & (a < up) for a, lo, up in zip((x, y, z), lower, upper, strict=True)]
@@ -44,7 +44,7 @@ def block(size: tuple[float, ...]) -> Boxes:
 
 @dataclass(frozen=True, kw_only=True)
 class Make:
-    """What a small lattice is made of, in SI units.
+    """Settings of a small lattice, in SI units.
 
     `poisson_ratio`: None for springs alone; `gravity`: its weight, for a body that is `held` at its
     lowest nodes by springs of E h.
@@ -82,7 +82,7 @@ def _material(make: Make, lattice: cells.CellLattice) -> Material:
 
 
 def watch(assembly: Assembly, seconds: float, samples: int) -> Observation:
-    """Look at all nodes at so many equally spaced times."""
+    """Observation of all nodes at equally spaced times."""
     none = np.zeros((0, 3))
     times = np.linspace(0.0, seconds, samples)
     return Observation(times, assembly.lattice.nodes, (samples - 1,), none, none)

@@ -1,4 +1,4 @@
-"""Energies of a lattice of linear springs, by arrays and not by the kernels that move it.
+"""Energies of a lattice of linear springs, by array operations instead of the lattice's kernels.
 
 `k` [N/m] is the stiffness of a spring of weight 1, that of `msm.laws.Hooke`.
 """
@@ -16,17 +16,17 @@ Floats = NDArray[np.float64]
 
 
 def kinetic(net: Network, v: Floats) -> float:
-    """Energy of motion [J] at velocities v [m/s] (n, 3)."""
+    """Kinetic energy [J] at velocities v [m/s] (n, 3)."""
     return float(0.5 * (net.mass[:, None] * v**2).sum())
 
 
 def potential(k: float, net: Network, u: Floats) -> float:
-    """Energy [J] of springs, cells and support at u [m] (n, 3), less the work of the full load."""
+    """Energy [J] of springs, cells and support at u [m] (n, 3), minus the work of the full load."""
     return springs(k, net, u) + cells(net, u) + support(net, u) - float((net.load * u).sum())
 
 
 def springs(k: float, net: Network, u: Floats) -> float:
-    """Energy [J] stored in the springs."""
+    """Strain energy [J] of the springs."""
     i, j = net.ends.T.astype(int)
     apart = u[j] - u[i]
     if net.linear:
@@ -50,7 +50,7 @@ def cells(net: Network, u: Floats) -> float:
 
 
 def support(net: Network, u: Floats) -> float:
-    """Energy [J] stored in the foundation."""
+    """Strain energy [J] of the foundation."""
     entries = (net.value, net.column.astype(int), net.row.astype(int))
     matrix = csr_array(entries, shape=(len(u), len(u)))
     return float(0.5 * (u * (matrix @ u)).sum())

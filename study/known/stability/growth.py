@@ -1,4 +1,4 @@
-"""The longest stable step, measured: does a small motion grow or not, by bisection on the step."""
+"""The critical step, measured: bisection on the step by whether a small motion grows."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ from msm.network import Network
 Floats = NDArray[np.float64]
 
 EXPLICIT = tuple(name for name, one in INTEGRATORS.items() if one.oscillation < UNBOUNDED)
-"""Names of the integrators that have a longest stable step."""
+"""Names of the integrators that have a critical step."""
 RESOLUTION = 1e-3
-"""Ratio of the two steps, one stable and one not, between which the limit is found, less one."""
+"""Relative distance of the stable and the unstable step between which the limit is found."""
 LOOKS = 40
 SMALL = 1e-7
-"""Size of the motion that is let go, in spacings: geometry stays out of it until it has grown."""
+"""Amplitude of the initial motion in spacings, so small that geometry stays linear."""
 LOST = 1e4
-"""Growth that ends the watch."""
+"""Growth that ends the observation."""
 GROWN = 10.0
-"""Growth from the first to the second half of the watch. What beats below the limit has beaten in
-the first half; what grows by 10 in the second does so by more than 1e-3 a step in 2000."""
+"""Growth from the first to the second half of the observation that counts as unstable.
+
+Beating below the limit has reached its amplitude in the first half; a growth by 10 in the second
+half is more than 1e-3 per step in 2000 steps.
+"""
 
 
 def measured_limit(
@@ -35,7 +38,7 @@ def measured_limit(
     *,
     linear: bool = True,
 ) -> float:
-    """Longest stable step [s] of a lattice without load about its shape, near a guess [s]."""
+    """Critical step [s] of an unloaded lattice about its rest shape, near a guess [s]."""
     net = arrays(assembly, material, linear=linear)
     net, still = net._replace(load=np.zeros_like(net.load)), np.zeros_like(net.load)
     return longest_stable_step(material.law, net, INTEGRATORS[integrator], guess, still, steps)
@@ -44,7 +47,7 @@ def measured_limit(
 def longest_stable_step(
     law: Law, net: Network, method: Integrator, guess: float, about: Floats, steps: int
 ) -> float:
-    """Step [s] beyond which motions about the rest `about` [m] (n, 3) grow, near a guess [s]."""
+    """Step [s] beyond which motions about the rest state `about` [m] (n, 3) grow."""
     low, high = guess / 1.25, guess * 1.25
     while grows(law, net, method, low, about, steps):
         low, high = low / 2.0, low
@@ -60,7 +63,7 @@ def longest_stable_step(
 
 
 def grows(law: Law, net: Network, method: Integrator, dt: float, about: Floats, steps: int) -> bool:
-    """Whether a small random motion about a rest under the full load grows."""
+    """Whether a small random motion about a rest state under the full load grows."""
     noise = np.random.default_rng(0).standard_normal(about.shape)
     u, v = about + SMALL * net.spacing * noise, np.zeros_like(about)
     stretch = np.ones((max(1, steps // LOOKS), len(method.at)))
@@ -75,5 +78,5 @@ def grows(law: Law, net: Network, method: Integrator, dt: float, about: Floats, 
 
 
 def _size(net: Network, u: Floats, v: Floats, dt: float) -> float:
-    """Size of a motion, as a root of its energy [J^0.5]."""
+    """Norm of a motion, as a root of its energy [J^0.5]."""
     return float(np.sqrt((net.mass[:, None] * (v**2 + (u / dt) ** 2)).sum()))

@@ -1,8 +1,8 @@
-"""Frequencies by dense matrices, and the sharp limit that theory gives each integrator for them.
+"""Frequencies by dense matrices, and the sharp critical step of each integrator for them.
 
-With damping over mass c alike for all nodes and Rayleigh's beta, modes stay apart,
-u'' + (c + beta w^2) u' + w^2 u = 0, and each is a recurrence of two terms whose roots leave the
-unit circle at a known step.
+With mass-proportional damping c, equal for all nodes, and Rayleigh's beta, modes stay uncoupled,
+u'' + (c + beta w^2) u' + w^2 u = 0. Each is a two-term recurrence whose roots leave the unit circle
+at a known step.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ Floats = NDArray[np.float64]
 
 
 def frequencies(assembly: Assembly, material: Material) -> Floats:
-    """All frequencies [rad/s] of a small lattice at rest, rising; zero for rigid motions."""
+    """All frequencies [rad/s] of a small lattice at rest, ascending; zero for rigid motions."""
     return shapes(assembly, material)[0]
 
 
 def shapes(assembly: Assembly, material: Material) -> tuple[Floats, Floats]:
-    """Frequencies [rad/s] and modes, the columns of (3 n, 3 n), of modal mass 1."""
+    """Frequencies [rad/s] and mass-normalised modes, the columns of (3 n, 3 n)."""
     squares, vectors = np.linalg.eigh(_over_mass(assembly, material))
     root = np.sqrt(np.repeat(assembly.mass, 3))
     return np.sqrt(np.clip(squares, 0.0, None)), vectors / root[:, None]
 
 
 def sharp_limit(integrator: str, omega: Floats, c: float, beta: float) -> float:
-    """Longest stable step [s] of an explicit integrator for modes of frequencies omega [rad/s].
+    """Critical step [s] of an explicit integrator for modes of frequencies omega [rad/s].
 
     `c` [1/s], `beta` [s]. ValueError for an integrator without such a theory here.
     """
@@ -46,10 +46,10 @@ def sharp_limit(integrator: str, omega: Floats, c: float, beta: float) -> float:
 
 
 def split_limit(assembly: Assembly, material: Material) -> float:
-    """Longest stable step [s] of springs explicit, volume implicit, without damping.
+    """Critical step [s] with springs explicit, volume term implicit, without damping.
 
-    (M + dt^2 K_v) v' = M v - dt (K_s + K_v) u, u' = u + dt v' turns a motion round at each step,
-    a root of -1, where dt^2 (K_s - K_v) u = 4 M u.
+    (M + dt^2 K_v) v' = M v - dt (K_s + K_v) u, u' = u + dt v' has a root of -1 where dt^2 (K_s -
+    K_v) u = 4 M u.
     """
     springs = _over_mass(assembly, Material(material.law))
     volume = _over_mass(assembly, material) - springs

@@ -1,1 +1,1 @@
-"""Problems with known answers, solved by the reference as a scene is: `liver-study verify`."""
+"""Problems with exact solutions, solved by the reference's own code: `liver-study verify`."""

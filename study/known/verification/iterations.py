@@ -1,4 +1,4 @@
-"""Iterative solvers beside factors of the same matrix."""
+"""Iterative solvers compared with a factorisation of the same matrix."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from study.known.pressed import block
 from study.problem.tissue import Tissue
 
 LIMIT = 1e-9
-"""A residual of 1e-10 of the load, and some ten times that in the displacement."""
+"""The residual is 1e-10 of the load, the error of the displacement about ten times that."""
 CASES: tuple[tuple[str, ElementName, float], ...] = (
     ("two-level conjugate gradients", "p2", 0.45),
     ("minimal residuals", "taylor-hood", 0.45),
@@ -24,7 +24,7 @@ CASES: tuple[tuple[str, ElementName, float], ...] = (
 
 
 def findings() -> Iterator[Finding]:
-    """Displacements by iterative solvers beside those by factors of the same matrix."""
+    """Displacements by iterative solvers compared with those by factorisation."""
     for method, name, nu in CASES:
         body = block(Tissue(poisson_ratio=nu), name, 0.01)
         system, size = body.stiffness.system(), body.stiffness.size

@@ -1,8 +1,8 @@
 """Rigid tools pressed on neo-Hookean elements: a plate at large strain, a sphere at small.
 
-A plate that a block meets in contact alone squeezes it as sliding plates that hold it do: by the
-two equations of `finite_strain.uniaxial`. A sphere that goes in little is Hertz's, as in
-`indentation`, the far faces of the block being moved as those of the half space are by that force.
+A plate in frictionless contact compresses a block as sliding plates do that hold its faces: by the
+two equations of `finite_strain.uniaxial`. A sphere at small depth is Hertz's, as in `indentation`,
+with the far faces of the block displaced as those of the half space are by that force.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 SQUEEZED, PRESSED = (0.3, 0.499), (0.45, 0.4999)
 """Poisson ratios under the plate and under the sphere."""
 EXACT, HERTZ = 1e-4, 1e-2
-"""Limits of the errors: the plate's is that of the balance of forces alone."""
+"""Limits of the errors: that of the plate is the tolerance of equilibrium alone."""
 FINEST = 0.5
 """Longest edge of the elements under the sphere over the radius of contact."""
 
@@ -52,7 +52,7 @@ def findings() -> Iterator[Finding]:
 
 
 def squeezed(tissue: Tissue) -> float:
-    """Force [N] of a plate on an eighth of a block, up to a stretch that is not small."""
+    """Force [N] of a plate on an eighth of a block, at a large stretch."""
     blunt = ToolPatch(np.full(3, EDGE), DOWN, EDGE, 0.0)
     mesh = block_mesh((EDGE, EDGE, EDGE), 0.5 * EDGE)
     bare = discretise(mesh, tissue, Foundation(DOWN, 0.0, 1e-3, 1.0), blunt, "taylor-hood")
@@ -70,7 +70,7 @@ def squeezed(tissue: Tissue) -> float:
 
 
 def sphere(tissue: Tissue, finest: float) -> float:
-    """Force [N] that presses a sphere in, elements being `finest` times the contact's radius."""
+    """Force [N] that presses a sphere in; elements are `finest` times the contact radius."""
     tool = indentation.tool_of(SPHERE, bonded=False)
     size = finest * indentation.TOUCHED
     bare = indentation.quarter(tissue, "taylor-hood", size, flat=False)

@@ -60,7 +60,7 @@ def _converging(
 
 
 def error(name: ElementName, tissue: Tissue, cells: int) -> float:
-    """Relative L2 error with so many cells along an edge, displacements prescribed all round."""
+    """Relative L2 error with `cells` along an edge, displacements prescribed on the boundary."""
     body = solid(straight(block_mesh((1.0, 1.0, 1.0), 1.0 / cells)), name, tissue)
     x = body.points
     inner = np.all((x > 1e-9) & (x < 1.0 - 1e-9), axis=1)[:, None]
@@ -75,7 +75,7 @@ def displacement(x: Floats, tissue: Tissue) -> Floats:
 
 
 def force(x: Floats, tissue: Tissue) -> Floats:
-    """The force per volume that the manufactured solution takes [N/m^3] (..., 3)."""
+    """The force per volume of the manufactured solution [N/m^3] (..., 3)."""
     mu, lame = shear_modulus(tissue), lame_lambda(tissue)
     gradient = 3.0 * oedometric(tissue) * mu / lame * _gradient(x)
     return np.asarray(np.pi**2 * (2.0 * mu * _solenoidal(x) + gradient))

@@ -18,8 +18,8 @@ def response(
 ) -> tuple[Floats, Floats]:
     """Displacement and velocity (times, m) from rest of y'' + c y' + k y = factor(t).
 
-    The rest under the mean load, the steady oscillation, and two exponentials that make the start
-    one of rest; c^2 = 4 k is excluded.
+    The sum of the rest under the mean load, the steady oscillation, and two exponentials that
+    satisfy the initial conditions; c^2 = 4 k is excluded.
     """
     w = 2.0j * np.pi / period
     steady = -0.5 / (stiffness + damping * w + w**2)

@@ -1,4 +1,4 @@
-"""Uniform strain: elements of any shape hold it exactly, whatever their degree.
+"""Patch test: elements of any shape represent uniform strain exactly, whatever their degree.
 
 Irons and Razzaque (1972); Taylor, Simo, Zienkiewicz and Chan (1986), Int. J. Numer. Meth. Eng.
 22:39.
@@ -32,7 +32,7 @@ def findings() -> Iterator[Finding]:
 
 
 def distorted() -> TetrahedralMesh:
-    """A block whose inner vertices lie anywhere."""
+    """A block whose inner vertices are displaced at random."""
     mesh = block_mesh(SIZE, 0.02)
     inner = np.all((mesh.points > 0.0) & (mesh.points < SIZE), axis=1)
     moves = np.random.default_rng(1).uniform(-4e-3, 4e-3, mesh.points.shape)

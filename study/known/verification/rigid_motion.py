@@ -1,4 +1,4 @@
-"""A body that nothing holds: six motions without strain, and its mass and inertia."""
+"""An unsupported body: six rigid motions without strain, and its mass and inertia."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A ball and an eighth of a shell: octahedra blown up to spheres, and their exact surfaces."""
+"""Meshes of a ball and an eighth of a shell: octahedra mapped to spheres, with exact surfaces."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _ball(points: Floats, octants: Ints, refinements: int) -> tuple[TetrahedralM
 def shell_octant(inner: float, outer: float, layers: int) -> tuple[TetrahedralMesh, Projection]:
     """Mesh of a thick shell [m] where x, y and z are positive, and its two spheres.
 
-    Twice as many cells as layers lie along a quarter of a circle.
+    A quarter of a circle has twice as many cells as there are layers.
     """
     i, j = np.array([(i, j) for i in range(2 * layers + 1) for j in range(2 * layers + 1 - i)]).T
     triangle = np.stack([i, j, 2 * layers - i - j], axis=1) / (2 * layers)
@@ -63,23 +63,24 @@ def _triangles(cells: int) -> Ints:
 
 
 def _prisms(triangles: Ints, vertices: int, layers: int) -> Ints:
-    """Tetrahedra (t, 4) of prisms; neighbours agree on diagonals as all go by vertex numbers."""
+    """Tetrahedra (t, 4) of prisms; diagonals follow vertex numbers, so that neighbours agree."""
     low = np.concatenate([triangles + vertices * layer for layer in range(layers)])
     both = np.concatenate([low, low + vertices], axis=1)
     return np.concatenate([both[:, [0, 1, 2, 5]], both[:, [0, 1, 4, 5]], both[:, [0, 3, 4, 5]]])
 
 
 def _blown_up(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Octahedra to spheres: |x| + |y| + |z|, constant on an octahedron, becomes the radius."""
+    """Map octahedra to spheres: |x| + |y| + |z|, constant on an octahedron, becomes the radius."""
     size = np.linalg.norm(mesh.points, axis=1)
     scale = np.abs(mesh.points).sum(axis=1) / np.where(size > 0.0, size, 1.0)
     return oriented(TetrahedralMesh(scale[:, None] * mesh.points, mesh.tetrahedra))
 
 
 def _spheres(radii: tuple[float, ...], layer: float) -> Projection:
-    """Projection onto the spheres of a mesh with layers so thick.
+    """Projection onto the spheres of a mesh with layers of this thickness.
 
-    The middle of a chord is closer to its sphere than a quarter of a layer, all others are farther.
+    The midpoint of a chord is closer to its sphere than a quarter of a layer, all others are
+    farther.
     """
     return partial(_onto_spheres, radii=radii, near=0.25 * layer)
 

@@ -1,4 +1,4 @@
-"""A body without support for problems whose boundary is prescribed, and its solution at rest."""
+"""An unsupported body for problems with prescribed boundary, and its solution at rest."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Field = Callable[[Floats], Floats]
 """Vectors (..., 3) at points [m] (..., 3)."""
 
 FIELD_ORDER = 6
-"""Degree that integrals of given fields are exact for; they are smooth within an element."""
+"""Quadrature degree for given fields, which are smooth within an element."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def at_rest(stiffness: Stiffness, load: Floats, prescribed: Floats) -> Floats:
 
 
 def free_everywhere(points: Floats) -> Floats:
-    """Prescribes nothing, (nodes, 3), to be filled in."""
+    """Displacements (nodes, 3) without any prescribed component, to be filled in."""
     return np.full_like(points, np.nan)
 
 

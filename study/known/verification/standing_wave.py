@@ -1,9 +1,9 @@
 """A standing shear wave between smooth walls, exact in space and time.
 
-In the unit cube u = g(t) U, U_x = 2 sin(pi x) cos(pi y) cos(pi z), U_y and U_z its like with
-factor -1 and sine of y and of z, is free of divergence, slides along all walls without shear, and
-vibrates at omega^2 = 3 pi^2 mu / rho whatever nu is. Under a body force rho U factor(t), g moves
-as one damped oscillator.
+In the unit cube u = g(t) U, with U_x = 2 sin(pi x) cos(pi y) cos(pi z), and U_y and U_z alike with
+factor -1 and the sine in y and in z. It is free of divergence, slides along all walls without
+shear, and vibrates at omega^2 = 3 pi^2 mu / rho for any nu. Under a body force rho U factor(t), g
+moves as one damped oscillator.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ STEPS_PER_CELL = 8
 PERIODS = 0.8
 """Duration of the motion, and period of the load, in periods of the wave."""
 RATIO, SHARE = 0.1, 0.5
-"""Damping ratio of the wave, and how much of it is by the stiffness."""
+"""Damping ratio of the wave, and the share of it that is stiffness-proportional."""
 
 
 def findings() -> Iterator[Finding]:
-    """Displacement at the end, cells and steps halved together.
+    """Displacement at the end, with cells and steps halved together.
 
     The steps are short, so the order is that of the elements: between 3 of the shape and 4 of the
     frequency.

@@ -37,10 +37,10 @@ RATIOS = (0.3, 0.45, 0.49, 0.499, 0.49999)
 
 
 def findings() -> Iterator[Finding]:
-    """Largest nodal error of the displacement, and how much Taylor-Hood's changes with nu.
+    """Largest nodal error of the displacement, and the variation of Taylor-Hood's with nu.
 
-    What a displacement alone does as nu grows is shown and not judged: it is why a reference near
-    nu 1/2 needs a pressure.
+    The locking of displacement elements as nu grows is reported without a criterion: it is why a
+    reference near nu 1/2 needs a pressure field.
     """
     mixed = []
     for nu in RATIOS:

@@ -1,7 +1,7 @@
-"""Torsion of a free ball: the slowest five motions, of one frequency.
+"""Torsion of a free ball: its five lowest modes have one frequency.
 
-The surface of a ball of radius R carries no shear where (l - 1) j_l(k) = k j_(l+1)(k), k = omega
-R / c_s; the least root for l = 2 is 2.50113. Lamb (1881), Proc. London Math. Soc. 13:189.
+The surface of a ball of radius R carries no shear where (l - 1) j_l(k) = k j_(l+1)(k), k = omega R
+/ c_s; the least root for l = 2 is 2.50113. Lamb (1881), Proc. London Math. Soc. 13:189.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def whole() -> Iterator[Finding]:
 
 
 def octant() -> Iterator[Finding]:
-    """Two of the five frequencies, in an eighth of the ball where no plane lets them slide.
+    """Two of the five frequencies, in an eighth of the ball that cannot slide along its planes.
 
     The order is between that of quadratic surfaces, 3, and of energy, 4.
     """

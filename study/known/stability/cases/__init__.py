@@ -1,1 +1,1 @@
-"""The cases, one family per module: `cases()` lists them, the functions beside it run them."""
+"""The cases, one family per module: `cases()` lists them, the module's other functions run them."""

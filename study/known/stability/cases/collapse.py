@@ -1,8 +1,8 @@
 """Loads up to total collapse: the automatic step completes whatever any fixed step completes.
 
-A body falls on its support under many times its weight. With a load that is constant from the
-start, the energy of motion and deformation less the work of the load is what damping has taken. So
-a finished run whose energies do not balance is wrong, however smooth.
+A body falls on its support under multiples of its weight. With a constant load from the start,
+kinetic energy plus strain energy minus the work of the load equals minus the dissipation of
+damping. A finished run whose energies do not balance is therefore wrong, however smooth.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from study.known.stability.bodies import Make, lattice_of, watch
 Floats = NDArray[np.float64]
 
 FRACTIONS = (1.0, 0.5, 0.2, 0.05)
-"""Lengths of the fixed steps over the limit at rest."""
+"""Fixed steps over the critical step at rest."""
 SAMPLES = 121
 RATE = 10.0
 """Damping to ground, per mass [1/s]."""
 DISSIPATIVE = ("implicit-euler", "split-volume")
-"""Integrators that take energy by themselves, and may not give any."""
+"""Integrators with numerical dissipation, which must not gain energy."""
 FALLS = 8.0
 """Duration over the time of a free fall by the size of the body, at most SECONDS."""
 SECONDS = 0.6
 WEIGHTS = (1.0, 3.0, 6.0, 10.0, 20.0, 40.0, 100.0, 1000.0)
 LOST_FROM = {None: 3.0, 0.45: 20.0, 0.49: 20.0}
-"""Weights, by Poisson ratio, from which the body turns inside out and falls through its support."""
+"""Multiples of the weight from which the body inverts, by Poisson ratio."""
 BALANCE = 0.02
-"""Share of the work of the load by which the energies of coarse steps may beat."""
+"""Admissible energy error of coarse steps, over the work of the load."""
 LOOKED_AT = 0.15
-"""Share of the time of divergence: two sampling intervals of a free fall's fifteen."""
+"""Tolerance of the time of divergence, relative to it."""
 FAMILY = Family("collapse", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Cases of a body under times of its weight, by Poisson ratio and integrator."""
+    """Cases of a body under multiples of its weight, by Poisson ratio and integrator."""
     for weights in WEIGHTS:
         for nu in LOST_FROM:
             yield _case("symplectic-euler", nu, weights)
@@ -69,7 +69,7 @@ def _case(name: str, nu: float | None, weights: float) -> Case:
 
 @dataclass
 class Ledger:
-    """Energies [J] of a run, sample by sample: of motion, and potential with that of the load."""
+    """Energies [J] of a run by sample: kinetic, and potential including that of the load."""
 
     k: float
     net: Network
@@ -78,13 +78,13 @@ class Ledger:
     work: float = 0.0
 
     def note(self, sample: int, u: Floats, v: Floats) -> None:
-        """Keep one sample; one that was undone is written over."""
+        """Record one sample; a sample that is repeated is overwritten."""
         self.kinetic[sample] = energy.kinetic(self.net, v)
         self.potential[sample] = energy.potential(self.k, self.net, u)
         self.work = max(self.work, abs(float((self.net.load * u).sum())))
 
     def balance(self, interval: float) -> Floats:
-        """What is there beside what damping has taken, over the largest work; zero if all is."""
+        """Energy error beyond the dissipation by damping, over the largest work of the load."""
         order = sorted(self.kinetic)
         kinetic = np.array([self.kinetic[sample] for sample in order])
         total = kinetic + [self.potential[sample] for sample in order]
@@ -94,10 +94,10 @@ class Ledger:
 
 
 def fall(integrator: str, nu: float | None, weights: float) -> Finding:
-    """The automatic step and several fixed ones under so many times the weight.
+    """The automatic step and several fixed ones under `weights` times the weight.
 
-    Where none completes, the body is lost by its load and not by its step: the finest fixed one
-    then loses it at the same time.
+    Where none completes, the load destroys the body whatever the step: the finest fixed step then
+    diverges at the same time.
     """
     gravity = 9.81 * weights
     make = Make(counts=(3, 3, 5), poisson_ratio=nu, gravity=gravity, damping=NodalDamping(RATE))
@@ -109,21 +109,21 @@ def fall(integrator: str, nu: float | None, weights: float) -> Finding:
     steps = [Fixed(interval / whole_steps(interval, part * limit)) for part in FRACTIONS]
     fixed = [_run(assembly, material, integrator, step, interval) for step in steps]
     complete = sum(one.trajectory.status == "finished" for one, _ in fixed)
-    told = (
+    message = (
         f"{complete} of {len(fixed)} fixed steps complete; smallest step "
         f"{found.smallest_step / limit:.2g} of the limit, strain {found.largest_strain:.2g}, "
         f"{found.inverted_cells} cells inverted"
     )
     if found.trajectory.ended_at is None:
-        return _balanced(integrator, ledger.balance(interval), told)
+        return _balanced(integrator, ledger.balance(interval), message)
     finest = fixed[-1][0].trajectory.ended_at
     if complete or finest is None:
-        return Finding("error", message=f"lost by its step: {told}")
-    return value(finest, found.trajectory.ended_at, told, "diverged")
+        return Finding("error", message=f"lost by its step: {message}")
+    return value(finest, found.trajectory.ended_at, message, "diverged")
 
 
 def _balanced(integrator: str, balance: Floats, message: str) -> Finding:
-    """How far the energy is from balance, at worst; upwards only for what dissipates."""
+    """Largest energy error; for dissipative integrators only gains count."""
     off = balance if integrator in DISSIPATIVE else np.abs(balance)
     worst = float(balance[off.argmax()])
     return Finding("bounded", 0.0, worst, float(off.max()), message)

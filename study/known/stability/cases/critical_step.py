@@ -1,9 +1,10 @@
-"""The critical step predicted and measured, over the range of every parameter that it depends on.
+"""The critical step, predicted and measured over the range of every parameter it depends on.
 
-Undamped, what is predicted is the limit that a run's step follows. Damping lengthens it where it is
-implicit and shortens Runge-Kutta's, and an implicit volume term steadies the springs a little: a
-run makes no use of what lengthens and is cautious about what shortens. There the sharp limit of
-theory is predicted, and the run's must not be beyond what is measured either.
+Without damping the prediction is the limit that a run's step follows. Damping extends the limit
+where it is implicit and shortens that of Runge-Kutta, and an implicit volume term stabilises the
+springs slightly. A run does not use such extensions, and is conservative about reductions. In these
+cases the sharp theoretical limit is compared with the measurement, and the run's limit must not
+exceed the measured one either.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from study.problem.contact import Foundation, ToolPatch
 
 PLAIN = ("symplectic-euler", "velocity-verlet", "runge-kutta-4")
 AGREEMENT = 5e-3
-"""The bisection leaves 1e-3, and growth that damping slows another 1e-3; the frequency 5e-4."""
+"""Bisection leaves 1e-3, growth slowed by damping another 1e-3, the frequency 5e-4."""
 FAMILY = Family("critical step", __name__)
 
 
@@ -97,7 +98,7 @@ def damped(integrator: str, zeta: float, beta: float = 0.0) -> Finding:
 
 
 def split(integrator: str, **make: Any) -> Finding:
-    """The sharp limit with the volume term implicit."""
+    """The sharp limit with an implicit volume term."""
     assembly, material = lattice_of(Make(counts=(2, 2, 2), **make))
     followed = critical_time_step(assembly, material, integrator)
     measured = _measured(assembly, material, integrator, followed)
@@ -105,15 +106,15 @@ def split(integrator: str, **make: Any) -> Finding:
 
 
 def _sharp(sharp: float, measured: float, followed: float) -> Finding:
-    """Theory beside measurement; the limit that a run follows must not be beyond it."""
+    """Theory beside measurement; the limit that a run follows must not exceed the measurement."""
     found = value(sharp, measured, f"a run takes {followed / measured:.3f} of it for the limit")
     return replace(found, difference=max(found.difference or 0.0, followed / measured - 1.0))
 
 
 def deformed(integrator: str, stretch: float) -> Finding:
-    """The limit about a stretched state, which a load that balances its forces makes a rest.
+    """The limit about a stretched state, made an equilibrium by a load that balances its forces.
 
-    A support of every node keeps that rest from buckling, at any step.
+    A support of every node keeps the state from buckling, at any step.
     """
     from msm.forces import internal_forces
 
@@ -131,7 +132,7 @@ def deformed(integrator: str, stretch: float) -> Finding:
 
 
 def benchmark(integrator: str) -> Finding:
-    """The limit at rest of springs of eq. (6), at motions small enough to be linear."""
+    """The limit at rest of springs of eq. (6), for motions small enough to be linear."""
     assembly, material = lattice_of(Make())
     material = replace(material, law=Basafa(8.0, 1600.0, 0.2))
     predicted = critical_time_step(assembly, material, integrator)
@@ -150,7 +151,7 @@ def on_tetrahedra(integrator: str) -> Finding:
 
 
 def cell(integrator: str, nu: float) -> Finding:
-    """One free cell against the closed form of its breathing, h sqrt(rho / (3 K))."""
+    """One free cell against the closed form of its breathing mode, h sqrt(rho / (3 K))."""
     make = Make(counts=(1, 1, 1), poisson_ratio=nu, held=False)
     assembly, material = lattice_of(make)
     closed = cell_bound(make.youngs_modulus, nu, make.density, make.spacing)
@@ -165,5 +166,5 @@ def _measured(
 
 
 def _steps(integrator: str, *, damped: bool = False) -> int:
-    """Steps that show growth just above the limit; damping slows it."""
+    """Number of steps that shows growth just above the limit; damping slows it."""
     return {"split-volume": 400, "runge-kutta-4": 1600}.get(integrator, 8000 if damped else 1000)

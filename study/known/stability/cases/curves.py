@@ -1,7 +1,7 @@
 """Similarity of curves that are constant, empty, huge, tiny, broken or equal.
 
-A score is held to what the measures promise: 1 for equal curves, the same whatever the scale of
-both, and never outside 0 to 1.
+A score must have the properties of the measures: 1 for equal curves, invariance to a common scale
+of both, and a value from 0 to 1.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REFUSED: tuple[tuple[str, str], ...] = (
     ("nan-time", "time is nan at sample 17"),
     ("shape", "has shape"),
 )
-"""What is done to both curves, and what the refusal says."""
+"""Changes of both curves that must be refused, and a pattern of the message."""
 
 
 def cases() -> Iterator[Case]:
@@ -62,7 +62,7 @@ def changed(change: str) -> Finding:
 
 
 def scaled(scale: float) -> Finding:
-    """Scores of two curves, and of both on another scale."""
+    """Scores of two curves, and of both at another scale."""
     candidate, reference = _motion(phase=0.3), _motion()
     return beside(
         _scores(candidate, reference), _scores(*(_times(m, scale) for m in (candidate, reference)))
@@ -84,7 +84,10 @@ def equal(kind: str) -> Finding:
 
 
 def within(times: float) -> Finding:
-    """By how much a score leaves 0 to 1; a candidate that is not the reference is no match."""
+    """By how much a score leaves the range 0 to 1.
+
+    A candidate that differs from the reference must not be a perfect match.
+    """
     found = _scores(_times(_motion(), times), _motion())
     outside = max(0.0, float(found.max()) - 1.0, -float(found.min()))
     if not np.isfinite(found).all() or found.min() >= 0.9:

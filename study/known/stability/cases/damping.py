@@ -1,8 +1,8 @@
-"""Free motion of single modes under damping, from none to far beyond critical, by closed form.
+"""Free motion of single modes under damping, from none to far above critical, in closed form.
 
-Damping to ground and Rayleigh's keep modes apart: each is an oscillator of its own frequency w and
-ratio zeta = (alpha / w + beta w) / 2. The lattice is let go in the shape of its slowest or fastest
-mode, the single control point at rest under a constant force.
+Mass-proportional and stiffness-proportional damping leave modes uncoupled: each is an oscillator
+with its own frequency w and ratio zeta = (alpha / w + beta w) / 2. The lattice is released in the
+shape of its slowest or fastest mode, the single control point at rest under a constant force.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from study.known.stability.modes import shapes
 Floats = NDArray[np.float64]
 
 STEP = 2e-3
-"""Step in radians of the mode: symplectic Euler is off by half of it, in damping too."""
+"""Phase angle [rad] per step; symplectic Euler has an error of half of it, in damping too."""
 PERIODS, LOOKS = 2.0, 50
 CLOSE, SOLVED = STEP, 1e-6
 FAMILY = Family("damping", __name__, quick=True)
 
 
 def cases() -> Iterator[Case]:
-    """Cases of both parts of Rayleigh's damping; of the control point to the paper's 12."""
+    """Cases of both parts of Rayleigh damping, and of the control point up to a zeta of 12."""
     for which in ("slowest", "fastest"):
         for alpha, beta in ((0.0, 0.0), (0.05, 0.0), (3.0, 0.0), (0.0, 0.05), (0.5, 0.5)):
             title = f"{which} mode, ratios {alpha:g} by mass and {beta:g} by stiffness"
@@ -44,7 +44,7 @@ def cases() -> Iterator[Case]:
 
 
 def rings(which: str, by_mass: float, by_stiffness: float) -> Finding:
-    """Coordinate of one mode, let go at 1."""
+    """Coordinate of one mode, released at 1."""
     assembly, material = lattice_of(Make(counts=(2, 2, 2), poisson_ratio=0.45))
     omegas, vectors = shapes(assembly, material)
     index = 0 if which == "slowest" else -1
@@ -62,7 +62,7 @@ def rings(which: str, by_mass: float, by_stiffness: float) -> Finding:
 
 
 def pushed(zeta: float) -> Finding:
-    """Displacement of the control point under a step of force, over the static one."""
+    """Displacement of the control point under a step force, over the static one."""
     k, mass, force = 20.0, 1e-3, 1e-4
     omega = float(np.sqrt(k / mass))
     times = np.linspace(0.0, 2.0 * np.pi * PERIODS / omega, LOOKS)
@@ -72,7 +72,7 @@ def pushed(zeta: float) -> Finding:
 
 
 def released(omega: float, zeta: float, t: Floats) -> Floats:
-    """Oscillator let go at 1: through the roots s of s^2 + 2 zeta w s + w^2, or their limit."""
+    """Oscillator released at 1, by the roots s of s^2 + 2 zeta w s + w^2 or their limit."""
     if zeta == 1.0:
         return np.asarray((1.0 + omega * t) * np.exp(-omega * t))
     root = np.sqrt(complex(zeta**2 - 1.0))

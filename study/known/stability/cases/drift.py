@@ -1,10 +1,10 @@
-"""Energy over a million undamped steps: it may beat, but neither leave its band nor drift.
+"""Energy over a million undamped steps: it may oscillate, but must not leave its band or drift.
 
-Symplectic integrators keep an energy of their own near the true one, so that this beats by (omega
-dt)^2. The drift is the slope of the mean over a hundred stretches, whose scatter gives the slope
-its standard error. The first fifth is left out: until the rough start has spread over all modes,
-the distance of the two energies changes. What is left of that, in the nonlinear lattice at nu 0.45,
-is four times as large for twice the step, as a distance is and a drift is not.
+Symplectic integrators conserve a modified energy near the true one, so that the true one oscillates
+by (omega dt)^2. The drift is the slope of the mean over a hundred stretches, whose scatter gives
+the slope its standard error. The first fifth is omitted: until the rough initial state has spread
+over all modes, the distance of the two energies changes. What remains of that, in the nonlinear
+lattice at nu 0.45, grows fourfold for twice the step, as a distance does and a drift does not.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ Floats = NDArray[np.float64]
 
 STRETCHES = 100
 LOOKS = 100
-"""Per stretch: its mean is that of so many energies."""
+"""Energies per stretch, over which the mean is taken."""
 SETTLING = 25
 """Stretches before the hundred."""
 SHARE = 0.1
-"""Length of a step over the limit."""
+"""Time step over the critical one."""
 RESOLVED = 1e-3
-"""Relative drift over the whole run that must not be missed."""
+"""Relative drift over the whole run that must be detected."""
 ERRORS = 4.0
-"""Standard errors that a slope of none may be off by."""
+"""Standard errors by which a slope may differ from zero."""
 FAMILY = Family("energy drift", __name__)
 
 
@@ -62,13 +62,13 @@ def _case(name: str, nu: float | None, *, linear: bool, steps: int) -> Case:
 
 
 def drifting(integrator: str, nu: float | None, *, linear: bool, steps: int) -> Finding:
-    """A block let go from a rough state, in steps of a tenth of the limit."""
+    """A block released from a rough state, in steps of a tenth of the limit."""
     energies = history(integrator, nu, linear=linear, steps=steps)
     return verdict(energies)
 
 
 def history(integrator: str, nu: float | None, *, linear: bool, steps: int) -> Floats:
-    """Energies [J], (STRETCHES, LOOKS), of a motion that strains springs by some tenths."""
+    """Energies [J] (STRETCHES, LOOKS) of a motion that strains springs by some tenths."""
     assembly, material = lattice_of(Make(counts=(2, 2, 2), poisson_ratio=nu))
     dt = SHARE * critical_time_step(assembly, material, integrator)
     net, method = arrays(assembly, material, linear=linear), INTEGRATORS[integrator]
@@ -88,10 +88,10 @@ def history(integrator: str, nu: float | None, *, linear: bool, steps: int) -> F
 
 
 def verdict(energies: Floats) -> Finding:
-    """No drift is predicted; measured is its slope over the run, relative to the mean energy.
+    """The predicted drift is none; measured is its slope over the run, over the mean energy.
 
-    The difference is what the slope has beyond ERRORS of its own: a run that leaves its band, which
-    its first tenth shows, counts in full.
+    The difference is the part of the slope beyond ERRORS of its standard error. A run that leaves
+    its band, which its first tenth defines, counts in full.
     """
     mean = float(energies.mean())
     x = np.linspace(-0.5, 0.5, len(energies))

@@ -49,7 +49,7 @@ def cases() -> Iterator[Case]:
 
 
 def rubs(friction: float) -> Finding:
-    """What the support takes of a sphere that is pressed in and dragged aside is what it gives."""
+    """The reaction of the support equals the force of a sphere that is pressed in and dragged."""
     aside = np.array([1.0, 0.0, 0.0])
 
     def travel(times: Floats) -> Floats:
@@ -62,18 +62,18 @@ def rubs(friction: float) -> Finding:
 
 
 def touches(shape: str) -> Finding:
-    """A tool without a gap that stays where it is takes no force."""
+    """A tool without a gap that stays in place has no force."""
     found = _rest(_tool(shape, 0.0))
     return value(0.0, float(np.abs(found.forces).max()), "N")
 
 
 def reacts(shape: str) -> Finding:
-    """What the support takes is what the tool gives."""
+    """The reaction of the support equals the force of the tool."""
     return _balanced(_tool(shape, 3e-3))
 
 
 def hits(speed: float) -> Finding:
-    """A sphere that goes in by 3 mm and out again is never pulled at."""
+    """A sphere that enters by 3 mm and withdraws is never pulled."""
     duration = 4 * 3e-3 / speed
 
     def travel(times: Floats) -> Floats:
@@ -85,17 +85,17 @@ def hits(speed: float) -> Finding:
     found = run(_block(), (tool,), RayleighDamping(30.0), np.zeros_like, seen, fem.Method(), _quiet)
     force = found.trajectory.tool_force[:, 0] @ DOWN
     pressing = float(-force.min())
-    told = f"{pressing:.3g} N at most, {found.trajectory.status}"
-    return at_most(1e-9 * max(pressing, 1e-9), float(force.max()), told)
+    message = f"{pressing:.3g} N at most, {found.trajectory.status}"
+    return at_most(1e-9 * max(pressing, 1e-9), float(force.max()), message)
 
 
 def through() -> Finding:
-    """A sphere that goes deeper than the block is thick, where no forces are found."""
+    """A sphere pushed deeper than the thickness of the block, where there is no equilibrium."""
     return value(0.0, float(np.abs(_rest(_tool("sphere", 0.04)).displacement).max()))
 
 
 def hangs(times: float) -> Finding:
-    """The far end of a column of nu 0 that hangs: rho g L^2 / 2 E beside rho g L / k."""
+    """End displacement of a hanging column with nu 0: rho g L^2 / 2 E + rho g L / k."""
     tissue, length, g = Tissue(poisson_ratio=0.0), 0.06, 9.81 * times
     body = pressed.column(block_mesh((0.04, 0.04, length), 0.02), tissue, "p2", 1e6, 0.0)
     start = fem.start_of(with_external_loads(body, ExternalLoads(gravity=-g * DOWN)))
@@ -106,7 +106,7 @@ def hangs(times: float) -> Finding:
 
 
 def beside_organ() -> Finding:
-    """A tool a metre away."""
+    """A tool one metre away."""
     away = RigidTool("tool", SHAPES["sphere"], RADIUS, TOP + 1.0, DOWN, lambda t: np.outer(t, DOWN))
     return value(0.0, float(_rest(away).forces.max()))
 
@@ -139,7 +139,7 @@ def _rest(tool: RigidTool) -> AtPeak:
 
 
 def _balanced(tool: RigidTool) -> Finding:
-    """The support's reaction along the tool beside its force."""
+    """The support's reaction along the tool beside the tool's force."""
     body = _block()
     found = at_peak(body, (tool,), _seen(1.0, 9, 8))
     taken = (body.support @ found.displacement).reshape(-1, 3).sum(axis=0)

@@ -1,4 +1,4 @@
-"""Finite elements at rest: Poisson ratios to the end, awkward meshes, supports, tools and sizes."""
+"""Finite elements at rest: limiting Poisson ratios, awkward meshes, supports, tools and sizes."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def column(element: str, nu: float | None) -> Finding:
 
 
 def slivers(height: float) -> Finding:
-    """A column between walls, with a node moved to within a share of an edge of the next one."""
+    """A column between walls with one node moved very close to an edge of its neighbour."""
     mesh = block_mesh(COLUMN, CELL)
     points = mesh.points.copy()
     node = int(np.linalg.norm(points - [0.02, 0.02, 0.02], axis=1).argmin())
@@ -92,7 +92,7 @@ def slivers(height: float) -> Finding:
 
 
 def supported(stiffness: float) -> Finding:
-    """A column of nu 0 with free sides sinks by p / k and shortens by p / E."""
+    """A column with nu 0 and free sides sinks by p / k and shortens by p / E."""
     tissue = Tissue(poisson_ratio=0.0)
     body = pressed.column(block_mesh(COLUMN, CELL), tissue, "p2", stiffness)
     exact = pressed.exact_column(body.points, tissue.youngs_modulus, stiffness)
@@ -100,12 +100,12 @@ def supported(stiffness: float) -> Finding:
 
 
 def scales(size: float) -> Finding:
-    """Displacement over the size, under a force that goes with its square."""
+    """Displacement over the size, under a force proportional to its square."""
     return beside(_indented(0.04), _indented(size))
 
 
 def reacts(radius: float) -> Finding:
-    """What the support takes is what the tool gives."""
+    """The reaction of the support equals the force of the tool."""
     tool = _tool(COLUMN, radius, 0.1)
     body = pressed.on_base(block_mesh(COLUMN, CELL), Tissue(), "p2", pressed.FOUNDATION, tool)
     taken = (body.support @ solve_static(body)).reshape(-1, 3).sum(axis=0)
@@ -113,7 +113,7 @@ def reacts(radius: float) -> Finding:
 
 
 def leaps(method: str) -> Finding:
-    """Steps, each far longer than any period, under a constant load with damping."""
+    """Steps far longer than any period, under a constant load with damping."""
     body = pressed.column(block_mesh(COLUMN, CELL), Tissue(), "p2")
     system = Oscillator(body.mass, body.stiffness, body.load, RayleighDamping(10.0))
     # HHT's first step overshoots by (omega dt)^2, of which each step leaves nine tenths.
@@ -123,12 +123,12 @@ def leaps(method: str) -> Finding:
 
 
 def turned() -> Finding:
-    """Volume of a block a quarter of whose elements were wound the other way."""
+    """Volume of a block with a quarter of its elements inverted in the input."""
     mesh = block_mesh(COLUMN, CELL)
     tetrahedra = mesh.tetrahedra.copy()
     tetrahedra[::4, 2:] = tetrahedra[::4, :1:-1]
-    mended = repair_tetrahedra(_draft(mesh.points, tetrahedra))
-    found = volumes(TetrahedralMesh(mended.points, mended.elements))
+    repaired = repair_tetrahedra(_draft(mesh.points, tetrahedra))
+    found = volumes(TetrahedralMesh(repaired.points, repaired.elements))
     return value(float(np.prod(COLUMN)), float(found.sum()), "m^3")
 
 
@@ -137,12 +137,12 @@ def flat_in_file() -> Finding:
     mesh = block_mesh(COLUMN, CELL)
     points = np.vstack([mesh.points, mesh.points[mesh.tetrahedra[0, :3]].mean(axis=0)])
     extra = np.append(mesh.tetrahedra[0, :3], len(mesh.points))
-    mended = repair_tetrahedra(_draft(points, np.vstack([mesh.tetrahedra, extra])))
-    return value(float(np.prod(COLUMN)), float(len(mended.elements)))
+    repaired = repair_tetrahedra(_draft(points, np.vstack([mesh.tetrahedra, extra])))
+    return value(float(np.prod(COLUMN)), float(len(repaired.elements)))
 
 
 def beside_organ(*, support: bool) -> Finding:
-    """A support far above its level, or a tool a metre away."""
+    """A support far above its level, or a tool one metre away."""
     level = 1.0 if support else 0.0
     tool = _tool(COLUMN, 0.02, 0.1) if support else _tool((3.0, 3.0, 0.06), 0.02, 0.1)
     foundation = Foundation(DOWN, level, 1e-3, pressed.FOUNDATION)
@@ -156,7 +156,7 @@ def _pressed(body: Body, tissue: Tissue) -> Finding:
 
 
 def _indented(size: float) -> Floats:
-    """Displacement over the size of a cube under a tool, on a support that goes with 1 / size."""
+    """Displacement over the size of a cube under a tool, on a support proportional to 1 / size."""
     tool = _tool((size, size, size), 0.4 * size, 100.0 * size**2)
     foundation = Foundation(DOWN, 0.0, 1e-3 * size, 2e4 / size)
     mesh = block_mesh((size, size, size), size / 2.0)
@@ -164,10 +164,10 @@ def _indented(size: float) -> Floats:
 
 
 def _tool(size: tuple[float, float, float], radius: float, force: float) -> ToolPatch:
-    """A tool on the top, off the middle of its facets."""
+    """A tool on the top, away from the middle of its facets."""
     return ToolPatch(np.array([0.4 * size[0], 0.3 * size[1], size[2]]), DOWN, radius, force)
 
 
 def _draft(points: Floats, tetrahedra: NDArray[np.int64]) -> Draft:
-    """A mesh as it is taken from a file in metres."""
+    """A mesh as read from a file in metres."""
     return start_draft(points, tetrahedra, 1e3)

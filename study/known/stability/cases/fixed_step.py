@@ -1,8 +1,8 @@
-"""A step that is fixed: beyond the limit it diverges when and where a dense computation says.
+"""A fixed step beyond the limit diverges at the step and place that a dense computation predicts.
 
-The run looks at every step, and the dense one knows nothing of its kernels: matrices of the lattice
-and the textbook form of each integrator. So the step of divergence must agree exactly, and below
-the limit the motion to rounding.
+The run checks every step, and the dense computation shares none of its kernels: it has matrices of
+the lattice and the textbook form of each integrator. So the step of divergence must agree exactly,
+and below the limit the motion must agree to rounding.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Step = Callable[[Floats, Floats], tuple[Floats, Floats]]
 STEPS = 400
 ROUNDING = 1e-9
 PRESSURES = 1e-5
-"""What the split integrator's own solver leaves of the displacement."""
+"""Error of the displacement due to the iterative solver of the split integrator."""
 FAMILY = Family("fixed step", __name__)
 
 
@@ -55,7 +55,7 @@ def cases() -> Iterator[Case]:
 
 
 def held(integrator: str, times: float) -> Finding:
-    """A linear lattice under an uneven load at so many times its limit."""
+    """A linear lattice under an uneven load at `times` its critical step."""
     assembly, material = _uneven()
     limit = critical_time_step(assembly, material, integrator)
     if integrator == "split-volume":  # the run's limit is the cautious one of springs alone
@@ -77,7 +77,7 @@ def held(integrator: str, times: float) -> Finding:
 
 
 def asked(seconds: float | None = 0.0, hertz: float | None = None) -> Finding:
-    """A run with a step that cannot be taken."""
+    """A run with an inadmissible step."""
     assembly, material = _uneven()
     step = Fixed(float("nan") if seconds is None else seconds) if hertz is None else Rate(hertz)
     found = run(assembly, material, np.ones_like, watch(assembly, 0.1, 11), step)
@@ -85,14 +85,14 @@ def asked(seconds: float | None = 0.0, hertz: float | None = None) -> Finding:
 
 
 def _uneven() -> tuple[Assembly, Material]:
-    """A load without symmetry, which leaves no mode out."""
+    """A load without symmetry, which excites every mode."""
     assembly, material = lattice_of(Make(counts=(2, 2, 2), poisson_ratio=0.45))
     load = np.random.default_rng(1).standard_normal(assembly.load.shape)
     return replace(assembly, load=1e-4 * load), material
 
 
 def _march(step: Step, nodes: int, far: float) -> tuple[int, Floats]:
-    """Steps taken until a component of u is beyond `far`, or STEPS of them, and u (n, 3) there."""
+    """Number of steps until a component of u exceeds `far`, at most STEPS, and u (n, 3) then."""
     u, v = np.zeros((2, 3 * nodes))
     count = 0
     while count < STEPS and np.abs(u).max() < far:
@@ -102,7 +102,7 @@ def _march(step: Step, nodes: int, far: float) -> tuple[int, Floats]:
 
 
 def _dense(name: str, assembly: Assembly, material: Material, dt: float) -> Step:
-    """One step of an undamped integrator by matrices, as books have it."""
+    """One step of an undamped integrator by matrices, in textbook form."""
     inverse = 1.0 / np.repeat(assembly.mass, 3)
     K = inverse[:, None] * stiffness_at_rest(assembly, material).toarray()
     b = inverse * assembly.load.ravel()
@@ -124,7 +124,7 @@ def _verlet(K: Floats, b: Floats, dt: float, u: Floats, v: Floats) -> tuple[Floa
 
 
 def _taylor(K: Floats, b: Floats, dt: float, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Runge-Kutta's four stages on a linear problem are the first four terms of its series."""
+    """The four stages of Runge-Kutta on a linear problem: the first four terms of its series."""
     du, dv = v, b - K @ u
     at, speed, share = u, v, 1.0
     for k in range(1, 5):

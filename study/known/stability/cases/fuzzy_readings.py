@@ -131,9 +131,9 @@ def _odd_widths() -> Iterator[Case]:
 
 def _refusals() -> Iterator[Case]:
     for reading in (0.0, -1.0, 0.4, 151.0, 9500.0, None):
-        told = "finite positive" if reading is None or reading <= 0 else "beyond any liver"
+        message = "finite positive" if reading is None or reading <= 0 else "beyond any liver"
         title = f"estimate from {'nothing finite' if reading is None else f'{reading:g} kPa'}"
-        yield FAMILY.case(title, "estimated", {"reading": reading}, told)
+        yield FAMILY.case(title, "estimated", {"reading": reading}, message)
     yield FAMILY.case(
         "estimate from an unknown aetiology", "estimated", {"reading": 9.5, "name": "flu"}, "flu"
     )

@@ -1,4 +1,4 @@
-"""Tissue that differs from place to place, by factors of up to a million."""
+"""Heterogeneous tissue with contrasts of up to a million."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from study.known.stability.bodies import Make, lattice_of
 from study.known.stability.growth import measured_limit
 from study.known.verification.moduli import oedometric
 from study.organ.block import block_mesh
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
 CELL, SOLVED, AGREEMENT = 0.02, 1e-8, 5e-3
 STEPS = 1000
-"""That show growth just above the limit."""
+"""Number of steps that shows growth just above the limit."""
 CONTRASTS = (1e-3, 1e-1, 1e1, 1e3, 1e6)
 FAMILY = Family("inclusions", __name__, quick=True)
 
 
 def cases() -> Iterator[Case]:
-    """Layers in series in closed form, the step beside a stiff or soft ball, a refusal."""
+    """Layers in series in closed form, the critical step beside a stiff or soft ball, a refusal."""
     for contrast in CONTRASTS:
         for element in ("p1", "p2"):
             settings = {"element": element, "contrast": contrast}
@@ -54,7 +54,7 @@ def cases() -> Iterator[Case]:
 
 @dataclass(frozen=True)
 class Layer:
-    """What lies between two heights [m]."""
+    """The region between two heights [m]."""
 
     lower: float
     upper: float
@@ -65,9 +65,9 @@ class Layer:
         return np.asarray(np.abs(points[..., 2] - middle) - half)
 
     def shortened(self, heights: Floats, around: float, contrast: float) -> Floats:
-        """How far points at heights [m] sink over the base, under `PRESSURE`.
+        """Settlement of points at heights [m] above the base, under `PRESSURE`.
 
-        `around` [Pa]: modulus under uniaxial strain.
+        `around` [Pa]: oedometric modulus of the surrounding tissue.
         """
         within = np.clip(heights, self.lower, self.upper) - self.lower
         return np.asarray(PRESSURE / around * (heights - within + within / contrast))
@@ -76,11 +76,11 @@ class Layer:
 MIDDLE = Layer(CELL, 2.0 * CELL)
 
 
-def varied(contrast: float, tissue: Tissue) -> VariedTissue:
-    """A layer in the middle of the column of so many times the modulus."""
+def varied(contrast: float, tissue: Tissue) -> HeterogeneousTissue:
+    """A layer in the middle of the column, with `contrast` times the modulus."""
     modulus = contrast * tissue.youngs_modulus
     layer = Region(name="layer", distance=MIDDLE, youngs_modulus=modulus)
-    return VariedTissue(
+    return HeterogeneousTissue(
         youngs_modulus=tissue.youngs_modulus,
         poisson_ratio=tissue.poisson_ratio,
         regions=(layer,),
@@ -98,7 +98,7 @@ def layer(element: str, contrast: float) -> Finding:
 
 
 def lattice_layer(contrast: float) -> Finding:
-    """The same of springs, of nu 1/4, on a base that does not move."""
+    """The same for springs with nu 1/4, on a fixed base."""
     make = Make(counts=(2, 2, 3), spacing=CELL)
     body, material = _lattice(make, varied(contrast, Tissue(youngs_modulus=make.youngs_modulus)))
     nodes = body.lattice.nodes
@@ -116,7 +116,7 @@ def lattice_layer(contrast: float) -> Finding:
 
 
 def step(contrast: float, nu: float | None) -> Finding:
-    """The limit at rest, predicted and by the step at which motions begin to grow."""
+    """The critical step at rest, predicted, and measured by the onset of growth."""
     make = Make(poisson_ratio=nu)
     body, material = _lattice(make, _with_ball(make, contrast, nu))
     predicted = critical_time_step(body, material, "velocity-verlet")
@@ -125,22 +125,22 @@ def step(contrast: float, nu: float | None) -> Finding:
 
 
 def too_low() -> Finding:
-    """A ratio at which the volume term would be negative."""
+    """A Poisson ratio for which the volume term would be negative."""
     make = Make(poisson_ratio=0.45)
     _lattice(make, _with_ball(make, 10.0, 0.1))
     return Finding("value")
 
 
-def _with_ball(make: Make, contrast: float, nu: float | None) -> VariedTissue:
+def _with_ball(make: Make, contrast: float, nu: float | None) -> HeterogeneousTissue:
     middle = 0.5 * make.spacing * np.array(make.counts)
     shape = Ellipsoid(middle, np.full(3, 0.9 * make.spacing))
     modulus = contrast * make.youngs_modulus
     ball = Region(name="ball", distance=shape, youngs_modulus=modulus, poisson_ratio=nu)
-    return VariedTissue(youngs_modulus=make.youngs_modulus, regions=(ball,))
+    return HeterogeneousTissue(youngs_modulus=make.youngs_modulus, regions=(ball,))
 
 
-def _lattice(make: Make, tissue: VariedTissue) -> tuple[Assembly, Material]:
-    """A block of whole cells of the tissue; its springs are those of `make` around."""
+def _lattice(make: Make, tissue: HeterogeneousTissue) -> tuple[Assembly, Material]:
+    """A block of whole cells of the tissue; `make` gives the springs of the surrounding tissue."""
     plain, material = lattice_of(make)
     assert isinstance(plain.lattice, CellLattice)  # noqa: S101 - as it is made of whole cells
     body = replace(

@@ -1,7 +1,7 @@
-"""Rigid tools on neo-Hookean elements at the extremes: impacts, tools through the body, contrasts.
+"""Rigid tools on neo-Hookean elements at the extremes: impacts, full penetration, contrasts.
 
-A sphere is pressed into a small block and lifted. What finishes is held to a tool that is never
-pulled, and gets back no more work than it gave. What cannot go on says when.
+A sphere is pressed into a small block and lifted. A motion that finishes must never pull at the
+tool, and must not return more work than it received. One that cannot continue states when.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from study.known.pressed import DOWN
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
 from study.problem.rigid import SPHERE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
-from study.problem.varied import Ellipsoid, Region, VariedTissue
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ TOP = np.array([0.03, 0.03, 0.03])
 RADIUS, DEPTH, DAMPING = 0.015, 4e-3, 30.0
 SAMPLES = 61
 PULLED, GIVEN_BACK = 1e-9, 0.02
-"""Of the largest force, and of the largest work: the steps' own error has a share in it."""
+"""Admissible tension over the largest force, and returned over largest work, with step error."""
 BALL = 0.008
 FAMILY = Family("large strain in contact", __name__)
 
@@ -65,7 +65,7 @@ def pressed(
     nu: float = 0.45,
     times_g: float = 0.0,
 ) -> Finding:
-    """The worse of pull and work given back, over what each may be; the run's ending."""
+    """The worse of tension and returned work, over their limits; how the run ended."""
     ramp = depth / speed
 
     def travel(times: Floats) -> Floats:
@@ -75,7 +75,7 @@ def pressed(
     times = np.linspace(0.0, 3.0 * max(ramp, 1e-3), SAMPLES)
     sphere = RigidTool("tool", SPHERE, RADIUS, TOP, DOWN, travel)
     distance = Ellipsoid(TOP - [0.0, 0.0, 0.014], np.full(3, BALL))
-    tissue = VariedTissue(
+    tissue = HeterogeneousTissue(
         poisson_ratio=nu,
         regions=(Region(name="ball", distance=distance, youngs_modulus=contrast * 9.5e3),),
     )
@@ -99,7 +99,7 @@ def _moved(tissue: Tissue, sphere: RigidTool, times: Floats, times_g: float) -> 
 
 
 def _share(force: Floats, travel: Floats) -> float:
-    """Of pull and of work given back, the one that is more of what it may be."""
+    """The larger of tension and returned work, each over its limit."""
     kept = np.isfinite(force).all(axis=1)
     force, travel = force[kept], travel[kept]
     work = np.cumsum((0.5 * (force[1:] + force[:-1]) * np.diff(travel, axis=0)).sum(axis=1))

@@ -1,8 +1,8 @@
-"""Large strain at rest: a pressed column by its closed form, to where the law itself gives way.
+"""Large strain at rest: a compressed column in closed form, up to the instability of the law.
 
-At Poisson ratio 0 nothing moves sideways, and a column between smooth walls has the nominal stress
-P of its stretch alone: (E / 2) (L - 1 / L) neo-Hookean, (E / 2) (L^2 - 1) L of St. Venant and
-Kirchhoff, which falls beyond E / (3 sqrt 3).
+At Poisson ratio 0 there is no lateral motion, and the nominal stress P of a column between smooth
+walls depends on its stretch L alone: (E / 2) (L - 1 / L) for the neo-Hookean law, (E / 2) (L^2 - 1)
+L for St. Venant and Kirchhoff's, which has its maximum at E / (3 sqrt 3).
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from study.problem.tissue import Tissue
 
 EDGE, CELL = 0.04, 0.02
 FOUNDATION = 1e9
-"""[Pa/m], so stiff that the base hardly sinks."""
+"""[Pa/m], so stiff that the base hardly moves."""
 TISSUE = Tissue(youngs_modulus=5e3, poisson_ratio=0.0)
 GIVES_WAY = 1.0 / (3.0 * np.sqrt(3.0))
-"""Largest pressure over E that St. Venant and Kirchhoff's law withstands."""
+"""Largest pressure over E that St. Venant and Kirchhoff's law can carry."""
 SOLVED = 1e-5
-"""TOLERANCE times what a stiffness that has softened by the stretch makes of it."""
+"""Error of the displacement: TOLERANCE, amplified by the softened tangent stiffness."""
 FAMILY = Family("large strain", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Cases of a column by pressure over E, negative where it is pulled; loads that cannot be."""
+    """Cases of a column by pressure over E, negative for tension, and of inadmissible loads."""
     for pressure in (1e-6, 0.1, 0.5, 2.0, 10.0, -0.5, -2.0):
         settings = {"law": "neo-hookean", "pressure": pressure}
         yield FAMILY.case(
@@ -75,21 +75,21 @@ def cases() -> Iterator[Case]:
 
 
 def stretch(law: str, pressure: float) -> Finding:
-    """Stretch of the column under a pressure over E, or at the last stable rest before it."""
+    """Stretch of the column under a pressure over E, or at the last stable state before it."""
     body = _column(pressure)
     path = solve(body, TISSUE, law)
-    told = path.failure and f"{path.failure}; compared at {path.reached:g} of it"
+    message = path.failure and f"{path.failure}; compared at {path.reached:g} of it"
     if not path.converged:
         path = solve(body, TISSUE, law, (path.reached,))
     # Height of the top over that of the base, both by their mean.
     u = path.states[-1].displacement.reshape(-1, 3)
     top, base = (np.abs(body.points[:, 2] - z) < 1e-9 for z in (EDGE, 0.0))
     found = 1.0 + (u[top, 2].mean() - u[base, 2].mean()) / EDGE
-    return value(_exact(law, pressure * path.reached), float(found), told)
+    return value(_exact(law, pressure * path.reached), float(found), message)
 
 
 def gives_way(pressure: float) -> Finding:
-    """Pressure over E at the last stable rest, on the way to one that cannot be."""
+    """Pressure over E at the last stable state, on the path to an inadmissible one."""
     path = solve(_column(pressure), TISSUE, "st-venant-kirchhoff")
     if path.converged:
         return Finding("error", message="a rest beyond the largest pressure")
@@ -97,7 +97,7 @@ def gives_way(pressure: float) -> Finding:
 
 
 def balance(force: float) -> Finding:
-    """Unbalanced force over the load, at the last rest under a small tool."""
+    """Residual force over the load, at the last state under a small tool."""
     tool = ToolPatch(np.array([0.5 * EDGE, 0.5 * EDGE, EDGE]), pressed.DOWN, 0.02, force)
     tissue = Tissue(youngs_modulus=5e3, poisson_ratio=0.45)
     body = pressed.on_base(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, "p2", 1e7, tool)
@@ -108,8 +108,8 @@ def balance(force: float) -> Finding:
     last = path.states[-1]
     inner = solid(body, tissue).internal_force(last.displacement)
     off = np.linalg.norm(inner - last.load_factor * body.load) / np.linalg.norm(body.load)
-    told = f"at {last.load_factor:g} of the load, strain {last.largest_strain:.2g}; {failure}"
-    return value(0.0, float(off) / last.load_factor, told)
+    message = f"at {last.load_factor:g} of the load, strain {last.largest_strain:.2g}; {failure}"
+    return value(0.0, float(off) / last.load_factor, message)
 
 
 def asked(
@@ -118,7 +118,7 @@ def asked(
     element: str = "p2",
     nu: float = 0.0,
 ) -> Finding:
-    """A path of large strain that cannot be begun."""
+    """A path of large strain that cannot be started."""
     tissue = replace(TISSUE, poisson_ratio=nu)
     given = tuple(float("nan") if factor is None else factor for factor in factors)
     path = solve(_column(0.1, element, tissue), tissue, law, given)
@@ -126,7 +126,7 @@ def asked(
 
 
 def _column(pressure: float, element: str = "p2", tissue: Tissue = TISSUE) -> Body:
-    """A cube between smooth walls, by stiff springs that its exact solution leaves alone."""
+    """A cube between smooth walls, by stiff springs that its exact solution does not strain."""
     load = pressure * TISSUE.youngs_modulus
     body = pressed.column(block_mesh((EDGE, EDGE, EDGE), CELL), tissue, element, FOUNDATION, load)
     held = np.where(pressed.walls(body.points), TISSUE.youngs_modulus * EDGE, 0.0)

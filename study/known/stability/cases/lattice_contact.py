@@ -1,8 +1,8 @@
 """Rigid tools and gravity at the extremes: impacts, tools through the body, friction, many times g.
 
-A small block is pressed by a moved tool. What finishes is held to the overlap of body and tool,
-which is zero for exact impulses, and to the work of the tool, of which the body can give back no
-more than it was given.
+A small block is pressed by a moved tool. A motion that finishes is checked for the overlap of body
+and tool, which is zero for exact impulses, and for the work of the tool: the body must not return
+more than it received.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from study.scene.file import read_scene
 from study.scene.problem import problem_of
 
 OVERLAP = 1e-2
-"""Of the tool's travel, that body and tool may overlap by."""
+"""Admissible overlap of body and tool, over the tool's travel."""
 GIVEN_BACK = 1e-2
-"""Of the tool's largest work, that a body may give back beyond it."""
+"""Admissible work returned beyond the work received, over the tool's largest work."""
 BEYOND = 0.0
 LOST_FROM = 10.0
-"""Times g under which springs without a volume term fall through their own support."""
+"""Multiple of g under which springs without a volume term collapse."""
 FAMILY = Family("lattices in contact", __name__)
 BLOCK = (
     'organ.size=["60 mm", "60 mm", "40 mm"]',
@@ -83,7 +83,7 @@ def _case(name: str, overrides: list[str], *, lost: bool = False, quick: bool = 
 
 
 def pressed(overrides: list[str]) -> Finding:
-    """The worse of overlap and energy given back, over what each may be; the run's ending."""
+    """The worse of overlap and returned energy, over their limits; how the run ended."""
     scene = read_scene("block", (*BLOCK, *overrides))
     problem = problem_of(scene)
     prepared = model(scene, "tissue").prepare(problem)

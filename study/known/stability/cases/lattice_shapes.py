@@ -1,8 +1,8 @@
 """Lattices of awkward shapes: one cell, sheets, rods, slivers, necks, hinges, tiny and huge organs.
 
-Each is held to closed forms that do not depend on the shape: an affine motion stores the energy of
-the material in the volume that is there; the rest of one solver is that of another; the critical
-step is the one at which motions grow; an organ scaled in size moves as the one it is scaled from.
+Each is compared with closed forms that do not depend on the shape: an affine motion stores the
+strain energy of the volume that exists; two solvers find the same rest; the critical step is the
+one at which motions grow; a scaled organ has a scaled motion.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ SHAPES: dict[str, list[Box]] = {
     "sliver cells filled to a sixth": [[[0, 0, 0], [3.1, 3, 3.1]]],
     "two cubes joined by one cell": [CUBE, [[3, 1, 1], [4, 2, 2]], [[4, 0, 0], [7, 3, 3]]],
 }
-"""Boxes in units of the spacing; a cell counts as filled by the share of 6^3 points in it."""
+"""Boxes in units of the spacing; the filled share of a cell is found from 6^3 points."""
 PARTED: dict[str, tuple[list[Box], float]] = {
     "joined by an edge": ([CUBE, [[3, 3, 0], [5, 5, 3]]], 12 / 39),
     "joined by a corner": ([CUBE, [[3, 3, 3], [5, 5, 5]]], 8 / 35),
     "apart": ([CUBE, [[4, 0, 0], [6, 3, 3]]], 18 / 45),
     "slivers below a twentieth": ([[[0, 0, 0], [3.1, 3.1, 3]]], 3 / 36 / (27 + 3 + 3 / 36)),
 }
-"""Shapes of which a share is left out: what hangs on less than a face, or hardly fills a cell."""
+"""Shapes of which parts are omitted: attached by less than a face, or nearly empty cells."""
 ROUNDING, SOLVED, MEASURED = 1e-12, 1e-6, 5e-3
 SIZES = (1e-3, 1.0, 10.0)
 FAMILY = Family("lattice shapes", __name__)
 
 
 def cases() -> Iterator[Case]:
-    """Cases of every shape by every closed form; of parts left out; of scaled organs."""
+    """Cases of every shape by every closed form, of omitted parts, and of scaled organs."""
     for shape in SHAPES:
         for nu in (0.25, 0.45, 0.4999):
             title = f"energy of an affine motion, nu {nu:g}: {shape}"
@@ -74,7 +74,7 @@ def cases() -> Iterator[Case]:
 
 
 def stores(shape: str, nu: float) -> Finding:
-    """V (lambda tr(e)^2 / 2 + mu e : e) for an affine motion of strain e."""
+    """Strain energy V (lambda tr(e)^2 / 2 + mu e : e) of an affine motion of strain e."""
     make = Make(poisson_ratio=nu, held=False)
     assembly, material = _shaped(shape, make)
     net = arrays(assembly, material, linear=True)
@@ -89,7 +89,7 @@ def stores(shape: str, nu: float) -> Finding:
 
 
 def rests(shape: str) -> Finding:
-    """Rest of a shape under its own weight by conjugate gradients beside that by relaxation."""
+    """Rest of a shape under its own weight, by conjugate gradients and by relaxation."""
     assembly, material = _shaped(shape, Make(poisson_ratio=0.45, gravity=0.5))
     found, ended = relax(material.law, arrays(assembly, material, linear=True), tolerance=1e-9)
     if ended.status != "at rest":
@@ -105,19 +105,19 @@ def steps(shape: str) -> Finding:
 
 
 def leaves_out(shape: str) -> Finding:
-    """The share of the body's volume that has no lattice."""
+    """The share of the body's volume without a lattice."""
     boxes, share = PARTED[shape]
     assembly, _ = lattice_of(Make(), Boxes(Make().spacing * np.array(boxes)))
     return value(share, assembly.lattice.dropped)  # type: ignore[attr-defined] # a cubic lattice has it
 
 
 def scales(size: float) -> Finding:
-    """Displacements over an organ's size, at times and under loads that similarity asks for."""
+    """Displacements over the organ's size, with times and loads scaled by similarity."""
     return beside(_moved(0.06), _moved(size))
 
 
 def _moved(size: float) -> Floats:
-    """Displacement over the size, after a motion under a weight that goes with 1 / size."""
+    """Displacement over the size, after a motion under a weight proportional to 1 / size."""
     make = Make(
         spacing=size / 3.0,
         poisson_ratio=0.45,

@@ -1,8 +1,9 @@
-"""Steps far beyond the explicit limit: to rest, with all energy, or bounded.
+"""Steps far beyond the explicit limit: convergence to rest, energy conservation, or boundedness.
 
-Implicit Euler ends at the static solution, of the linear lattice by conjugate gradients and of the
-nonlinear one by relaxation. Implicit midpoint keeps the energy. Position-based dynamics becomes
-softer with the step, never stiffer: each part gives back only 1 / (1 + (omega dt)^2) of its force.
+Implicit Euler ends at the static solution, found for the linear lattice by conjugate gradients and
+for the nonlinear one by relaxation. Implicit midpoint conserves energy. Position-based dynamics
+becomes softer with the step, never stiffer: each part returns only 1 / (1 + (omega dt)^2) of its
+force.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ Floats = NDArray[np.float64]
 
 TIMES = (10.0, 100.0, 1e3, 1e4)
 SOLVED = 1e-6
-"""What Newton's method and relaxation leave of the displacement."""
+"""Error of the displacement by Newton's method and by relaxation."""
 SHORT = 1e-3
-"""(omega dt)^2 at 0.02 of the limit: the share of a force that a short step keeps back."""
+"""(omega dt)^2 at 0.02 of the limit: the share of a force that a short step does not return."""
 FAMILY = Family("long steps", __name__)
 
 
@@ -59,7 +60,7 @@ def cases() -> Iterator[Case]:
 
 
 def to_rest(times: float, *, linear: bool) -> Finding:
-    """Implicit Euler under a constant load, until nothing moves."""
+    """Implicit Euler under a constant load, until the motion has stopped."""
     assembly, material = _loaded()
     u, _ = _march("implicit-euler", assembly, material, times, 600, linear=linear)
     if linear:
@@ -70,14 +71,14 @@ def to_rest(times: float, *, linear: bool) -> Finding:
 
 
 def to_rest_by_position(times: float) -> Finding:
-    """Position-based dynamics in short steps, damped until nothing moves."""
+    """Position-based dynamics in short steps, damped until the motion has stopped."""
     assembly, material = _loaded(NodalDamping(60.0))
     u, _ = _march("xpbd", assembly, material, times, 60_000, linear=True)
     return beside(static_displacement(assembly, material), u)
 
 
 def kept(times: float) -> Finding:
-    """Energy of implicit midpoint under a constant load from rest, beside the work of the load."""
+    """Energy of implicit midpoint under a constant load from rest, over the work of the load."""
     assembly, material = _loaded()
     net = arrays(assembly, material, linear=True)
     u, v = _march("implicit-midpoint", assembly, material, times, 200, linear=True)
@@ -87,9 +88,9 @@ def kept(times: float) -> Finding:
 
 
 def softened(times: float, *, linear: bool) -> Finding:
-    """Work of the load on the rest of position-based dynamics: more than the static, but bounded.
+    """Work of the load up to the rest of position-based dynamics: bounded, above the static one.
 
-    The bound is the static work over the least share of a force that is given back.
+    The bound is the static work over the smallest share of a force that is returned.
     """
     assembly, material = _loaded(NodalDamping(20.0))
     net = arrays(assembly, material, linear=linear)
@@ -114,7 +115,7 @@ def fastest_part(net: Network, k: float) -> float:
 
 
 def called_lost(times: float) -> Finding:
-    """A run that moves its body by more than its size is called diverged, not a result."""
+    """A run whose body moves by more than its size counts as diverged."""
     assembly, material = _loaded()
     dt = times * critical_time_step(assembly, material)
     seen = watch(assembly, 100 * dt, 101)

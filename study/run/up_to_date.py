@@ -1,6 +1,6 @@
-"""Whether a results folder holds what a run of a scene would give, so that there is none to make.
+"""Whether a results folder already holds what a run of a scene would write.
 
-Of each run the store keeps the checksums of what it wrote, under the key of the whole scene, the
+The store keeps the checksums of the files that each run wrote, under a key of the whole scene, the
 files that it names, and the whole program.
 """
 
@@ -22,12 +22,12 @@ from study.sweep.canonical import digest
 from study.sweep.program import everything
 
 REPORTS = {"report": manifest.REPORT, "page": manifest.PAGE}
-"""What is made of the results, by what a note calls it."""
+"""The files made of the results, by their names in the store."""
 
 
 @dataclass(frozen=True)
-class Left:
-    """What a run left in a folder: when [UTC], in short, and which reports of the run it has."""
+class UpToDateRun:
+    """An earlier run that a folder holds: its date [UTC], its results, and the reports it has."""
 
     at: str
     results: Results
@@ -36,7 +36,7 @@ class Left:
 
 
 def run_key(scene: Scene, folder: Path, *, fields: bool, mesh: bool) -> str:
-    """SHA-256 of all that the files of a run into a folder depend on, and of where that is.
+    """SHA-256 of everything that the files of a run depend on, and of the folder's path.
 
     ValueError for a file of the scene that is missing.
     """
@@ -45,8 +45,8 @@ def run_key(scene: Scene, folder: Path, *, fields: bool, mesh: bool) -> str:
     return digest(["run", *given, everything("reports"), machine()])
 
 
-def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
-    """What the folder holds of the run of a key, None if it is not what that wrote."""
+def up_to_date_run(store: Store, key: str, folder: Path, scene: Scene) -> UpToDateRun | None:
+    """The run with this key that the folder holds, None if its files are not those written."""
     found = store.get(key)
     if found is None or found.value["sums"] != _sha256(folder / manifest.NAME):
         return None
@@ -58,11 +58,11 @@ def left_by(store: Store, key: str, folder: Path, scene: Scene) -> Left | None:
         (digest := _sha256(folder / name)) is not None and found.value.get(kind) == digest
         for kind, name in REPORTS.items()
     )
-    return Left(at, results, report, page)
+    return UpToDateRun(at, results, report, page)
 
 
-def note(store: Store, key: str, folder: Path) -> None:
-    """Note what a run has left in a folder."""
+def record_run(store: Store, key: str, folder: Path) -> None:
+    """Record the checksums of what a run has written into a folder."""
     reports = {kind: _sha256(folder / name) for kind, name in REPORTS.items()}
     store.put(key, {"sums": _sha256(folder / manifest.NAME), **reports}, {}, wall=0.0)
 

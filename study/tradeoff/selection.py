@@ -1,4 +1,4 @@
-"""A configuration that was chosen, in words and as a scene to run."""
+"""A selected configuration, described in words and as a scene to run."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import replace
 from study.models.lattice import LatticeModel
 from study.models.tissue import FRACTION
 from study.scene import Scene
-from study.tradeoff.lineup import Configuration, is_moved
+from study.tradeoff.contenders import Configuration, is_moved
 
 DOUBLE = "double"
 
 
-def in_words(one: Configuration) -> str:
-    """What it is, for a person."""
+def described(one: Configuration) -> str:
+    """The configuration in words."""
     given = one.settings
     if one.contender == "superposition":
         return f"superposition of {given['count']} Ritz vectors of finite elements"
@@ -30,7 +30,7 @@ def in_words(one: Configuration) -> str:
 
 
 def scene_with(scene: Scene, one: Configuration) -> Scene:
-    """The scene with the reference and this; elements are those of the scene's reference."""
+    """The scene with the reference and this configuration; elements are those of the reference."""
     given = dict(one.settings)
     if one.contender == "superposition":
         own = replace(scene.superposition, vectors="ritz", count=int(given["count"]))
@@ -45,7 +45,7 @@ def scene_with(scene: Scene, one: Configuration) -> Scene:
 
 
 def _corrected(scene: Scene, one: Configuration) -> Scene:
-    """The scene with its coarse lattice, of one size or graded."""
+    """The scene with the configuration's coarse lattice, uniform or graded."""
     lattice = replace(scene.lattice, step_fraction=FRACTION, time_step=None, step_rate=None)
     spacing = float(one.settings["spacing"])
     if "radius" not in one.settings:
@@ -60,6 +60,6 @@ def _corrected(scene: Scene, one: Configuration) -> Scene:
 
 
 def _naming(scene: Scene, name: str) -> Scene:
-    """With the model that was measured, and the reference where it was compared with that."""
+    """The scene naming the measured model, and the reference where it was compared with it."""
     reference = ("fem",) if not is_moved(scene) else ()
     return replace(scene, models=tuple(dict.fromkeys((*reference, *scene.models, name))))

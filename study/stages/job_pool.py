@@ -1,8 +1,7 @@
-"""Jobs that do not depend on each other, one after another or in processes side by side.
+"""Independent jobs, run one after another or in a pool of forked processes.
 
-A process is forked, so that it shares what was built before with the one that runs them all, and
-takes one job after another. It ends when the jobs do, whatever ends these: it is told to, and if
-nobody is left to tell it, it sees that.
+A forked process shares what the parent has built so far, and runs one job after another. It ends
+with the pool in every case: the parent asks it to, and if the parent dies, it notices.
 """
 
 from __future__ import annotations
@@ -26,56 +25,56 @@ from typing import Any, NamedTuple, NoReturn, Protocol
 from study import signals
 from study.progress import Advance, Lines, Progress, Silent
 
-PATIENCE = 5.0
-"""Seconds that a process has to end before it is killed."""
-PAUSE = 0.1
-"""Seconds between two shares that a process tells of a stage."""
+EXIT_TIMEOUT = 5.0
+"""Seconds that a process has to exit before it is killed."""
+PROGRESS_INTERVAL = 0.1
+"""Least time [s] between two progress messages of a stage."""
 
 
 class Job(NamedTuple):
-    """Work by a name that is unique; it tells its progress, and its result goes through a pipe."""
+    """A function with a unique name; it reports its progress, and its result must be picklable."""
 
     name: str
     work: Callable[[Progress], Any]
 
 
-class Lanes(Protocol):
-    """Takes jobs as they come, and gives their results once all are there."""
+class JobPool(Protocol):
+    """Accepts jobs at any time, and returns their results once all have ended."""
 
     def start(self, job: Job) -> None:
-        """Take a job; whether it runs at once is not said."""
+        """Submit a job; it may run at once or later."""
 
     def results(self) -> dict[str, Any]:
-        """Results of all jobs by name. Whatever a job raises is raised here."""
+        """Results of all jobs by name. An exception of a job is raised here."""
 
 
 def available() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def can_fork() -> bool:
-    """Whether processes can share what was built; macOS has libraries that do not bear it."""
+    """Whether processes can be forked; some libraries on macOS do not survive it."""
     return "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
 
 
 @contextmanager
-def lanes(count: int, progress: Progress) -> Iterator[Lanes]:
-    """So many jobs side by side, or one after another; no process is left when the block ends."""
+def job_pool(count: int, progress: Progress) -> Iterator[JobPool]:
+    """A pool of `count` processes, or of this one alone; no process is left when the block ends."""
     if count < 2 or not can_fork():
-        yield _OneLane(progress)
+        yield _SerialPool(progress)
         return
-    found = _Processes(count, progress)
+    found = _ProcessPool(count, progress)
     try:
         yield found
     finally:
         found.stop()
 
 
-class _OneLane:
-    """Jobs in this process, in their order, when results are asked for."""
+class _SerialPool:
+    """Runs jobs in this process, in order, when the results are requested."""
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress
@@ -92,7 +91,7 @@ class _OneLane:
 
 
 class _Worker:
-    """A process with the jobs that there were when it was forked, and the one it is at."""
+    """A process with the jobs that existed when it was forked, and its current job's number."""
 
     def __init__(self, jobs: list[Job], progress: Progress) -> None:
         context = multiprocessing.get_context("fork")
@@ -102,7 +101,7 @@ class _Worker:
         self.process: BaseProcess = context.Process(
             target=_serve, args=(theirs, list(jobs), progress), daemon=True
         )
-        with _undisturbed():
+        with _signals_blocked():
             self.process.start()
         theirs.close()
 
@@ -111,8 +110,8 @@ class _Worker:
         self.pipe.send(number)
 
 
-class _Processes:
-    """Jobs in processes of their own; this one only waits."""
+class _ProcessPool:
+    """Runs jobs in child processes, while this one waits."""
 
     def __init__(self, count: int, progress: Progress) -> None:
         self.count, self.progress = count, progress
@@ -124,18 +123,18 @@ class _Processes:
     def start(self, job: Job) -> None:
         self.jobs.append(job)
         self.waiting.append(len(self.jobs) - 1)
-        self._feed()
+        self._dispatch()
 
     def results(self) -> dict[str, Any]:
         while len(self.found) < len(self.jobs):
-            self._feed()
+            self._dispatch()
             busy = {worker.pipe: worker for worker in self.workers if worker.at >= 0}
             for pipe in wait(list(busy)):
-                self._hear(busy[pipe])  # type: ignore[index] # one of those that were given
+                self._receive(busy[pipe])  # type: ignore[index] # one of the pipes given
         return {job.name: self.found[job.name] for job in self.jobs}
 
-    def _feed(self) -> None:
-        """Give jobs to idle processes, and fork such as know them."""
+    def _dispatch(self) -> None:
+        """Give jobs to idle processes; fork a new process for a job that none of them knows."""
         while self.waiting:
             idle = [worker for worker in self.workers if worker.at < 0]
             fit = next((worker for worker in idle if worker.known > self.waiting[0]), None)
@@ -149,17 +148,17 @@ class _Processes:
                 self.workers.append(fit)
             fit.give(self.waiting.popleft())
 
-    def _hear(self, worker: _Worker) -> None:
+    def _receive(self, worker: _Worker) -> None:
         try:
             kind, *content = worker.pipe.recv()
         except (EOFError, ConnectionError):
-            raise _death(self.jobs[worker.at].name, worker.process) from None
+            raise _death_of(self.jobs[worker.at].name, worker.process) from None
         match kind:
             case "done":
                 self.found[self.jobs[worker.at].name] = content[0]
                 worker.at = -1
             case "failed":
-                raise content[0] from _Elsewhere(content[1])
+                raise content[0] from _RemoteTraceback(content[1])
             case "begin":
                 stage = self.progress.stage(content[1])
                 worker.stages[content[0]] = stage, stage.__enter__()
@@ -169,7 +168,7 @@ class _Processes:
                 worker.stages.pop(content[0])[0].__exit__(None, None, None)
 
     def stop(self) -> None:
-        """End all processes, at once those that are amid a job."""
+        """End all processes, those in the middle of a job at once."""
         for worker in self.workers:
             if worker.at >= 0:
                 worker.process.terminate()
@@ -178,29 +177,28 @@ class _Processes:
         self.workers.clear()
 
 
-class _Elsewhere(Exception):  # noqa: N818 - the cause of one, and only shown
-    """Where something was raised in another process."""
+class _RemoteTraceback(Exception):  # noqa: N818 - the cause of one, and only shown
+    """The traceback of an exception that was raised in another process."""
 
     def __str__(self) -> str:
         return f"\n{self.args[0]}"
 
 
 def _end(worker: _Worker) -> None:
-    """Let an idle process leave, or end it."""
-    with suppress(OSError):  # it may have ended
-        worker.pipe.send(
-            None
-        )  # others that were forked later have the pipe, so closing says nothing
+    """Ask an idle process to exit, and kill it if it does not."""
+    with suppress(OSError):  # the process may have ended
+        # Processes forked later inherit the pipe, so closing it would not be noticed.
+        worker.pipe.send(None)
     worker.pipe.close()
-    worker.process.join(PATIENCE)
+    worker.process.join(EXIT_TIMEOUT)
     if worker.process.is_alive():
         worker.process.kill()
         worker.process.join()
 
 
-def _death(job: str, process: BaseProcess) -> Exception:
-    """What ended a process that did not say it itself."""
-    process.join(PATIENCE)
+def _death_of(job: str, process: BaseProcess) -> Exception:
+    """The exception for a process that ended without reporting anything."""
+    process.join(EXIT_TIMEOUT)
     code = process.exitcode or 0
     if code == -signal.SIGKILL:
         return MemoryError(f"the process of {job} was killed")
@@ -209,11 +207,11 @@ def _death(job: str, process: BaseProcess) -> Exception:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Signals wait while a process is forked, which else might answer them in this one's name."""
+def _signals_blocked() -> Iterator[None]:
+    """Block signals while forking, so that the child does not handle them for the parent."""
     with warnings.catch_warnings():
-        # Threads that others have started are not in the fork, which needs none of their locks: it
-        # computes, and tells of it through its pipe.
+        # Python warns that a fork of a process with threads may deadlock on their locks. The child
+        # needs none of them: it computes, and communicates through its pipe.
         warnings.simplefilter("ignore", DeprecationWarning)
         before = signal.pthread_sigmask(signal.SIG_BLOCK, signals.numbers())
         try:
@@ -226,28 +224,28 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, jobs: list[Job], progress: Progress) -> NoReturn:
-    """Do jobs as their numbers come, until the pipe is closed. Nothing of the parent is unwound."""
+    """Run jobs by their numbers until the pipe is closed, without unwinding the parent's stack."""
     try:
-        _heed_the_parent()
+        _follow_parent()
         with ExitStack() as stack:
             stack.callback(pipe.close)
             while (number := pipe.recv()) is not None:
-                pipe.send(_done(jobs[number], _own(progress, pipe)))
-    finally:  # whatever it was: the parent has left, or cannot be told
+                pipe.send(_done(jobs[number], _child_progress(progress, pipe)))
+    finally:  # on any exception the parent is gone or out of reach
         os._exit(0)
 
 
-def _heed_the_parent() -> None:
-    """Leave what is typed at the terminal to the parent, and end with it."""
+def _follow_parent() -> None:
+    """Ignore keyboard signals, which the parent handles, and exit when the parent does."""
     for number in signals.numbers():
-        # One that waits to be answered would be lost if it were ignored, be it for a moment.
+        # A pending SIGTERM would be lost if it were ignored, even for a moment.
         ends = number == signal.SIGTERM
         signal.signal(number, signal.SIG_DFL if ends else signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, signals.numbers())
-    Thread(target=_end_with_the_parent, daemon=True).start()
+    Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def _end_with_the_parent() -> None:
+def _exit_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])
@@ -255,32 +253,32 @@ def _end_with_the_parent() -> None:
 
 
 def _done(job: Job, progress: Progress) -> tuple[Any, ...]:
-    """What the parent is told of a job in the end."""
+    """The last message on a job to the parent."""
     try:
         return "done", job.work(progress)
     except BaseException as error:  # the parent raises it
-        return "failed", _portable(error), traceback.format_exc()
+        return "failed", _picklable(error), traceback.format_exc()
 
 
-def _portable(error: BaseException) -> BaseException:
-    """An exception as it can be sent, the one below it where that is the reason."""
+def _picklable(error: BaseException) -> BaseException:
+    """The exception in a form that can be sent; its cause where that is the actual reason."""
     below = None if error.__suppress_context__ else error.__context__
     if isinstance(error, ValueError) and isinstance(below, OSError):
         return below
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - one's own
-    except Exception:  # whatever its class forgot
+    except Exception:  # a class that does not support pickling
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error
 
 
-def _own(progress: Progress, pipe: Connection) -> Progress:
-    """Lines are told here, where their time is taken; bars are drawn by the parent."""
-    return progress if isinstance(progress, Lines | Silent) else _Sent(pipe)
+def _child_progress(progress: Progress, pipe: Connection) -> Progress:
+    """Lines are printed by the child, where the time is taken; bars are drawn by the parent."""
+    return progress if isinstance(progress, Lines | Silent) else _SentProgress(pipe)
 
 
-class _Sent:
-    """Tells the stages of a process to its parent."""
+class _SentProgress:
+    """Sends the progress of a process to its parent."""
 
     def __init__(self, pipe: Connection) -> None:
         self.pipe, self.count = pipe, 0
@@ -292,7 +290,7 @@ class _Sent:
 
         def advance(share: float) -> None:
             nonlocal told
-            if time.monotonic() - told > PAUSE:
+            if time.monotonic() - told > PROGRESS_INTERVAL:
                 told = time.monotonic()
                 self.pipe.send(("share", number, share))
 

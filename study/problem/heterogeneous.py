@@ -1,11 +1,11 @@
-"""Tissue that differs from place to place, and what cells of any mesh are made of.
+"""Heterogeneous tissue, and the composition of the cells of any mesh.
 
-A model of an organ has one surrounding tissue, whose stiffness may be an estimate, and regions of
-their own stiffness in it. What a cell is made of is told by shares of its volume, so that no volume
-of a region is lost or gained but by the sampling of the cells that its surface cuts. A cell that is
-cut has the mean of the compliance over it, of volume and of shape (Reuss's mean): tissue and region
-lie behind each other across the cut. Beside the mean of the stiffness, which makes a stiff region
-larger by half a cell, this leaves a fifth of the error of a ball; soft regions gain nothing by it.
+A model of an organ has one surrounding tissue, whose stiffness may be an estimate, and regions with
+a stiffness of their own. The composition of a cell is given by volume fractions, so that no volume
+of a region is lost or gained beyond the sampling error of cells that its surface cuts. A cut cell
+has the mean compliance of its parts, bulk and shear (Reuss's mean): tissue and region are in series
+across the cut. Compared with the mean stiffness (Voigt's), which enlarges a stiff region by half a
+cell, this leaves a fifth of the error of a ball; soft regions gain nothing by it.
 """
 
 from __future__ import annotations
@@ -25,24 +25,23 @@ from study.problem.tissue import Tissue
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 Points = Callable[[slice], Floats]
-"""Points [m] (c, k, 3), equally many in each of a range of cells, that share the cell equally."""
+"""Points [m] (c, k, 3) of a range of cells, equally many in each, with equal weights."""
 
 CHUNK = 2048
-"""Cells that are sampled at once: 512 points of each take 25 MB."""
+"""Number of cells that are sampled at once: 512 points of each take 25 MB."""
 SAMPLES = 512
-"""Points in a tetrahedron: a cut through one is told to 1 % of its volume in the mean."""
+"""Points per tetrahedron: the volume of a cut is found to 1 % of the cell on average."""
 OUTLINE = 200
-"""Points of a region's surface that pictures have."""
+"""Points on a region's surface that figures have."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Region:
     """A part of the organ with a Young's modulus [Pa] of its own.
 
-    `distance`: at points [m] (..., 3) a function of the shape (...) that is negative inside and
-    nowhere larger in size than the distance from the surface. Poisson ratio and density are those
-    of the tissue around it unless they are given. `outline` [m] (OUTLINE, 3): points of its
-    surface, for pictures.
+    `distance`: function of points [m] (..., 3) that is negative inside, and whose magnitude never
+    exceeds the distance from the surface. Poisson ratio and density are those of the surrounding
+    tissue unless given. `outline` [m] (OUTLINE, 3): points of its surface, for figures.
     """
 
     name: str
@@ -53,16 +52,16 @@ class Region:
     outline: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def ratio(self, around: float) -> float:
-        """Its Poisson ratio in tissue of another one."""
+        """Its Poisson ratio within tissue of the given one."""
         return around if self.poisson_ratio is None else self.poisson_ratio
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VariedTissue(Tissue):
-    """Tissue round regions; where several meet, the last of them counts.
+class HeterogeneousTissue(Tissue):
+    """Tissue with regions; where several overlap, the last of them counts.
 
-    `mapped`: Young's modulus [Pa] (...) at points (..., 3) outside all regions, NaN where nothing
-    is known and the tissue is that around.
+    `mapped`: Young's modulus [Pa] (...) at points (..., 3) outside all regions, NaN where the map
+    has no value and the surrounding tissue applies.
     """
 
     regions: tuple[Region, ...] = ()
@@ -83,26 +82,26 @@ class Moduli(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """What cells are made of: `share` (c, regions) of each region of a tissue in each cell.
+    """Volume fractions of cells: `share` (c, regions) of each region of a tissue.
 
-    `mapped_share` (c,): of the cell where a map tells the modulus, and `mapped` (c,): the mean of
-    its inverse there times this share [1/Pa]. The rest is the tissue around.
+    `mapped_share` (c,): fraction where a map gives the modulus, and `mapped` (c,): mean of its
+    inverse there times that fraction [1/Pa]. The remainder is the surrounding tissue.
     """
 
-    tissue: VariedTissue
+    tissue: HeterogeneousTissue
     share: Floats
     mapped_share: Floats
     mapped: Floats
 
     @property
     def around(self) -> Floats:
-        """Share (c,) of the tissue around."""
+        """Volume fraction (c,) of the surrounding tissue."""
         return np.asarray(1.0 - self.share.sum(axis=1) - self.mapped_share)
 
     def moduli(self, around: Tissue, *, one_ratio: bool = False) -> Moduli:
-        """Of the mean compliance of each cell, with the tissue around of other constants.
+        """Moduli of the mean compliance of each cell, for a surrounding tissue.
 
-        `one_ratio`: all regions have the Poisson ratio of the tissue around.
+        `one_ratio`: all regions have the Poisson ratio of the surrounding tissue.
         """
         nu = around.poisson_ratio
         own = self.around / around.youngs_modulus + self.mapped
@@ -114,7 +113,7 @@ class Composition:
         return Moduli(1.0 / of_volume - 2.0 / 3.0 / of_shape, 1.0 / of_shape)
 
     def density(self, around: float) -> Floats:
-        """Mean density [kg/m^3] (c,) of each cell, `around` that of the tissue around."""
+        """Mean density [kg/m^3] (c,) of each cell, for that of the surrounding tissue."""
         found = np.full(len(self.share), around)
         for share, region in zip(self.share.T, self.tissue.regions, strict=True):
             if region.density is not None:
@@ -123,8 +122,8 @@ class Composition:
 
 
 def composition(tissue: Tissue | None, count: int, points: Points) -> Composition | None:
-    """What each of so many cells is made of; None for tissue that is the same everywhere."""
-    if not isinstance(tissue, VariedTissue):
+    """Composition of `count` cells; None for homogeneous tissue."""
+    if not isinstance(tissue, HeterogeneousTissue):
         return None
     share = np.zeros((count, len(tissue.regions)))
     mapped_share, mapped = np.zeros(count), np.zeros(count)
@@ -146,7 +145,7 @@ def _chunks(count: int) -> Iterator[slice]:
 
 
 def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
-    """Number of the region that each point (c, k, 3) lies in, -1 in none."""
+    """Number of the region that each point (c, k, 3) lies in, -1 outside all."""
     centre = points.mean(axis=1)
     reach = np.linalg.norm(points - centre[:, None], axis=2).max(axis=1)
     part = np.full(points.shape[:2], -1, dtype=np.int16)
@@ -161,17 +160,17 @@ def _parts(regions: tuple[Region, ...], points: Floats) -> NDArray[np.int16]:
 
 
 def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition | None:
-    """What each tetrahedron is made of; None for tissue that is the same everywhere."""
-    if not isinstance(tissue, VariedTissue):  # and SciPy's statistics take a while to load
+    """Composition of each tetrahedron; None for homogeneous tissue."""
+    if not isinstance(tissue, HeterogeneousTissue):  # and SciPy's statistics take a while to load
         return None
     corners, inside = mesh.points[mesh.tetrahedra], barycentric_samples()
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
 
 
 def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
-    """How much of the organ is of other tissue than around."""
+    """Notes on the volume share of heterogeneous tissue."""
     made = of_tetrahedra(mesh, tissue)
-    if made is None or not isinstance(tissue, VariedTissue):
+    if made is None or not isinstance(tissue, HeterogeneousTissue):
         return ()
     size = volumes(mesh)
     found = [
@@ -191,10 +190,10 @@ def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
 
 @cache
 def barycentric_samples() -> Floats:
-    """Coordinates (k, 4) of points that fill a tetrahedron evenly.
+    """Barycentric coordinates (k, 4) of points that fill a tetrahedron evenly.
 
-    Gaps between three sorted coordinates of a Sobol sequence, which fill the tetrahedron as that
-    fills a cube.
+    The gaps between three sorted coordinates of a Sobol sequence, which fill the tetrahedron as the
+    sequence fills a cube.
     """
     from scipy.stats import qmc
 
@@ -207,13 +206,13 @@ def barycentric_samples() -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """Distance from an ellipsoid of semi-axes [m] (3,) along x, y and z, or less than it."""
+    """A lower bound on the distance from an ellipsoid of semi-axes [m] (3,) along x, y and z."""
 
     centre: Floats
     semi_axes: Floats
 
     def __call__(self, points: Floats) -> Floats:
-        """Exact for a ball: no gradient of the scaled radius exceeds 1 over the least semi-axis."""
+        """Exact for a ball: the scaled radius has no gradient above 1 over the least semi-axis."""
         scaled = np.linalg.norm((points - self.centre) / self.semi_axes, axis=-1)
         return np.asarray((scaled - 1.0) * self.semi_axes.min())
 

@@ -1,4 +1,4 @@
-"""What a run looks at besides its curves: the surface at times in between, and a cut."""
+"""What a run records for its figures: the surface at intermediate times, and a section."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from study.results.arrays import Arrays
 Floats = NDArray[np.float64]
 
 FRAMES = 9
-"""Samples at which the surface is kept."""
+"""Number of samples at which the surface is recorded."""
 STRAIGHT = 0.05
-"""Share of a load's largest value by which it may leave a straight line between two frames."""
+"""Largest deviation of a load from linear interpolation between frames, relative to its maximum."""
 
 
 @dataclass(frozen=True)
-class Watched:
-    """Where a run is looked at for its pictures.
+class VisualOutput:
+    """Where and when a run is recorded for its figures.
 
-    `samples`: those at which the surface is kept, the peak first and the last one last. Of the cut
-    through the tool's axis points [m] (c, 3) and triangles. `held` and `loaded` (m,): share of the
-    area of each triangle of the surface that a support holds, or a tool loads or would touch.
+    `samples`: those at which the surface is recorded, the peak first and the final one last.
+    `points` [m] (c, 3) and `triangles`: the section through the tool's axis. `held` and `loaded`
+    (m,): the share of the area of each surface triangle that a support holds, or that a tool loads
+    or would touch.
     """
 
     samples: tuple[int, ...]
@@ -37,16 +38,16 @@ class Watched:
     loaded: Floats
 
 
-def watched(problem: Problem) -> Watched:
-    """What is looked at of a problem as a scene poses it."""
+def visual_output(problem: Problem) -> VisualOutput:
+    """The frames, the section and the marked surface of a problem."""
     (peak, last), tool = problem.observation.frames, problem.tool
     between = set(_frames(_loads(problem), {0, peak, last})) - {peak, last}
     points, triangles = cut(problem.geometry.mesh, tool.centre, _across(problem))
-    return Watched((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
+    return VisualOutput((peak, *sorted(between), last), points, triangles, *_acted_on(problem))
 
 
 def _loads(problem: Problem) -> Floats:
-    """Every load and every way of a tool over the samples (samples, k), each up to 1."""
+    """Every load and the travel of every tool over the samples (samples, k), each at most 1."""
     times = problem.observation.times
     ways = [np.linalg.norm(one.travel(times), axis=1) for one in problem.rigid_tools]
     found = np.column_stack([problem.factors(times), *ways])
@@ -54,7 +55,7 @@ def _loads(problem: Problem) -> Floats:
 
 
 def _frames(loads: Floats, given: set[int]) -> list[int]:
-    """Samples where lines between them come nearest to the loads, then in the widest gaps."""
+    """Samples that best interpolate the loads linearly; then those that halve the widest gaps."""
     found, samples = sorted(given), np.arange(len(loads))
     while len(found) < min(FRAMES, len(loads)):
         lines = np.stack([np.interp(samples, found, one[found]) for one in loads.T], axis=1)
@@ -67,8 +68,8 @@ def _frames(loads: Floats, given: set[int]) -> list[int]:
     return found
 
 
-def to_watch(problem: Problem, found: Watched) -> Problem:
-    """The problem whose models keep all that is looked at, see `kept`."""
+def with_visual_output(problem: Problem, found: VisualOutput) -> Problem:
+    """The problem with an observation that includes the visual output."""
     seen = problem.observation
     surface = np.vstack([seen.surface_points, found.points])
     seen = replace(seen, frames=found.samples, surface_points=surface)
@@ -76,7 +77,7 @@ def to_watch(problem: Problem, found: Watched) -> Problem:
 
 
 def _across(problem: Problem) -> Floats:
-    """Normal of a plane in which the push lies, and the body's largest extent across it."""
+    """Normal of the section: the plane of the push and the body's largest extent across it."""
     points, push = problem.geometry.surface.points, problem.tool.direction
     away = points - points.mean(axis=0)
     away = away - np.outer(away @ push, push)
@@ -86,7 +87,7 @@ def _across(problem: Problem) -> Floats:
 
 
 def _acted_on(problem: Problem) -> tuple[Floats, Floats]:
-    """Shares of the area of each triangle that is held, and loaded."""
+    """Shares of the area of each triangle that are held, and loaded."""
     rule, tools = problem.surface_rule, [problem.tool, *(one.tool for one in problem.loads)]
     given = rule.points, rule.normals
     held = (problem.foundation.density(*given) > 0.0) | problem.foundation.fixed(*given).any(axis=1)
@@ -99,8 +100,8 @@ def _acted_on(problem: Problem) -> tuple[Floats, Floats]:
     return held, loaded
 
 
-def thinned(run: ModelRun) -> ModelRun:
-    """The run whose fields inside are kept at the peak and at the end alone: they are large."""
+def with_end_fields_only(run: ModelRun) -> ModelRun:
+    """The run with its volume fields, which are large, at the peak and the end only."""
     bounds = None if run.bounds is None else (_ends(run.bounds[0]), _ends(run.bounds[1]))
     halved = None if run.halved is None else _ends(run.halved)
     return replace(run, trajectory=_ends(run.trajectory), bounds=bounds, halved=halved)
@@ -110,11 +111,11 @@ def _ends(one: Trajectory) -> Trajectory:
     return replace(one, volume_field=one.volume_field[[0, -1]])
 
 
-def kept(found: Watched, name: str, field: Floats) -> Arrays:
-    """Arrays of a model's field (frames, s + c, 3): on the surface, in the cut, and as a film.
+def visual_arrays(found: VisualOutput, name: str, field: Floats) -> Arrays:
+    """Arrays of a model's field (frames, s + c, 3): on the surface, in the section, and as a film.
 
-    On surface and cut [m] at the peak and at the end; the film in single precision at all samples,
-    in order.
+    Surface and section [m] are at the peak and at the end. The film is in single precision, at all
+    recorded samples in order.
     """
     count = field.shape[1] - len(found.points)
     order = np.unique(found.samples, return_index=True)[1]

@@ -1,7 +1,7 @@
-"""A scene made ready to run: whatever can be refused of it is refused here, by `run` and `check`.
+"""Preparation of a scene: everything that `run` and `check` can refuse is refused here.
 
-What a run refuses must be known before anything heavy is computed: an organ, its meshes and
-lattices are built here, and nothing is solved.
+Errors must be known before anything expensive is computed. The organ, its meshes and the lattices
+are built, and nothing is solved.
 """
 
 from __future__ import annotations
@@ -19,70 +19,70 @@ from study.scene import Scene
 from study.scene.problem import point_problem_of, problem_of
 
 QUIET = Silent()
-"""Nobody is told what is set up."""
+"""Reports no progress."""
 
 
 @runtime_checkable
-class Refusing(Protocol):
+class Refuses(Protocol):
     """A prepared model that refuses more than `prepare` does, such as too many steps."""
 
     def refuse(self) -> None:
-        """ValueError for what its run would refuse, found without the work of one."""
+        """Raise ValueError for what its run would refuse, without the work of a run."""
 
 
 @runtime_checkable
-class RefusingPoint(Protocol):
+class RefusesPoint(Protocol):
     """A model of a single point that refuses some of them."""
 
     def refuse(self, problem: PointProblem) -> None:
-        """ValueError for what its run would refuse, found without the work of one."""
+        """Raise ValueError for what its run would refuse, without the work of a run."""
 
 
 @dataclass(frozen=True)
-class Ready:
-    """The problem of a scene with an organ, and its models by name, set up and not refused."""
+class PreparedScene:
+    """The problem of a scene with an organ, and its prepared models by name."""
 
     problem: Problem
     models: dict[str, Prepared]
 
 
 @dataclass(frozen=True)
-class ReadyPoint:
+class PreparedPointScene:
     """The problem of a scene that is a single point, and its models."""
 
     problem: PointProblem
     models: tuple[PointModel, ...]
 
 
-def ready(scene: Scene, progress: Progress = QUIET) -> Ready | ReadyPoint:
-    """Everything that a scene names, set up. ValueError for whatever a run of it would refuse."""
+def prepare_scene(scene: Scene, progress: Progress = QUIET) -> PreparedScene | PreparedPointScene:
+    """Prepare everything that a scene names. ValueError for whatever a run would refuse."""
     found = estimates(scene) if is_tuned(scene) else {}
     return _point(scene, found) if scene.is_point else _organ(scene, found, progress)
 
 
-def _organ(scene: Scene, found: Estimates, progress: Progress) -> Ready:
+def _organ(scene: Scene, found: Estimates, progress: Progress) -> PreparedScene:
     with progress.stage("organ"):
         problem = problem_of(scene)
-    return Ready(problem, set_up(models_of(scene, found), problem, progress))
+    return PreparedScene(problem, prepare_models(models_of(scene, found), problem, progress))
 
 
-def set_up(
+def prepare_models(
     models: Iterable[Model], problem: Problem, progress: Progress = QUIET
 ) -> dict[str, Prepared]:
-    """Models by name on a problem, all before any runs. ValueError for one that would not run."""
+    """Prepare models by name, all before any of them runs. ValueError for one that cannot run."""
     found: dict[str, Prepared] = {}
     for model in models:
         with progress.stage(f"{model.name}: set up"):
             found[model.name] = prepared = model.prepare(problem)
-            if isinstance(prepared, Refusing):
+            if isinstance(prepared, Refuses):
                 prepared.refuse()
     return found
 
 
-def _point(scene: Scene, found: Estimates) -> ReadyPoint:
+def _point(scene: Scene, found: Estimates) -> PreparedPointScene:
     problem = point_problem_of(scene)
     models = tuple(point_models_of(scene, found))
     for model in models:
-        if isinstance(model, RefusingPoint):
+        if isinstance(model, RefusesPoint):
             model.refuse(problem)
-    return ReadyPoint(problem, models)
+    return PreparedPointScene(problem, models)

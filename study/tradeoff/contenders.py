@@ -1,6 +1,6 @@
-"""The contenders by name, and the settings that each enters with.
+"""The contenders by name, and the settings of their configurations.
 
-A contender is a model in a family of settings. Other models of a scene enter as they are.
+A contender is a model with a family of settings. Other models of a scene take part as they are.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ Settings = Mapping[str, str | float | int | bool]
 
 FRAME_RATE = 60.0
 FAST = 250.0
-"""Steps per second [Hz] beyond a frame's, to show what the step contributes."""
+"""Steps per second [Hz] beyond the frame rate, to show the time-step error."""
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A model by the name of its kind, and settings worth a place in the table of a scene.
+    """A model by the name of its kind, and the settings with which it takes part.
 
-    `always`: settings that all of them share and none is told apart by; `unable`: names of
-    `study.problem.features.FEATURES` that its steps do not follow, though a run of its kind may.
+    `always`: settings that all of them share; `unable`: names of `study.problem.features.FEATURES`
+    that its steps do not support, though a run of its kind may.
     """
 
     model: str
@@ -41,58 +41,58 @@ class Contender:
     unable: frozenset[str] = frozenset()
 
     def lacks(self, scene: Scene) -> list[str]:
-        """Names of what a scene asks that it cannot follow."""
-        able = kind(self.model).able - self.unable
+        """Names of the features of a scene that it does not support."""
+        able = kind(self.model).supported_features - self.unable
         return [feature for feature in scene.features if feature not in able]
 
 
 def is_moved(scene: Scene) -> bool:
-    """Whether a scene has tools that are moved, and configurations are judged by their force."""
+    """Whether a scene has moved tools, so that the force is the criterion."""
     return "moved-tools" in scene.features
 
 
 def fraction(scene: Scene) -> float:
-    """Of the critical step: the scene's own where tools are moved, whose force is one step's."""
+    """Time step over the critical one: the scene's own where tools are moved."""
     return scene.lattice.step_fraction if is_moved(scene) else FRACTION
 
 
 def lattice_settings(scene: Scene, times: float, **more: str | float | bool) -> Settings:
-    """A lattice of so many times the scene's spacing, of the tissue's Poisson ratio."""
+    """A lattice of `times` the scene's spacing, with the tissue's Poisson ratio."""
     spacing = times * scene.lattice.spacing
     return {"spacing": spacing, "volume_term": lacks_poisson_ratio(scene)} | more
 
 
 def _springs(scene: Scene) -> Iterator[Settings]:
-    """Springs alone, which have Poisson ratio 1/4 whatever the tissue's."""
+    """Springs alone, with Poisson ratio 1/4 whatever the tissue's."""
     for times in (2.0, 1.5, 1.0, 0.75):
         spacing = times * scene.lattice.spacing
         yield {"spacing": spacing, "volume_term": False, "step_fraction": fraction(scene)}
 
 
 def _volume_springs(scene: Scene) -> Iterator[Settings]:
-    """Springs with the volume term; none for a tissue whose ratio springs have already."""
+    """Springs with the volume term; none for a tissue whose ratio springs have anyway."""
     spacings = (2.0, 1.75, 1.5, 1.25, 1.0, 0.8, 2.0 / 3.0, 0.5)
     for times in spacings if lacks_poisson_ratio(scene) else ():
         yield lattice_settings(scene, times, step_fraction=fraction(scene))
 
 
 def _single_precision(scene: Scene) -> Iterator[Settings]:
-    """Steps in single precision, with the volume term where the tissue's ratio asks for it."""
+    """Steps in single precision, with the volume term where the tissue's ratio needs it."""
     for times in (1.0, 0.8, 2.0 / 3.0, 0.5) if may_be_single(scene) else ():
         yield lattice_settings(scene, times, precision="single", step_fraction=fraction(scene))
 
 
 def may_be_single(scene: Scene) -> bool:
-    """Whether there are steps in single precision, which are on the grid alone.
+    """Whether single precision is available, which is implemented on the grid alone.
 
-    Springs with rest lengths each of their own are stepped over the list.
+    Springs with individual rest lengths are stepped over the list.
     """
     loaded = "gravity" in scene.features and scene.gravity.given == "loaded"
     return INTEGRATORS[scene.lattice.integrator].on_grid is not None and not loaded
 
 
 def _step_sizes(scene: Scene) -> Iterator[Settings]:
-    """The default integrator at fixed rates and fractions; a fixed step too long diverges."""
+    """The default integrator at fixed rates and fractions; too long a fixed step diverges."""
     for rate in (500.0, 1000.0, 2000.0):
         yield lattice_settings(scene, 1.0, step_rate=rate)
     for fraction in (0.95, 0.4, 0.2):
@@ -119,7 +119,7 @@ def _basafa(scene: Scene) -> Iterator[Settings]:
 
 
 def _finite_elements(_: Scene) -> Iterator[Settings]:
-    """By element and mesh at a frame's step, and the coarsest with shorter ones."""
+    """By element and mesh at one step per frame, and the coarsest with shorter steps."""
     meshes = (
         *(("p1", level) for level in (-2, -1, 0, 1)),
         *(("p2", level) for level in (-2, -1, 0)),
@@ -131,7 +131,7 @@ def _finite_elements(_: Scene) -> Iterator[Settings]:
 
 
 def _superposition(_: Scene) -> Iterator[Settings]:
-    """By vectors, their number and mesh."""
+    """By kind and number of vectors, and by mesh."""
     subspaces = (
         *(("ritz", count, -1) for count in (4, 16)),
         *(("ritz", count, 0) for count in (2, 4, 8, 16, 24)),
@@ -144,14 +144,14 @@ def _superposition(_: Scene) -> Iterator[Settings]:
 
 
 def _corrected(scene: Scene) -> Iterator[Settings]:
-    """By the spacing of the coarse lattice, and the coarsest on the scene's own mesh too."""
+    """By the spacing of the coarse lattice, the coarsest also on the scene's own mesh."""
     for times, level in ((2.0, 0), (2.0, 1), (1.5, 1), (1.0, 1), (0.8, 1)):
         spacing = times * scene.lattice.spacing
         yield {"spacing": spacing, "level": level, "step_fraction": FRACTION}
 
 
 def _region(scene: Scene) -> Iterator[Settings]:
-    """Graded lattices by how far their finest cells reach, in radii of the tool."""
+    """Graded lattices by the radius of their finest cells, in radii of the tool."""
     for times in (0.5, 1.0, 1.5, 2.0):
         finer = lattice_settings(scene, 0.5, step_fraction=FRACTION)
         yield {**finer, "radius": times * scene.tool.radius}
@@ -199,7 +199,7 @@ class Configuration:
 
     @property
     def any_load(self) -> bool:
-        """Whether it follows a load whose place was not known beforehand."""
+        """Whether it can follow a load whose place was unknown beforehand."""
         return kind(contender(self.contender).model).any_load
 
     def model(self, scene: Scene) -> Model:
@@ -212,11 +212,11 @@ class Configuration:
 def contender(name: str) -> Contender:
     """The contender of a name, or the model of that name as it is.
 
-    ValueError with those there are; models of fuzzy estimates are the lattice at other moduli.
+    ValueError with the existing names; models of fuzzy estimates are the lattice at other moduli.
     """
     if name in CONTENDERS:
         return CONTENDERS[name]
-    if name not in MODELS or kind(name).of_patient:
+    if name not in MODELS or kind(name).patient_specific:
         raise ValueError(
             f"contender {name}: there is none; choose from {', '.join(CONTENDERS)}, or a model of "
             "the scene that needs no estimate"
@@ -225,16 +225,16 @@ def contender(name: str) -> Contender:
 
 
 def contenders_of(scene: Scene) -> list[str]:
-    """All contenders that can follow a scene, and its own models that need no estimate."""
+    """All contenders that support a scene, and its own models that need no estimate."""
     entered = {one.model for one in CONTENDERS.values()}
-    own = [name for name in scene.models if name not in entered and not kind(name).of_patient]
+    own = [name for name in scene.models if name not in entered and not kind(name).patient_specific]
     return [name for name in (*CONTENDERS, *own) if not contender(name).lacks(scene)]
 
 
 def configurations(scene: Scene, chosen: Sequence[str] = ()) -> list[Configuration]:
     """All configurations of the chosen contenders, or of all that a scene has.
 
-    ValueError for a contender that cannot follow the scene.
+    ValueError for a contender that does not support the scene.
     """
     for name in chosen:
         lacks = contender(name).lacks(scene)

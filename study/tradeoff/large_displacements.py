@@ -1,8 +1,8 @@
-"""The reference with large displacements, which linear elements lack: from corrected lattices.
+"""Large displacements added to the linear reference, from corrected lattices.
 
-What a corrected lattice moves beyond the same elements without it is what geometry changes. Added
-to the reference it gives what all models are judged by where the place of the load is known; its
-error is told by a second lattice, whose finest cells reach less far.
+The displacement of a corrected lattice less that of the same elements alone is the effect of
+geometric nonlinearity. Added to the reference it gives what all models are compared with where the
+place of the load is known. Its error follows from a second lattice with a smaller fine region.
 """
 
 from __future__ import annotations
@@ -10,23 +10,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import Truth
+from study.tradeoff.reference import ReferenceSolution
 
 Floats = NDArray[np.float64]
 
 
 def with_large_displacements(
-    known: Truth, linear: Outcome, near: Outcome, far: Outcome, given: Stated
-) -> Truth | None:
-    """The reference with what geometry changes, None where one of the runs was not whole.
+    known: ReferenceSolution, linear: Outcome, near: Outcome, far: Outcome, given: SceneProblem
+) -> ReferenceSolution | None:
+    """The reference with geometric nonlinearity, None where one of the runs did not finish.
 
-    `linear`: elements alone; `near` and `far`: corrected by lattices, of which the second's finest
-    cells reach farther.
+    `linear`: elements alone; `near` and `far`: corrected by lattices, the second with a larger fine
+    region.
     """
     seen = [_seen(one, known) for one in (linear, near, far)]
     if any(one is None for one in seen):
@@ -38,11 +38,11 @@ def with_large_displacements(
     volumes = given.problem.volume_rule.weights
     own = relative_l2(whole + field_near - field_far, whole, volumes)
     apart = relative_l2_of_curves(curves_near - curves_far, moved)
-    return Truth(whole, moved, known.field_error + own, known.curve_errors + apart)
+    return ReferenceSolution(whole, moved, known.field_error + own, known.curve_errors + apart)
 
 
-def _seen(outcome: Outcome, known: Truth) -> tuple[Floats, Floats] | None:
-    """Field and curves of a run, None where it was not whole."""
+def _seen(outcome: Outcome, known: ReferenceSolution) -> tuple[Floats, Floats] | None:
+    """Field and curves of a run, None where it did not finish."""
     if outcome.value is None:
         return None
     found = restored(Observed, outcome.value)

@@ -24,8 +24,8 @@ from study.models.tissue import elastic
 from study.organ.block import block_mesh
 from study.organ.occupancy import ImplicitBody
 from study.problem.contact import Foundation, ToolPatch
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region, of_tetrahedra
 from study.problem.tissue import Tissue
-from study.problem.varied import Ellipsoid, Region, VariedTissue, of_tetrahedra
 
 RADIUS, HALF, E = 0.01, 0.03, 9.5e3
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -80,7 +80,7 @@ def stiffer(times, nu=0.45):
 
 @pytest.mark.parametrize(("radius", "within"), [(0.004, 0.04), (0.011, 0.01), (0.018, 0.005)])
 def test_shares_of_elements_and_cells_keep_the_volume_of_a_ball(radius, within):
-    tissue = VariedTissue(regions=(ball(E, radius),))
+    tissue = HeterogeneousTissue(regions=(ball(E, radius),))
     mesh = block_mesh((0.04, 0.04, 0.04), 0.005)
     exact = 4.0 / 3.0 * np.pi * radius**3
     own = float(volumes(mesh) @ of_tetrahedra(mesh, tissue).share[:, 0])
@@ -95,7 +95,7 @@ def test_shares_of_elements_and_cells_keep_the_volume_of_a_ball(radius, within):
 def test_shares_keep_the_volume_of_an_ellipsoid(semi_axes):
     """Far from a ball: what lies near is not told by the longest of its axes."""
     shape = Ellipsoid(CENTRE, np.array(semi_axes))
-    tissue = VariedTissue(regions=(Region(name="oval", distance=shape, youngs_modulus=E),))
+    tissue = HeterogeneousTissue(regions=(Region(name="oval", distance=shape, youngs_modulus=E),))
     mesh = block_mesh((0.04, 0.04, 0.04), 0.005)
     own = float(volumes(mesh) @ of_tetrahedra(mesh, tissue).share[:, 0])
     assert own == pytest.approx(4.0 / 3.0 * np.pi * np.prod(semi_axes), rel=0.02)
@@ -104,7 +104,7 @@ def test_shares_keep_the_volume_of_an_ellipsoid(semi_axes):
 def test_the_last_of_two_regions_counts_where_they_meet():
     two = (ball(2 * E, 0.015), ball(3 * E, 0.008))
     mesh = block_mesh((0.04, 0.04, 0.04), 0.005)
-    found = of_tetrahedra(mesh, VariedTissue(regions=two))
+    found = of_tetrahedra(mesh, HeterogeneousTissue(regions=two))
     inner, whole = (4.0 / 3.0 * np.pi * r**3 for r in (0.008, 0.015))
     assert volumes(mesh) @ found.share == pytest.approx([whole - inner, inner], rel=0.02)
     assert found.around.min() >= 0.0
@@ -114,7 +114,7 @@ def test_a_cut_cell_has_the_mean_compliance_and_density_of_its_parts():
     region = ball(1e5, 1.0, np.array([-1.0, 0.0, 0.0]), poisson_ratio=0.3, density=2000.0)
     mesh = block_mesh((0.01, 0.01, 0.01), 0.01)
     moved = replace(mesh, points=mesh.points - 0.005)
-    found = of_tetrahedra(moved, VariedTissue(regions=(region,)))
+    found = of_tetrahedra(moved, HeterogeneousTissue(regions=(region,)))
     share = found.share[:, 0]
     assert 0.05 < share.min() < share.max() < 0.95
     around = Tissue(poisson_ratio=0.45)
@@ -129,15 +129,15 @@ def test_a_cut_cell_has_the_mean_compliance_and_density_of_its_parts():
 @pytest.mark.parametrize(("element", "nu"), [("p1", 0.3), ("p2", 0.45), ("taylor-hood", 0.49)])
 def test_an_inclusion_like_its_surroundings_changes_nothing(element, nu):
     plain = solve_static(pressed(Tissue(poisson_ratio=nu), element))
-    like = VariedTissue(poisson_ratio=nu, regions=(ball(E),))
+    like = HeterogeneousTissue(poisson_ratio=nu, regions=(ball(E),))
     assert solve_static(pressed(like, element)) == pytest.approx(plain, abs=1e-10 * plain.max())
-    other = VariedTissue(poisson_ratio=nu, regions=(ball(1.01 * E),))
+    other = HeterogeneousTissue(poisson_ratio=nu, regions=(ball(1.01 * E),))
     assert np.abs(solve_static(pressed(other, element)) - plain).max() > 1e-4 * plain.max()
 
 
 def test_elements_wholly_of_a_region_are_those_of_its_tissue():
     own = Tissue(youngs_modulus=3e4, poisson_ratio=0.3, density=1200.0)
-    everywhere = VariedTissue(regions=(ball(3e4, 1.0, poisson_ratio=0.3, density=1200.0),))
+    everywhere = HeterogeneousTissue(regions=(ball(3e4, 1.0, poisson_ratio=0.3, density=1200.0),))
     expected, found = pressed(own), pressed(everywhere)
     assert found.mass.sum() == pytest.approx(expected.mass.sum(), rel=1e-12)
     at_rest = solve_static(expected)
@@ -146,16 +146,16 @@ def test_elements_wholly_of_a_region_are_those_of_its_tissue():
 
 def test_a_pressure_of_its_own_follows_a_region():
     """Mixed elements near nu 1/2, against displacements alone at a ratio that both can do."""
-    tissue = VariedTissue(poisson_ratio=0.4, regions=(ball(1e5, poisson_ratio=0.3),))
+    tissue = HeterogeneousTissue(poisson_ratio=0.4, regions=(ball(1e5, poisson_ratio=0.3),))
     plain, mixed = (solve_static(pressed(tissue, name, 0.005)) for name in ("p2", "taylor-hood"))
     assert np.linalg.norm(plain - mixed) < 0.02 * np.linalg.norm(plain)
-    empty = VariedTissue(poisson_ratio=0.4, regions=(ball(1e5, 1.0, poisson_ratio=0.0),))
+    empty = HeterogeneousTissue(poisson_ratio=0.4, regions=(ball(1e5, 1.0, poisson_ratio=0.0),))
     with pytest.raises(ValueError, match="poisson_ratio"):
         pressed(empty, "taylor-hood")
 
 
 def test_large_strain_follows_a_region():
-    tissue = VariedTissue(regions=(ball(1e5),))
+    tissue = HeterogeneousTissue(regions=(ball(1e5),))
     body = pressed(tissue)
     small = replace(body, load=1e-4 * body.load)
     state = solve(small, tissue, "neo-hookean").states[-1]
@@ -164,7 +164,7 @@ def test_large_strain_follows_a_region():
 
 
 def test_the_element_suits_the_highest_poisson_ratio():
-    tissue = VariedTissue(regions=(ball(E, poisson_ratio=0.499),))
+    tissue = HeterogeneousTissue(regions=(ball(E, poisson_ratio=0.499),))
     assert chosen_element("auto", tissue.highest_poisson_ratio) == "taylor-hood"
     assert pressed(tissue, "auto", 0.02).element == "taylor-hood"
 
@@ -224,17 +224,19 @@ def test_a_lattice_holds_a_ball_like_its_surroundings_exactly():
 
 def test_a_mean_of_stiffness_would_make_a_stiff_ball_larger(monkeypatch):
     """What cut cells have is seen: Voigt's mean in its place is caught."""
-    from study.problem import varied
+    from study.problem import heterogeneous
 
     def voigt(self, around, *, one_ratio=False):
         del one_ratio
         mean = self.around * around.youngs_modulus
         mean = mean + self.share[:, 0] * self.tissue.regions[0].youngs_modulus
         nu = around.poisson_ratio
-        return varied.Moduli(mean * nu / (1.0 + nu) / (1.0 - 2.0 * nu), mean / (2.0 + 2.0 * nu))
+        return heterogeneous.Moduli(
+            mean * nu / (1.0 + nu) / (1.0 - 2.0 * nu), mean / (2.0 + 2.0 * nu)
+        )
 
     good = in_a_lattice(stiffer(10.0), 12)
-    monkeypatch.setattr(varied.Composition, "moduli", voigt)
+    monkeypatch.setattr(heterogeneous.Composition, "moduli", voigt)
     assert in_a_lattice(stiffer(10.0), 12) > 2.5 * good
 
 
@@ -253,7 +255,7 @@ def scene_assembly(tissue, lattice="lattice"):
 
 @pytest.mark.parametrize("springs", ["lattice", "tetrahedra"])
 def test_springs_of_a_region_are_stiffer_and_those_around_stay(springs):
-    tissue = VariedTissue(regions=(ball(1e5, 0.012, density=2000.0),))
+    tissue = HeterogeneousTissue(regions=(ball(1e5, 0.012, density=2000.0),))
     plain = scene_assembly(tissue, springs)
     material = elastic(plain.lattice, E, 0.25)
     found, _ = of_tissue(plain, material, E)
@@ -268,7 +270,7 @@ def test_springs_of_a_region_are_stiffer_and_those_around_stay(springs):
 
 
 def test_an_estimate_tunes_the_tissue_around_alone():
-    plain = scene_assembly(VariedTissue(regions=(ball(1e5, 1.0),)))
+    plain = scene_assembly(HeterogeneousTissue(regions=(ball(1e5, 1.0),)))
     weights = [
         of_tissue(plain, elastic(plain.lattice, own, 0.25), own)[0].springs.weight * own
         for own in (5e3, 2e4)
@@ -278,7 +280,7 @@ def test_an_estimate_tunes_the_tissue_around_alone():
 
 def test_at_large_strain_a_pressure_of_its_own_follows_an_inclusion():
     """Both kinds of elements differ by what the mesh costs them, the ball far more."""
-    tissue = VariedTissue(youngs_modulus=E, poisson_ratio=0.4, regions=(ball(10.0 * E),))
+    tissue = HeterogeneousTissue(youngs_modulus=E, poisson_ratio=0.4, regions=(ball(10.0 * E),))
     p2, mixed = (
         solve(pressed(tissue, element), tissue).states[0].displacement
         for element in ("p2", "taylor-hood")

@@ -1,8 +1,8 @@
-"""A scene's own models: critical step and rest of its lattices, motion under many times its load.
+"""A scene's own models: critical step and rest of its lattices, motion under multiples of its load.
 
-Tried are the lattice of the tissue's modulus, with the law, geometry and integrator of the scene,
-and the models that the scene names beside the reference and those of fuzzy estimates, which are the
-same lattice at other moduli.
+The cases run the lattice of the tissue's modulus, with the law, geometry and integrator of the
+scene, and the models that the scene names beside the reference and those of fuzzy estimates, which
+are the same lattice at other moduli.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from study.models.model import Prepared
 from study.models.table import kind, model
 from study.problem.problem import Problem
 from study.results.provenance import organ_sha256
-from study.run.ready import set_up
+from study.run.preparation import prepare_models
 from study.scene import Scene
 from study.scene.file import resolved, validate
 from study.scene.problem import problem_of
 from study.sweep.canonical import Plain
 
 FRACTIONS = (0.5, 0.2)
-"""Of the limit at rest, or of the model's own step, of the equal ones."""
+"""Equal steps over the critical step at rest, or over the model's own step."""
 LOADS = (1.0, 10.0, 100.0, 1000.0)
 MEASURED, SOLVED = 5e-3, 1e-6
 FINER = 0.02
-"""Of the motion, by which symplectic Euler's steps of 0.8 and 0.2 of the limit may differ."""
+"""Admissible difference of symplectic Euler at 0.8 and 0.2 of the limit, over the motion."""
 WATCHED = {"runge-kutta-4": 1600, "split-volume": 400}
-"""Steps that show growth just above the limit, where 1000 are too few or too dear."""
+"""Steps that show growth just above the limit, where 1000 are too few or too expensive."""
 LEAPS, LEAP = 40, 1e3
-"""Implicit steps to rest, and how many times the explicit limit each is."""
+"""Number of implicit steps to rest, and the length of each over the explicit limit."""
 NEAR_REST = 1e-9
-HERE = "study.known.stability.cases.own_scene"
+HERE = "study.known.stability.cases.user_scene"
 
 
 def cases(scene: Scene) -> Iterator[Case]:
-    """Cases of a scene with a body. ValueError for a single control point, which has no lattice."""
+    """Cases of a scene with an organ. ValueError for a single control point, without a lattice."""
     _refuse_point(scene)
     for name in tried(scene):
         given = {"name": name, "scene": resolved(scene), "mesh": organ_sha256(scene)}
@@ -61,10 +61,10 @@ def cases(scene: Scene) -> Iterator[Case]:
 
 
 def refuse(scene: Scene) -> None:
-    """ValueError for a scene of which a model cannot be set up, found before any case is run."""
+    """Raise ValueError for a scene with a model that cannot be prepared, before any case is run."""
     _refuse_point(scene)
     free = _free(scene)
-    set_up((model(free, name) for name in tried(free)), problem_of(free))
+    prepare_models((model(free, name) for name in tried(free)), problem_of(free))
 
 
 def _refuse_point(scene: Scene) -> None:
@@ -73,13 +73,13 @@ def _refuse_point(scene: Scene) -> None:
 
 
 def _free(scene: Scene) -> Scene:
-    """The scene with steps that follow the limit."""
+    """The scene with steps that follow the stability limit."""
     return replace(scene, lattice=replace(scene.lattice, time_step=None, step_rate=None))
 
 
 def tried(scene: Scene) -> list[str]:
-    """Kinds of models that are tried on a scene."""
-    others = (n for n in scene.models if n != "fem" and not kind(n).of_patient)
+    """Kinds of models that are run for a scene."""
+    others = (n for n in scene.models if n != "fem" and not kind(n).patient_specific)
     return list(dict.fromkeys(("tissue", *others)))
 
 
@@ -100,7 +100,8 @@ def _case(
 def steps(name: str, scene: Plain, mesh: str | None) -> Finding:
     """The critical step at rest, predicted and measured, without damping.
 
-    Of a law with a corner at rest the predicted one may be the shorter: motions feel both slopes.
+    For a law with a corner at rest the prediction may be shorter, since motions involve both
+    slopes.
     """
     one, _ = _lattice(name, scene, mesh)
     integrator = one.model.lattice.integrator
@@ -118,7 +119,7 @@ def _has_corner(law: Law) -> bool:
 
 
 def rests(name: str, scene: Plain, mesh: str | None) -> Finding:
-    """Rest under the full load by relaxation beside that by long implicit steps."""
+    """Rest under the full load, by relaxation and by long implicit steps."""
     one, _ = _lattice(name, scene, mesh)
     material = replace(one.springs.material, damping=UNDAMPED)  # which the rest does not depend on
     law, net = material.law, arrays(one.assembly, material, linear=one.linear)
@@ -136,10 +137,10 @@ def _explicit_limit(one: PreparedLattice) -> float:
 
 
 def moves(name: str, scene: Plain, mesh: str | None, times: float) -> Finding:
-    """Motion of the control points by the model's own steps beside that by the finest equal ones.
+    """Motion of the control points by the model's own steps and by the finest equal ones.
 
-    If no equal step completes, its own may not either, and are to lose the body when the finest do,
-    to within a sampling interval.
+    If no equal step completes, the model's own steps need not either; they must then diverge at the
+    same time as the finest, within one sampling interval.
     """
     one, problem = _prepared(name, scene, mesh, times)
     own = one.simulate()
@@ -147,17 +148,17 @@ def moves(name: str, scene: Plain, mesh: str | None, times: float) -> Finding:
     longest = min(one.critical_time_step, own.step / FRACTIONS[0])
     equal = [one.simulate(part * longest).trajectory for part in FRACTIONS]
     complete = sum(other.status == "finished" for other in equal)
-    told = f"{complete} of {len(equal)} fixed steps complete"
+    message = f"{complete} of {len(equal)} fixed steps complete"
     if found.ended_at is None:
         whole = [other for other in equal if other.status == "finished"]
         if not whole:
-            return Finding("error", message=f"nothing to compare with: {told}")
-        return replace(beside(whole[-1].displacement, found.displacement), message=told)
+            return Finding("error", message=f"nothing to compare with: {message}")
+        return replace(beside(whole[-1].displacement, found.displacement), message=message)
     finest = equal[-1].ended_at
     if complete or finest is None:
-        return Finding("error", message=f"lost by its step: {told}")
+        return Finding("error", message=f"lost by its step: {message}")
     late = max(0.0, abs(found.ended_at - finest) - interval) / finest
-    return Finding("value", finest, found.ended_at, late, f"lost by its load: {told}")
+    return Finding("value", finest, found.ended_at, late, f"lost by its load: {message}")
 
 
 def _lattice(name: str, scene: Plain, mesh: str | None) -> tuple[PreparedLattice, Problem]:
@@ -169,7 +170,7 @@ def _lattice(name: str, scene: Plain, mesh: str | None) -> tuple[PreparedLattice
 def _prepared(
     name: str, table: Plain, mesh: str | None, times: float = 1.0
 ) -> tuple[Prepared, Problem]:
-    """A model of a scene whose steps follow the limit, under so many times the load."""
+    """A model of a scene whose steps follow the limit, under `times` the load."""
     scene = validate(table, "scene")
     if organ_sha256(scene) != mesh:
         raise ValueError(f"organ.mesh: {scene.organ.mesh} has changed since the cases were listed")

@@ -1,4 +1,4 @@
-"""How far a sweep is, and how a person is told: a bar on a terminal, else a line now and then."""
+"""Progress of a sweep, shown as a bar on a terminal and as occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 
-class Tally(NamedTuple):
-    """Counts of a sweep: `stored` were there before; `failed` includes the crashed."""
+class SweepStatus(NamedTuple):
+    """Counts of a sweep: `stored` existed before; `failed` includes crashes."""
 
     total: int
     stored: int = 0
@@ -21,23 +21,23 @@ class Tally(NamedTuple):
 
     @property
     def finished(self) -> int:
-        """How many need no more work in this sweep."""
+        """Number of tasks that need no more work in this sweep."""
         return self.stored + self.done + self.failed
 
     @property
     def seconds_left(self) -> float | None:
-        """At the rate so far; None before the first run has finished."""
+        """Remaining time at the rate so far; None before the first run has finished."""
         ran = self.done + self.failed
         return self.seconds / ran * (self.total - self.finished) if ran else None
 
-    def counting(self, done: bool, seconds: float) -> Tally:
-        """With one more run, done or not, after so many seconds of the sweep."""
+    def counting(self, done: bool, seconds: float) -> SweepStatus:
+        """The status after one more run, done or not, at so many seconds of the sweep."""
         return self._replace(
             done=self.done + done, failed=self.failed + (not done), seconds=seconds
         )
 
     def __str__(self) -> str:
-        """For a person."""
+        """For a reader."""
         parts = [f"{self.finished} of {self.total}"]
         parts += [f"{self.stored} from before"] if self.stored else []
         parts += [f"{self.failed} failed"] if self.failed else []
@@ -46,51 +46,51 @@ class Tally(NamedTuple):
         return ", ".join(parts)
 
 
-Tell = Callable[[Tally], None]
+ReportStatus = Callable[[SweepStatus], None]
 
 SECONDS = 15.0
-"""Between two lines where stderr is no terminal."""
+"""Time between two lines where stderr is no terminal."""
 
 
 def duration(seconds: float) -> str:
-    """A time for a person: "8 s", "3 min", "2.5 h"."""
+    """A time as text: "8 s", "3 min", "2.5 h"."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def silent(_: Tally) -> None:
-    """Tell nothing."""
+def silent(_: SweepStatus) -> None:
+    """Report nothing."""
 
 
 @dataclass
-class TallyLines:
-    """A line at the beginning, at the end, and every so many seconds between."""
+class StatusLines:
+    """A line at the beginning, at the end, and at regular intervals between."""
 
     name: str
     seconds: float = SECONDS
-    told: float = float("-inf")
+    last_printed: float = float("-inf")
 
-    def __call__(self, tally: Tally) -> None:
-        """Tell, if it is time."""
+    def __call__(self, status: SweepStatus) -> None:
+        """Print a line, if it is time."""
         now = time.monotonic()
-        if now - self.told >= self.seconds or tally.finished == tally.total:
-            self.told = now
-            print(f"{self.name}: {tally}", file=sys.stderr, flush=True)  # noqa: T201 - its job
+        if now - self.last_printed >= self.seconds or status.finished == status.total:
+            self.last_printed = now
+            print(f"{self.name}: {status}", file=sys.stderr, flush=True)  # noqa: T201 - its job
 
 
 @contextmanager
-def on_stderr(name: str) -> Iterator[Tell]:
+def on_stderr(name: str) -> Iterator[ReportStatus]:
     """A bar if stderr is a terminal, else lines."""
     if not sys.stderr.isatty():
-        yield TallyLines(name)
+        yield StatusLines(name)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     columns = (TextColumn(name), BarColumn(), TextColumn("{task.fields[tally]}"))
     with Progress(*columns, console=Console(stderr=True)) as bars:
-        bar = bars.add_task(name, tally="")
-        yield lambda tally: bars.update(
-            bar, total=tally.total, completed=tally.finished, tally=str(tally)
+        bar = bars.add_task(name, status="")
+        yield lambda status: bars.update(
+            bar, total=status.total, completed=status.finished, status=str(status)
         )

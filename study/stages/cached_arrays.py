@@ -1,6 +1,7 @@
-"""Arrays that are dear, or come out otherwise each time, made once for all runs that need them.
+"""Arrays that are expensive or not reproducible, computed once for all runs that need them.
 
-They are asked for deep in a stage by code that knows no store: that of the run is set around it.
+They are computed deep within a stage by code that knows no store; the store of the run is set as a
+context around it.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from typing import NamedTuple
 
 from study.folders import tell
 from study.stages.fingerprint import key
-from study.stages.flat import Arrays
+from study.stages.serialisation import Arrays
 from study.stages.store import Store
 
 
 class _Current(NamedTuple):
-    """A store, and whether what is there may be taken from it."""
+    """The current store, and whether its content may be read."""
 
     store: Store
     readable: bool
@@ -28,8 +29,8 @@ _CURRENT: ContextVar[_Current | None] = ContextVar("current", default=None)
 
 
 @contextmanager
-def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
-    """Let what is made in the block be kept in a store, and taken from it if it is readable."""
+def using_store(store: Store | None, *, readable: bool = True) -> Iterator[None]:
+    """Within the block, keep computed arrays in a store, and read them from it if `readable`."""
     token = _CURRENT.set(None if store is None else _Current(store, readable))
     try:
         yield
@@ -38,7 +39,7 @@ def keeping_in(store: Store | None, *, readable: bool = True) -> Iterator[None]:
 
 
 def kept(name: str, *given: object, modules: tuple[str, ...]) -> Arrays | None:
-    """What `made_once` would take from the store, None where it would make it."""
+    """The arrays that `cached_arrays` would take from the store, None if it would compute them."""
     current, found = _CURRENT.get(), key(name, *given, modules=modules)
     if current is None or found is None or not current.readable:
         return None
@@ -46,10 +47,10 @@ def kept(name: str, *given: object, modules: tuple[str, ...]) -> Arrays | None:
     return None if entry is None else entry.arrays
 
 
-def made_once(
+def cached_arrays(
     name: str, make: Callable[[], Arrays], *given: object, modules: tuple[str, ...]
 ) -> Arrays:
-    """Arrays by name that `make` gives, or gave before of equal `given` by the same modules."""
+    """The arrays of `make`, or those stored for equal `given` and the same `modules`."""
     current, found = _CURRENT.get(), key(name, *given, modules=modules)
     if current is None or found is None:
         return make()

@@ -1,8 +1,8 @@
-"""A user's own scene beside a user's own measurements: every model of it."""
+"""A user's scene beside the user's measurements: every model of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,27 +20,27 @@ from study.problem.trajectory import Trajectory
 from study.progress import Progress
 from study.scene import Scene
 from study.scene.problem import OUTSIDE, problem_of
-from study.validation.own_data import Curve, OwnMarkers, read_curve, read_markers
-from study.validation.rows import ORDER, Comparison
+from study.validation.comparison import ORDER, Comparison
+from study.validation.user_data import Curve, UserMarkers, read_curve, read_markers
 
 Floats = NDArray[np.float64]
 
 NAME = "own scene"
 MARKERS = "markers.csv"
 COARSER_SPACING = 4.0 / 3.0
-"""Of a lattice over the next finer one, that its own error is seen by."""
+"""Spacing of a lattice over the next finer one, from which its own error is estimated."""
 
 
 @dataclass(frozen=True)
-class OwnData:
-    """What a folder holds: curves by the name of their file, markers."""
+class UserData:
+    """Content of a folder: curves by the name of their file, and markers."""
 
     curves: dict[str, Curve]
-    markers: OwnMarkers | None
+    markers: UserMarkers | None
 
 
-def read_folder(folder: Path) -> OwnData:
-    """All CSV files of a folder. ValueError for a folder without, or a file that is no such."""
+def read_folder(folder: Path) -> UserData:
+    """All CSV files of a folder. ValueError for a folder without any, or a malformed file."""
     if not folder.is_dir():
         raise ValueError(f"--data {folder}: there is no such folder; give one with CSV files")
     shown = sorted(one for one in folder.iterdir() if not one.name.startswith("."))
@@ -57,16 +57,16 @@ def read_folder(folder: Path) -> OwnData:
         if twice:
             raise ValueError(f"--data {folder}: holds {min(twice)} twice; rename one of them")
     markers = read_markers(of_markers[0]) if of_markers else None
-    return OwnData({one.stem: read_curve(one) for one in curves}, markers)
+    return UserData({one.stem: read_curve(one) for one in curves}, markers)
 
 
 def comparisons(
-    scene: Scene, data: OwnData, progress: Progress, probe: str | None = None
+    scene: Scene, data: UserData, progress: Progress, probe: str | None = None
 ) -> Iterator[Comparison]:
-    """Each model of the scene beside what was measured: curves by their rms, markers likewise.
+    """Each model of the scene beside the measurements, as rms of curves and of markers.
 
-    `probe`: the control point that curves of displacement are of, by default the one nearest to
-    the tool. ValueError for what the scene cannot answer.
+    `probe`: the control point of displacement curves, by default the one nearest to the tool.
+    ValueError for what the scene cannot predict.
     """
     if scene.is_point:
         raise ValueError("organ.shape: a single point has no body to be measured; give an organ")
@@ -94,10 +94,10 @@ def comparisons(
             yield _of_markers(data.markers, model.label, moved(found), own)
 
 
-def _marked(problem: Problem, markers: OwnMarkers) -> Problem:
-    """The problem seen at the markers too, after its control points.
+def _marked(problem: Problem, markers: UserMarkers) -> Problem:
+    """The problem observed at the markers too, after its control points.
 
-    ValueError naming the line of one outside of the organ, where models have nothing to say.
+    ValueError naming the line of a marker outside the organ, where models have no displacement.
     """
     within = locate(problem.geometry.mesh, markers.places)[1].min(axis=1)
     if (within < OUTSIDE).any():
@@ -113,12 +113,26 @@ def _marked(problem: Problem, markers: OwnMarkers) -> Problem:
             f"{MARKERS}: {line}({place}) m lies outside the organ, which is {extent} m; give "
             "metres in the axes of the scene, and markers inside the organ"
         )
+    _refuse_beyond(problem, markers.moved, MARKERS, markers.lines)
     probes = np.concatenate([problem.observation.probes, markers.places])
     return replace(problem, observation=replace(problem.observation, probes=probes))
 
 
+def _refuse_beyond(problem: Problem, moved: Floats, where: str, lines: Sequence[int] = ()) -> None:
+    """ValueError for a displacement [m] of (k, ...) that is longer than the organ."""
+    longest = float(np.linalg.norm(np.ptp(problem.geometry.mesh.points, axis=0)))
+    length = np.linalg.norm(moved.reshape(len(moved), -1), axis=1)
+    worst = int(length.argmax())
+    if length[worst] > longest:
+        line = f"line {lines[worst]}: " if lines else ""
+        raise ValueError(
+            f"{where}: {line}a displacement of {length[worst]:.4g} m in an organ that is "
+            f"{longest:.3g} m across; give metres"
+        )
+
+
 def probe_number(problem: Problem, name: str | None) -> int:
-    """Number of a control point, by default the one nearest to the tool; ValueError for none."""
+    """Number of a control point, by default the nearest to the tool; ValueError if unknown."""
     if name is None:
         known = problem.observation.probes[: len(problem.probes)]
         return int(np.linalg.norm(known - problem.tool.centre, axis=1).argmin())
@@ -128,7 +142,7 @@ def probe_number(problem: Problem, name: str | None) -> int:
 
 
 def refuse_unanswered(problem: Problem, curve: Curve) -> None:
-    """ValueError for a force without a tool that is moved, or times that are not simulated."""
+    """Raise ValueError for a force without a moved tool, or times that are not simulated."""
     if curve.column == "force_N" and not problem.rigid_tools:
         raise ValueError(
             "force_N: the scene's tool is driven by force; give a curve of displacement_m, or "
@@ -140,10 +154,12 @@ def refuse_unanswered(problem: Problem, curve: Curve) -> None:
             f"time_s: {curve.times[0]:g} to {curve.times[-1]:g} s is not within the {last:g} s "
             "simulated; enlarge time.duration or shorten the curve"
         )
+    if curve.column == "displacement_m":
+        _refuse_beyond(problem, curve.values, curve.column, curve.lines)
 
 
 def seen(problem: Problem, trajectory: Trajectory, curve: Curve, probe: int) -> Floats:
-    """What a motion says at the times of a curve (k,); nan after it diverged."""
+    """The motion at the times of a curve (k,); nan after it diverged."""
     if curve.column == "force_N":
         tool = problem.rigid_tools[0]
         values = -(trajectory.tool_force[:, 0] @ tool.axis)
@@ -154,16 +170,16 @@ def seen(problem: Problem, trajectory: Trajectory, curve: Curve, probe: int) -> 
 
 @dataclass(frozen=True)
 class Coarser:
-    """A model's motions on coarser meshes or lattices, coarse to fine; their sizes over its."""
+    """A model's motions on coarser meshes or lattices, coarse to fine; their sizes over its own."""
 
     motions: tuple[Trajectory, ...]
     sizes: tuple[float, ...]
 
     def own_error(self, found: Floats, read: Callable[[Trajectory], Floats]) -> Floats | None:
-        """Error of values (k, ...) that are read of a motion, by those of the coarser ones.
+        """Error of values (k, ...) read from a motion, estimated from the coarser ones.
 
-        As large as estimated in the root mean square, and of the shape of the last change. None
-        without a coarser one, or where one diverged.
+        Its root mean square is the estimate, and its shape that of the last change. None without a
+        coarser motion, or where one diverged.
         """
         if not self.motions:
             return None
@@ -191,7 +207,7 @@ def coarser(model: Model, problem: Problem) -> Coarser:
 
 
 def _coarser_settings(model: Model, problem: Problem) -> Iterator[tuple[dict[str, float], float]]:
-    """What to vary, and the size of elements or cells over the model's own, coarse to fine."""
+    """Settings, and the size of elements or cells over the model's own, coarse to fine."""
     lattice, levels = getattr(model, "lattice", None), problem.geometry.level
     base = levels(0)
     for step in (2, 1):
@@ -210,7 +226,7 @@ def _simulated(model: Model, problem: Problem, settings: dict[str, float]) -> Si
 
 
 def _of_curve(name: str, curve: Curve, label: str, found: Floats, own: Floats | None) -> Comparison:
-    """Root mean squares of the measured curve and of what the model is off."""
+    """Root mean squares of the measured curve and of the model's difference from it."""
     spread = curve.uncertainty
     return Comparison(
         problem=NAME,
@@ -227,8 +243,8 @@ def _of_curve(name: str, curve: Curve, label: str, found: Floats, own: Floats | 
     )
 
 
-def _of_markers(markers: OwnMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
-    """The same of the markers when the load is largest."""
+def _of_markers(markers: UserMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
+    """The same for the markers when the load is largest."""
     spread = markers.uncertainty
     return Comparison(
         problem=NAME,
@@ -246,5 +262,5 @@ def _of_markers(markers: OwnMarkers, label: str, moved: Floats, own: Floats | No
 
 
 def _rms(values: Floats) -> float:
-    """Of numbers (k,), or of the lengths of vectors (k, 3)."""
+    """Root mean square of numbers (k,), or of the lengths of vectors (k, 3)."""
     return float(np.sqrt((values**2).sum() / len(values)))

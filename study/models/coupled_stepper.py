@@ -18,10 +18,11 @@ Floats = NDArray[np.float64]
 
 
 class Frame:
-    """So many steps of a motion in a subspace as one: the same, but for rounding.
+    """Several steps of a motion in a subspace as one, with the same result but for rounding.
 
-    A step takes a mode from y to A y + b f + c f', f and f' its load at either end. So a frame of n
-    takes it to A^n y and a weighted sum of its loads at the ends of all steps.
+    A step takes a modal coordinate from y to A y + b f + c f', with the loads f and f' at its ends.
+    A frame of n steps therefore takes it to A^n y plus a weighted sum of the loads at the ends of
+    all steps.
     """
 
     def __init__(self, motion: SubspaceMotion, damping: RayleighDamping, count: int) -> None:
@@ -46,12 +47,12 @@ class Frame:
         motion.time += motion.step * self.count
 
 
-class Together:
-    """A nonlinear lattice, itself linear, and linear elements, at rest and then by the same steps.
+class CoupledStepper:
+    """A nonlinear lattice, its linearisation, and linear elements, advanced by the same steps.
 
-    `lattice` is the first, with its `step` [s]. The displacement of the mesh's vertices is made
-    when it is asked for, and at the end of every frame. Until then the linear parts wait: many
-    steps at once cost them little more than one.
+    `lattice`: the nonlinear lattice with its `step` [s]. The displacement of the mesh's vertices is
+    computed on request, and at the end of every frame. The linear parts are advanced only then,
+    since many of their steps at once cost little more than one.
     """
 
     def __init__(
@@ -66,36 +67,39 @@ class Together:
         self.reduced = remainder.linear()
         self.linear = remainder.linear_motion(self.reduced)
         self.every, self.waiting = max(1, round(1.0 / (FRAME_RATE * self.step))), 0
+        self.delivered: Floats | None = None
         self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
         self.frame = Frame(self.elements, damping, self.every)
+        self.start = shape.start - shape.weights @ remainder.start
         below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
         own = shape.subspace.vectors @ self.elements.modes
         shapes = np.hstack([own, -below.reshape(len(own), -1)])
-        # In single precision: they are read once a frame, and drive all else out of the cache.
+        # Single precision: read once a frame, they would evict everything else from the cache.
         self.shapes = np.asfortranarray(shapes, dtype=np.float32)
 
     @property
     def unknowns(self) -> int:
-        """Components of the lattice's displacement, and coordinates of either linear part."""
+        """Displacement components of the lattice, plus the coordinates of both linear parts."""
         among = self.reduced.squares.size + self.shape.subspace.load.size
         return int(self.lattice.unknowns + among)
 
     def take_step(self) -> None:
-        """Take one step with all that a run does between steps."""
+        """Take one step, including the work that a run does between steps."""
         self.take_steps(1)
 
     def take_steps(self, count: int) -> None:
-        """Take so many steps with all that a run does between steps."""
+        """Take `count` steps, including the work that a run does between steps."""
         while count > 0:
             taken = min(count, self.every - self.waiting)
             self.lattice.take_steps(taken)
+            self.delivered = None
             self.waiting += taken
             count -= taken
             if self.waiting >= self.every:
                 self.displacement()
 
     def _catch_up(self) -> None:
-        """Bring the linear parts to where the lattice is."""
+        """Advance the linear parts to the time of the lattice."""
         if self.waiting:
             self.linear.advance(self.waiting, self.step)
             if self.waiting == self.every:
@@ -105,21 +109,24 @@ class Together:
             self.waiting = 0
 
     def displacement(self) -> Floats:
-        """Of the vertices of the elements' mesh [m] (v, 3), as they are now."""
-        self._catch_up()
-        coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
-        linear = self.shapes @ coordinates.astype(np.float32)
-        return np.asarray(linear.reshape(-1, 3) + self.shape.weights @ self.lattice.displacement())
+        """Displacement [m] (v, 3) of the vertices of the elements' mesh, at the current time."""
+        if self.delivered is None:  # a frame that has just ended has delivered it
+            self._catch_up()
+            coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
+            linear = (self.shapes @ coordinates.astype(np.float32)).reshape(-1, 3)
+            nonlinear = self.shape.weights @ self.lattice.displacement()
+            self.delivered = self.start + linear + nonlinear
+        return self.delivered
 
     def restart(self) -> None:
-        """Put all parts at rest again."""
+        """Return all parts to rest."""
         self.lattice.restart()
         self.linear.restart()
         self.elements.restart()
-        self.waiting = 0
+        self.waiting, self.delivered = 0, None
 
     def stepper(self) -> Stepper:
-        """As a model gives it."""
+        """The stepper of the model."""
         return Stepper(
             self.take_step,
             self.displacement,

@@ -1,4 +1,4 @@
-"""The problem of a scene as far as its results tell it, so that it need not be built again."""
+"""What the results keep of a scene's problem, so that a cached run need not build it again."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from study.problem.response import Response
 from study.progress import Progress
 from study.results.records import Dimensionless
 from study.run.dimensionless import dimensionless
-from study.run.watched import Watched, to_watch, watched
+from study.run.visual_output import VisualOutput, visual_output, with_visual_output
 from study.scene import Scene
 from study.scene.part import without
 from study.scene.problem import problem_of
-from study.stages.fingerprint import text
+from study.stages.fingerprint import fingerprint
 
 Floats = NDArray[np.float64]
 
-BLIND_TO = (
+MODEL_KEYS = (
     *("patient", "fuzzy", "lattice", "damping", "basafa", "superposition"),
     *("corrected", "region"),
     *(f"reference.{key}" for key in ("element", "accuracy", "method", "modes")),
     *("reference.steps_per_sample", "reference.large_strain"),
 )
-"""Tables and keys of a scene that the problem is posed without: those of its models."""
+"""Tables and keys of a scene that concern its models alone and not the problem."""
 
 
 @dataclass(frozen=True)
-class Posed:
-    """What is seen of a problem: where, on which surface, and of which mesh (by its SHA-256).
+class ProblemRecord:
+    """What the results and their figures need of a problem.
 
-    `inclusions` [m] (regions, points, 3): points of the surface of each; `ways` [m] (tools, places,
-    3): of tools that travel; `watched`: for pictures.
+    `mesh`: SHA-256 of the tetrahedra; `inclusions` [m] (regions, points, 3): points on the surface
+    of each; `travel_paths` [m] (tools, places, 3): of the tools that travel; `visual_output`: where
+    the models record fields for figures.
     """
 
     response: Response
@@ -47,43 +48,43 @@ class Posed:
     dimensionless: Dimensionless
     mesh: str
     inclusions: Floats
-    ways: Floats
-    watched: Watched
+    travel_paths: Floats
+    visual_output: VisualOutput
 
 
 @dataclass(frozen=True, eq=False)
-class Posing:
-    """A scene whose problem is built when it is asked for, once, of no more than it depends on."""
+class ProblemBuilder:
+    """Builds the problem of a scene when it is first needed, from no more than it depends on."""
 
     scene: Scene
     progress: Progress
 
     @property
     def part(self) -> Scene:
-        """What the problem is made of."""
-        return without(self.scene, BLIND_TO)
+        """The scene without the tables that concern its models alone."""
+        return without(self.scene, MODEL_KEYS)
 
     @cached_property
-    def stated(self) -> Problem:
-        """The organ with support, tool and probes. ValueError naming the key that does not fit."""
+    def without_visuals(self) -> Problem:
+        """The problem as the scene states it. ValueError naming the key that does not fit."""
         with self.progress.stage("organ"):
             return problem_of(self.part)
 
     @cached_property
-    def watched(self) -> Watched:
-        """What its pictures show."""
-        return watched(self.stated)
+    def visual_output(self) -> VisualOutput:
+        """Where the models record fields for figures."""
+        return visual_output(self.without_visuals)
 
     @cached_property
     def problem(self) -> Problem:
-        """The same, looked at for its pictures too."""
-        return to_watch(self.stated, self.watched)
+        """The problem whose observation also covers the figures."""
+        return with_visual_output(self.without_visuals, self.visual_output)
 
-    def posed(self) -> Posed:
-        """What is seen of it."""
+    def problem_record(self) -> ProblemRecord:
+        """The part of the problem that the results keep."""
         problem = self.problem
         surface, tool = problem.geometry.surface, problem.tool
-        return Posed(
+        return ProblemRecord(
             problem.response,
             surface.points,
             surface.triangles,
@@ -93,11 +94,11 @@ class Posing:
             dimensionless(self.scene, problem),
             self.mesh,
             problem.inclusions,
-            problem.ways,
-            self.watched,
+            problem.travel_paths,
+            self.visual_output,
         )
 
     @property
     def mesh(self) -> str:
-        """SHA-256 of the mesh that all integrals are over: some meshers make another each time."""
-        return text(self.problem.geometry.mesh)
+        """SHA-256 of the tetrahedra: some meshers produce different ones in every call."""
+        return fingerprint(self.problem.geometry.mesh)

@@ -1,8 +1,8 @@
-"""Dataclasses as plain values and arrays apart, and made of them again by their annotations.
+"""Dataclasses as plain JSON values and arrays, and back by their type annotations.
 
-A plain value is what JSON can say. An array stands in it as its name among the arrays, a number
-that is not finite, which JSON cannot say, as its text. What is made again is of the kind that the
-reader asks for, never of one that the text names.
+An array is represented by its name among the arrays, and a number that is not finite, for which
+JSON has no notation, by its text. The type of a restored value is the one that the reader requests,
+never one that the stored text names.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NUMERIC = (bool, int, float)
 def flattened(thing: object) -> tuple[Any, Arrays]:
     """A plain value of nested dataclasses, tuples and dictionaries, and the arrays in it.
 
-    TypeError for what is none of these, nor a number, a text, an array or None.
+    TypeError for anything else than these, numbers, texts, arrays and None.
     """
     arrays: Arrays = {}
     return _plain(thing, arrays), arrays
@@ -58,7 +58,7 @@ def _of_many(thing: object, arrays: Arrays) -> Any:
 
 
 def restored(kind: type[Value], plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Value:
-    """A value of a kind from what `flattened` gave. ValueError where it is none of that kind."""
+    """A value of type `kind` from the output of `flattened`. ValueError if it has another type."""
     try:
         found: Value = _made(kind, plain, arrays)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

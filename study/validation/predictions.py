@@ -1,9 +1,9 @@
-"""What each kind of model answers to a specimen: displacements and the force, along a path.
+"""Predictions of each kind of model for a specimen: displacements and force along a load path.
 
-All are at rest. The two finite-element models have the same quadratic elements with a pressure of
-their own, linear and neo-Hookean. The lattices follow their deformation: linear springs with
-Poisson's ratio 1/4, the same with the volume term that gives the material's, and springs of the
-Basafa benchmark in proportion to the material's modulus.
+All are at rest. The two finite-element models share mixed quadratic elements with a pressure field,
+linear and neo-Hookean. The lattices are nonlinear in the displacement: linear springs with
+Poisson's ratio 1/4, the same with the volume term that gives the material's ratio, and springs of
+the Basafa benchmark scaled to the material's modulus.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Answer:
-    """States at the `factors` (k,) that were reached; `failure` says why there are no more.
+class Prediction:
+    """States at the load `factors` (k,) that were reached; `failure` states why there are no more.
 
-    `displacement` [m] (k, q, 3) at the points watched; `force` [N] (k,) of the whole body on the
-    plane whose reaction is read, along its axis; `unknowns`: displacements and pressures.
+    `displacement` [m] (k, q, 3) at the observed points; `force` [N] (k,): reaction of the whole
+    body on the specimen's plane, along its axis; `unknowns`: number of displacements and pressures.
     """
 
     factors: Floats
@@ -60,25 +60,27 @@ class Answer:
     failure: str = ""
 
 
-Solve = Callable[[Specimen, int, float, tuple[float, ...]], Answer]
-"""From a specimen, the number of its mesh or spacing, Young's modulus [Pa] and the factors."""
+Solve = Callable[[Specimen, int, float, tuple[float, ...]], Prediction]
+"""From a specimen, the number of its mesh or spacing, Young's modulus [Pa] and the load factors."""
 
 
 def neo_hookean(
     specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
-) -> Answer:
+) -> Prediction:
     """Finite elements at large strain."""
     solid, loading, watched = _elements(specimen, level, modulus)
     path = equilibrium_path(solid, loading, factors)
-    return _told(specimen, solid, watched, path.states, path.failure)
+    return _prediction(specimen, solid, watched, path.states, path.failure)
 
 
-def linear(specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]) -> Answer:
-    """Finite elements of linear elasticity: one solution, in proportion."""
+def linear(
+    specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
+) -> Prediction:
+    """Finite elements of linear elasticity: one solution, scaled."""
     solid, loading, watched = _elements(specimen, level, modulus)
-    whole = _told(specimen, solid, watched, (solve_linear(solid, loading),), "")
+    whole = _prediction(specimen, solid, watched, (solve_linear(solid, loading),), "")
     share = np.array(factors)
-    return Answer(
+    return Prediction(
         share,
         share[:, None, None] * whole.displacement,
         share * whole.force,
@@ -87,7 +89,7 @@ def linear(specimen: Specimen, level: int, modulus: float, factors: tuple[float,
 
 
 def neo_hookean_frequency(specimen: Specimen, level: int, modulus: float) -> float:
-    """Of free motion of small amplitude about the loaded rest [Hz]; nan where there is none."""
+    """Frequency [Hz] of small vibrations about the loaded rest; nan if there is no rest."""
     solid, loading, _ = _elements(specimen, level, modulus)
     path = equilibrium_path(solid, loading)
     if not path.converged:
@@ -96,7 +98,7 @@ def neo_hookean_frequency(specimen: Specimen, level: int, modulus: float) -> flo
 
 
 def linear_frequency(specimen: Specimen, level: int, modulus: float) -> float:
-    """The same of linear elasticity, whatever the rest."""
+    """Frequency [Hz] of vibrations of linear elasticity, which does not depend on the rest."""
     solid, loading, _ = _elements(specimen, level, modulus)
     return natural_frequency.lowest_frequency(solid, loading, specimen.density)
 
@@ -120,17 +122,17 @@ def _nothing(solid: MixedSolid) -> csr_array:
     return csr_array((0, len(solid.points)))
 
 
-def _told(
+def _prediction(
     specimen: Specimen,
     solid: MixedSolid,
     watched: csr_array,
     states: tuple[EquilibriumState, ...],
     failure: str,
-) -> Answer:
+) -> Prediction:
     face, axis = specimen.face(solid.points), specimen.along[0]
     moved = [watched @ state.displacement for state in states]
     force = [specimen.parts * state.reaction[face, axis].sum() for state in states]
-    return Answer(
+    return Prediction(
         np.array([state.factor for state in states]),
         np.reshape(moved, (len(states), watched.shape[0], 3)),
         np.array(force),
@@ -140,7 +142,7 @@ def _told(
 
 
 class _Springs(NamedTuple):
-    """Law of springs, and the modulus [Pa] that a volume term goes with; none without a term."""
+    """Law of the springs, and the modulus [Pa] of a volume term; None without the term."""
 
     law: Law
     modulus: float | None
@@ -155,13 +157,13 @@ def springs(specimen: Specimen, level: int, modulus: float) -> _Springs:
 
 
 def springs_and_volume(specimen: Specimen, level: int, modulus: float) -> _Springs:
-    """The same with the volume term that makes up for the material's Poisson's ratio."""
+    """Linear springs with the volume term that gives the material's Poisson's ratio."""
     k = reference_stiffness(modulus, specimen.spacings[level], specimen.poisson_ratio)
     return _Springs(Hooke(k), modulus)
 
 
 def basafa(specimen: Specimen, level: int, modulus: float) -> _Springs:
-    """Springs of the benchmark's law with its own ratio of constants, at the modulus given."""
+    """Springs of the benchmark's law with its own ratio of constants, scaled to the modulus."""
     table, k = BasafaConstants(), reference_stiffness(modulus, specimen.spacings[level])
     return _Springs(in_proportion(k, table.k2 / table.k1, table.x_c), None)
 
@@ -184,8 +186,8 @@ def _network(specimen: Specimen, level: int, chosen: _Springs) -> tuple[CellLatt
 
 def of_lattice(
     make: Make, specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
-) -> Answer:
-    """Rests of a lattice."""
+) -> Prediction:
+    """Rest states of a lattice."""
     chosen = make(specimen, level, modulus)
     lattice, net = _network(specimen, level, chosen)
     found = displacement_control.equilibrium_path(
@@ -195,7 +197,7 @@ def of_lattice(
     watched, _ = lattice.interpolation(specimen.watched)
     moved = [watched @ rest.displacement for rest in found.states]
     force = [specimen.parts * rest.reaction[face, axis].sum() for rest in found.states]
-    return Answer(
+    return Prediction(
         np.array([rest.factor for rest in found.states]),
         np.reshape(moved, (len(found.states), len(specimen.watched), 3)),
         np.array(force),
@@ -205,7 +207,7 @@ def of_lattice(
 
 
 def lattice_frequency(make: Make, specimen: Specimen, level: int, modulus: float) -> float:
-    """Of free motion of small amplitude about the loaded rest [Hz]; nan where there is none."""
+    """Frequency [Hz] of small vibrations about the loaded rest; nan if there is no rest."""
     chosen = make(specimen, level, modulus)
     lattice, net = _network(specimen, level, chosen)
     prescribed = specimen.prescribed(lattice.nodes)
@@ -219,10 +221,10 @@ def lattice_frequency(make: Make, specimen: Specimen, level: int, modulus: float
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of model: how it is called in tables, its answer, and how it vibrates.
+    """A kind of model: its name in tables, its prediction, and its vibration.
 
-    `elements` or a lattice. `frequency` [Hz] is that of the slowest free motion about the loaded
-    rest, by specimen, number of the mesh or spacing, and Young's modulus [Pa].
+    `elements`: whether it has finite elements or is a lattice. `frequency` [Hz]: lowest frequency
+    about the loaded rest, by specimen, number of the mesh or spacing, and Young's modulus [Pa].
     """
 
     label: str
@@ -242,4 +244,4 @@ KINDS: dict[str, Kind] = {
     "volume": _lattice("springs and volume term", springs_and_volume),
     "basafa": _lattice("Basafa's law, scaled", basafa),
 }
-"""Kinds of models by name, as the command and the tables have them."""
+"""Kinds of models by name, as used by the command and the tables."""

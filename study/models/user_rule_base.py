@@ -1,4 +1,4 @@
-"""Estimates of stiffness by a fuzzy system of one's own, which a scene names by its file."""
+"""Stiffness estimates by a fuzzy system of the user's, which a scene names by its file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from study.scene.answer_units import UNITS
 Floats = NDArray[np.float64]
 
 FINER = 10
-"""Times as many samples, to tell the error of those that are taken."""
+"""Factor on the number of samples that estimates the sampling error of an answer."""
 SOFTEST, STIFFEST = 10.0, 1e7
 """[Pa] Beyond which an answer is no stiffness of soft tissue in the unit that is stated."""
 
@@ -36,11 +36,11 @@ def system_of(scene: Scene) -> FuzzySystem:
         raise ValueError(f"fuzzy.rule_base: {error}") from error
 
 
-def own_estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
-    """Estimate by each kind of system that the scene names.
+def user_estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
+    """The estimate by each kind of system that the scene names.
 
-    ValueError naming the key: for readings that are not those of the system's inputs, a kind that
-    it cannot be evaluated as, and an answer that is no stiffness.
+    ValueError naming the key: for readings that are not the inputs of the system, for a kind of
+    inference that it does not support, and for an answer that is no stiffness of soft tissue.
     """
     system = system_of(scene)
     row = _row(system, scene.fuzzy.inputs)
@@ -93,7 +93,7 @@ def _interval(found: Inferred, factor: float) -> tuple[float, float] | None:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On the fuzzy system of one's own."""
+    """On the user's fuzzy system."""
     system = system_of(scene)
     given = ", ".join(f"{name} = {value:g}" for name, value in scene.fuzzy.inputs.items())
     return [

@@ -1,12 +1,12 @@
-"""A blunt tool that travels over the surface: patches at stations on its way that take turns.
+"""A blunt tool that travels over the surface: fixed patches at stations on its path, in turn.
 
-The share of each station is a cardinal cubic spline of the place along a straight piece of the way
-(de Boor 1978, A Practical Guide to Splines, chapter 4; ends without a knot next to them), one at
-its own station and zero at all others. Together they repeat polynomials up to the third degree, so
-that on a flat surface the force, its centre and its second and third moment along the way are those
-of the tool itself at all times; what is left falls with the fourth power of the distance of
-stations, with hat functions by the second. At its rim the pressure pulls a little, by 0.6 % of the
-force at the distance in use.
+The share of each station is a cardinal cubic spline in the arc length of a straight piece of the
+path (de Boor 1978, A Practical Guide to Splines, chapter 4; not-a-knot ends), one at its own
+station and zero at all others. Together they reproduce cubic polynomials. On a flat surface the
+force, its centre and its second and third moment along the path are therefore those of the tool at
+all times. The remaining error falls with the fourth power of the distance of stations, with hat
+functions by the second. At its rim the pressure is slightly negative, by 0.6 % of the force at the
+distance in use.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 APART = 0.25
-"""Distance of stations, at most, in radii of the tool: `reports/data/travelling_stations.csv`."""
+"""Largest distance of stations, in radii of the tool: `reports/data/travelling_stations.csv`."""
 MEASURED = 0.002
-"""Larger than what such stations were off in the displacement under the tool, in the same table."""
+"""Bound on the error of the displacement under the tool with such stations, same table."""
 DEGREE = 3
 MOST = 200
-"""Stations: each is a load of its own, which every step of a lattice adds up."""
+"""Largest number of stations: each is a load that every step of a lattice adds up."""
 OUTLINE = 33
-"""Places by which a way is drawn."""
+"""Number of places by which a path is drawn."""
 SAME = 1e-6
 """Distance, in radii, below which two stations are one that the tool passes twice."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Share of one station along a straight piece between two marks [m] of the way."""
+    """Share of one station along a straight piece between two marks [m] of the path."""
 
     first: float
     last: float
@@ -46,11 +46,11 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
-    """The factor of a station: its share of the tool, wherever that is, times the tool's history.
+class StationFactor:
+    """Load factor of a station: its share of the tool times the tool's history.
 
-    `times` [s] and `marks` [m] (c,): when the tool is how far on its way, linear in between, at
-    rest before and after. `history`: share of the tool's force at times [s].
+    `times` [s] and `marks` [m] (c,): arc length travelled over time, linear in between and constant
+    before and after. `history`: share of the tool's force at times [s].
     """
 
     times: Floats
@@ -59,7 +59,7 @@ class Turn:
     history: Callable[[Floats], Floats]
 
     def share(self, times: Floats) -> Floats:
-        """Of the tool's pressure, what stands at the station at times [s]; the shape of `times`."""
+        """Share of the tool's pressure at the station at times [s]; the shape of `times`."""
         at = np.asarray(np.interp(times, self.times, self.marks))
         found = np.zeros_like(at)
         for one in self.pieces:
@@ -68,13 +68,13 @@ class Turn:
         return found
 
     def __call__(self, times: Floats) -> Floats:
-        """Share of the tool's whole force at times [s]."""
+        """Share of the tool's full force at times [s]."""
         return np.asarray(self.share(times) * self.history(times))
 
 
 @dataclass(frozen=True)
 class Stations:
-    """Marks [m] (k,) of stations along a way, and where they are across the push [m] (k, 3).
+    """Arc lengths [m] (k,) of stations on a path, and their places across the push [m] (k, 3).
 
     `pieces` (p, 2): numbers of the first and last station of each straight piece.
     """
@@ -84,7 +84,7 @@ class Stations:
     pieces: tuple[tuple[int, int], ...]
 
     def shares(self) -> list[list[Piece]]:
-        """Of each station, on the pieces that it is a station of."""
+        """For each station, its share on each of its pieces."""
         from scipy.interpolate import make_interp_spline
 
         found: list[list[Piece]] = [[] for _ in self.marks]
@@ -97,9 +97,10 @@ class Stations:
 
 
 def stations(corners: Floats, distance: float) -> tuple[Stations, Floats]:
-    """Stations at most a `distance` [m] apart on straight pieces between corners [m] (c, 3).
+    """Stations at most `distance` [m] apart on straight pieces between corners [m] (c, 3).
 
-    And marks (c,) of the corners. ValueError for a way without length, or of too many stations.
+    Also the arc lengths (c,) of the corners. ValueError for a path without length, or too many
+    stations.
     """
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     marks, away, pieces = [0.0], [corners[0]], []
@@ -121,37 +122,40 @@ def stations(corners: Floats, distance: float) -> tuple[Stations, Floats]:
     return found, np.concatenate([[0.0], np.cumsum(lengths)])
 
 
-def turns(
+def station_loads(
     found: Stations,
     places: Floats,
     times: Floats,
     marks: Floats,
     history: Callable[[Floats], Floats],
     same: float,
-) -> Iterator[tuple[Floats, Turn]]:
-    """Place [m] (3,) and factor of each station, of those less than `same` [m] apart as one."""
+) -> Iterator[tuple[Floats, StationFactor]]:
+    """Place [m] (3,) and load factor of each station, merging those closer than `same` [m]."""
     shares, left = found.shares(), list(range(len(places)))
     while left:
         here = places[left[0]]
         at = [n for n in left if np.linalg.norm(places[n] - here) < same]
         left = [n for n in left if n not in at]
-        yield here, Turn(times, marks, tuple(one for n in at for one in shares[n]), history)
+        yield (
+            here,
+            StationFactor(times, marks, tuple(one for n in at for one in shares[n]), history),
+        )
 
 
-def ways(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
+def travel_paths(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]) -> Floats:
     """Places [m] (tools, OUTLINE, 3), equally spaced in time, of each tool that travels.
 
     `loads`: name of the tool, place [m] (3,) and factor of each load.
     """
-    stations: dict[str, list[tuple[Floats, Turn]]] = {}
+    stations: dict[str, list[tuple[Floats, StationFactor]]] = {}
     for name, place, factor in loads:
-        if isinstance(factor, Turn):
+        if isinstance(factor, StationFactor):
             stations.setdefault(name, []).append((place, factor))
     found = [_outline(one) for one in stations.values()]
     return np.stack(found) if found else np.zeros((0, OUTLINE, 3))
 
 
-def _outline(stations: Sequence[tuple[Floats, Turn]]) -> Floats:
+def _outline(stations: Sequence[tuple[Floats, StationFactor]]) -> Floats:
     times = stations[0][1].times
     at = np.linspace(times[0], times[-1], OUTLINE)
     shares = np.column_stack([turn.share(at) for _, turn in stations])
@@ -159,8 +163,9 @@ def _outline(stations: Sequence[tuple[Floats, Turn]]) -> Floats:
 
 
 def full_share(history: Callable[[Floats], Floats], time: float) -> float:
-    """Share of a load at rest in full: all of it, of a station what the tool leaves it at a time.
+    """Share of a load in the full load at rest.
 
-    `time` [s]: at which the tool is where its rest is told.
+    One, or for a station the share it has at `time` [s], when the tool is where its rest is
+    evaluated.
     """
-    return float(history.share(np.array([time]))[0]) if isinstance(history, Turn) else 1.0
+    return float(history.share(np.array([time]))[0]) if isinstance(history, StationFactor) else 1.0

@@ -1,4 +1,4 @@
-"""What a model says beside what was measured, each with its uncertainty."""
+"""A model's prediction beside a measurement, each with its uncertainty."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ import numpy as np
 from fem_reference.error_estimate import discretisation_error
 
 COVERAGE = 2.0
-"""Standard uncertainties within which a difference counts as explained by them."""
+"""Coverage factor: standard uncertainties within which a difference counts as explained."""
 ORDER = 2.0
-"""Highest order of convergence that is believed: edges of faces that are held are singular."""
+"""Largest accepted order of convergence: edges of held faces are singular."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A quantity in its `unit`: measured with its standard uncertainty, and found by a model.
+    """A quantity in its `unit`: measured with its standard uncertainty, and predicted by a model.
 
-    `numerical`: error of the model's own by its meshes or spacings, nan of one alone. `coverage`:
-    uncertainties within which the difference counts as explained, 1 for what noise alone would
-    leave of many readings. `modulus`: Young's modulus [Pa] it was found with, nan where none
-    matters. `fitted`: what of the model was fitted to the measurement. `note`: why a number is
-    missing, or what else is to know.
+    `numerical`: the model's own error by its meshes or spacings, nan for a single one. `coverage`:
+    the coverage factor, 1 where the residual of many readings is compared with their noise.
+    `modulus`: the Young's modulus [Pa] used, nan where it has no effect. `fitted`: what was fitted
+    to the measurement. `note`: why a number is missing, or a further remark.
     """
 
     problem: str
@@ -49,7 +48,7 @@ class Comparison:
 
     @property
     def judged(self) -> bool:
-        """Whether there is a number, and an uncertainty to hold its difference to."""
+        """Whether there is a number, and an uncertainty to compare its difference with."""
         return self.answered and math.isfinite(self.uncertainty)
 
     @property
@@ -65,7 +64,7 @@ class Comparison:
 
 
 def own_error(values: Sequence[float], sizes: Sequence[float]) -> float:
-    """Error of the last of values on meshes coarse to fine, in their unit; nan if not known."""
+    """Error of the last of values on meshes coarse to fine, in their unit; nan if unknown."""
     if len(values) < 2 or not np.isfinite(values).all() or values[-1] == 0.0:
         return math.nan
     used = slice(-3, None)

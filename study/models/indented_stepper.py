@@ -1,4 +1,4 @@
-"""A lattice stepped from where its tools are deepest, where a step costs most."""
+"""Steps of a lattice from the state of deepest indentation, where a step costs most."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from msm.stepper import LatticeStepper, State
 from msm.timestep import LOOK
 
 
-class AtDepth:
-    """Steps of a lattice from rest until `restart`, which puts it where its tools are deepest.
+class IndentedStepper:
+    """Steps of a lattice from rest until `restart`, then from its deepest indentation.
 
-    `at` [s]: when they are; `step`: the step [s] for a critical one [s]. What is touched is stopped
-    in every step, and a step from rest would leave that out. The way there is gone once.
+    `at` [s]: time of the deepest indentation; `step`: maps a critical step [s] to the step [s]
+    taken. Contact is resolved in every step, a cost that steps from rest would omit. The motion up
+    to the indentation is computed once.
     """
 
     def __init__(self, motion: LatticeStepper, at: float, step: Callable[[float], float]) -> None:
@@ -21,15 +22,15 @@ class AtDepth:
         self.deepest: State | None = None
 
     def take_step(self) -> None:
-        """Take one step, with what a run does between steps."""
+        """Take one step, including the work that a run does between steps."""
         self.motion.take_step(self.dt)
 
     def advance(self, count: int) -> None:
-        """Take so many steps and nothing else."""
+        """Take `count` steps without the work between them."""
         self.motion.advance(count, self.dt)
 
     def restart(self) -> None:
-        """Put the lattice where the tools are deepest."""
+        """Return the lattice to the state of deepest indentation."""
         motion = self.motion
         if self.deepest is None:
             motion.restart()

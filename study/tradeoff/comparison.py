@@ -1,8 +1,8 @@
-"""What configurations are compared with: the scene's reference, or the finest lattice they have.
+"""What configurations are compared with: the scene's reference, or the finest lattice of a family.
 
-Under tools that are moved the scene's finite elements are the reference where the scene names them
-and they follow to the end with a known error. Else each lattice is compared with a finer one of the
-same springs, which tells its discretisation alone; that is told beside the reference too.
+Under moved tools the reference is the scene's finite elements, if the scene names them and they
+finish with a known error. Otherwise each lattice is compared with a finer one of the same springs,
+which gives its discretisation error alone; that error is also reported beside the reference.
 """
 
 from __future__ import annotations
@@ -14,37 +14,37 @@ import numpy as np
 
 from study.models.lattice import LatticeModel
 from study.models.spacing_error import COARSER, ORDER, force_differences
-from study.run.stated import Stated
+from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.similarity.fields import relative_l2, relative_l2_of_curves
 from study.sweep.canonical import restored
 from study.sweep.runner import Outcome
+from study.tradeoff.contenders import Configuration, contender, fraction
 from study.tradeoff.errors import Errors, errors
-from study.tradeoff.lineup import Configuration, contender, fraction
 from study.tradeoff.observation import Observed
-from study.tradeoff.reference import SolvedReference, Truth
+from study.tradeoff.reference import ReferenceSolution, SolvedReference
 
 FINEST = 0.5
-"""Spacing of the lattice that others are compared with, times that of the scene's own lattice."""
+"""Spacing of the lattice that others are compared with, over that of the scene's own lattice."""
 Family = tuple[str, bool]
 """Lattices of the same springs: the kind of their model, and whether they have a volume term."""
 
 
 @dataclass(frozen=True)
-class Judge:
-    """The reference, None where there is none to compare with, and the finest lattices.
+class Comparison:
+    """The reference, None if there is none to compare with, and the finest lattices.
 
-    `solved`: the record of the reference; `why` there is none, if it was asked for.
+    `solved`: the record of the reference; `why`: the reason why a requested reference is missing.
     """
 
-    given: Stated
-    reference: Truth | None
+    given: SceneProblem
+    reference: ReferenceSolution | None
     solved: SolvedReference | None
-    finest: Mapping[Family, Truth]
+    finest: Mapping[Family, ReferenceSolution]
     why: str = ""
 
-    def truth(self, one: Configuration) -> Truth:
-        """What a configuration is compared with."""
+    def truth(self, one: Configuration) -> ReferenceSolution:
+        """The reference solution for a configuration."""
         return self.finest[family(one)] if self.reference is None else self.reference
 
     def errors(self, one: Configuration, outcome: Outcome) -> Errors:
@@ -57,7 +57,7 @@ class Judge:
 
     @property
     def words(self) -> str:
-        """What errors are against, for a person."""
+        """The reference of the errors, in words."""
         if self.reference is not None:
             return "the scene's finite elements" if self.finest else "the converged reference"
         finest = 1e3 * FINEST * self.given.scene.lattice.spacing
@@ -65,17 +65,17 @@ class Judge:
 
 
 def family(one: Configuration) -> Family:
-    """The springs of a lattice."""
+    """The family of a lattice."""
     return contender(one.contender).model, bool(one.settings.get("volume_term", False))
 
 
 def is_lattice(scene: Scene, one: Configuration) -> bool:
-    """Whether it has a spacing that another could be finer than."""
+    """Whether it has a spacing that can be refined."""
     return isinstance(one.model(scene), LatticeModel)
 
 
 def refuse_unlike(scene: Scene, chosen: Iterable[Configuration]) -> None:
-    """ValueError for what is no lattice, of which there is no finer one to compare it with."""
+    """Raise ValueError for a configuration that is no lattice and so has no finer one."""
     for one in chosen:
         if not is_lattice(scene, one):
             raise ValueError(
@@ -85,12 +85,12 @@ def refuse_unlike(scene: Scene, chosen: Iterable[Configuration]) -> None:
 
 
 def is_finest(scene: Scene, one: Configuration) -> bool:
-    """Whether it is what others are compared with."""
+    """Whether it is what others of its family are compared with."""
     return one == _lattice(scene, family(one), FINEST)
 
 
 def lattices(scene: Scene, chosen: Iterable[Configuration]) -> dict[Family, list[Configuration]]:
-    """The finest lattice of each family among those chosen, and the one that tells its error."""
+    """The finest lattice of each family among those chosen, and the one that gives its error."""
     like = (one for one in chosen if is_lattice(scene, one))
     families = dict.fromkeys(family(one) for one in like)
     return {
@@ -100,7 +100,7 @@ def lattices(scene: Scene, chosen: Iterable[Configuration]) -> dict[Family, list
 
 
 def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
-    """As the contenders enter, so that a run is one of them."""
+    """With the settings of the contenders, so that its run is one of theirs."""
     model, volume_term = springs
     spacing, step = times * scene.lattice.spacing, {"step_fraction": fraction(scene)}
     if model != "tissue":
@@ -109,11 +109,11 @@ def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
     return Configuration(name, {"spacing": spacing, "volume_term": volume_term, **step})
 
 
-def truth_of(outcomes: Sequence[Outcome], given: Stated) -> Truth:
-    """The finest lattice of a family as what is compared with, from both runs of `lattices`.
+def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolution:
+    """The finest lattice of a family as reference solution, from both runs of `lattices`.
 
-    Its own errors are what halving the spacing changed, at an assumed order of one. ValueError
-    where one of the two was lost.
+    Its own errors are the changes due to halving the spacing, at an assumed order of one.
+    ValueError where one of the two did not finish.
     """
     finest, coarser = (_whole(one, given) for one in outcomes)
     if finest is None or coarser is None:
@@ -138,14 +138,14 @@ def _said(outcomes: Sequence[Outcome]) -> str:
     return ", ".join(one.message or "diverged" for one in lost)
 
 
-def _whole(outcome: Outcome, given: Stated) -> Truth | None:
-    """What a run gave, as if it were exact; None of one that was lost."""
+def _whole(outcome: Outcome, given: SceneProblem) -> ReferenceSolution | None:
+    """The result of a run, as if it were exact; None if it did not finish."""
     found = None if outcome.value is None else restored(Observed, outcome.value)
     if found is None or found.field is None or found.curves is None or found.inverted_cells:
         return None
     samples, probes = len(given.problem.observation.times), len(given.problem.probes)
     tools = len(given.problem.rigid_tools)
-    return Truth(
+    return ReferenceSolution(
         np.reshape(found.field, (-1, 3)),
         np.reshape(found.curves, (samples, probes, 3)),
         0.0,
