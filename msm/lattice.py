@@ -36,6 +36,9 @@ EXTRAPOLATION = 0.75
 class LatticeMesh(Protocol):
     """What a model needs to know of its lattice, whatever the cells."""
 
+    def __hash__(self) -> int:
+        """Of the object: one lattice is equal to itself alone."""
+
     @property
     def nodes(self) -> Floats:
         """Nodes [m] (n, 3)."""
@@ -55,7 +58,7 @@ class LatticeMesh(Protocol):
         """How many cells are turned inside out by a displacement [m] (n, 3)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CellLattice:
     """Nodes [m] (n, 3); cells (c, 8) of node numbers, corners in the order of CORNERS.
 

@@ -39,7 +39,7 @@ OUTSIDE = 1e-9
 """A barycentric coordinate below minus this is outside, and not on a face up to rounding."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TetrahedralLattice:
     """A mesh as a lattice."""
 

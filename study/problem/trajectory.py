@@ -13,7 +13,7 @@ Status = Literal["finished", "diverged", "not finished"]
 """Not finished: no state was found to go on from, or the means of the run did not suffice."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observation:
     """When and where a model is looked at.
 
