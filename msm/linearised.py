@@ -40,7 +40,7 @@ def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     return rx / length, ry / length, rz / length, along, across
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
     """Set (n,) values [1/s^2], the largest of which is no less than omega_max squared at u.
 
@@ -79,7 +79,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0 - net.swollen[c]) * size
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def farthest(u: Floats) -> tuple[float, int]:
     """Largest component [m] of u (n, 3) and its node; NaN and infinity count as infinite."""
     size, node = 0.0, 0
@@ -92,7 +92,7 @@ def farthest(u: Floats) -> tuple[float, int]:
     return size, node
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def largest_turn(net: Network, u: Floats, before: Floats) -> float:
     """Largest change of a spring's vector over its rest length, between two displacements [m]."""
     largest = 0.0
@@ -105,7 +105,7 @@ def largest_turn(net: Network, u: Floats, before: Floats) -> float:
     return float(np.sqrt(largest))
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def largest_strain(net: Network, u: Floats) -> float:
     """Largest absolute strain of a spring at the displacement u [m] (n, 3)."""
     largest = 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel
 from msm.lattice import LatticeMesh
 from msm.tools import CLOSE, NO_POINT, Contact, meet_tools
 from study.mesh.quadrature import SurfaceRule
@@ -38,7 +38,7 @@ class Outer(NamedTuple):
     contact: Contact | None
 
 
-@kernel()
+@inner_kernel()
 def add_outer_forces(outer: Outer | None, row: Floats, stage: int, force: Floats) -> None:
     """Add dead load and further loads [N] to the force (3, m)."""
     if outer is None:
@@ -52,7 +52,7 @@ def add_outer_forces(outer: Outer | None, row: Floats, stage: int, force: Floats
             force[d, outer.place[i]] += pushed
 
 
-@kernel()
+@inner_kernel()
 def stop_at_tools(outer: Outer | None, row: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Let the tools stop what entered them in a step of dt [s]; the motion is (3, m)."""
     if outer is None:

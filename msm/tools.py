@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import inner_kernel, kernel
+from msm.kernel import inner_kernel
 from msm.kinematics import dot
 from study.problem.rigid import PLATE, SPHERE
 
@@ -120,7 +120,7 @@ def standing(contact: Contact | None) -> Standing:
     return Standing(contact.push, contact.before, contact.due, contact.sums, contact.force)
 
 
-@kernel()
+@inner_kernel()
 def meet_tools(contact: Contact | None, moves: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Correct the motion, (3, m), at the end of a step of dt [s] in which the tools moved.
 
@@ -270,7 +270,7 @@ def set_give(contact: Contact, p: int, a: int, dt: float, u: Floats) -> None:
     contact.give[a] = give
 
 
-@kernel()
+@inner_kernel()
 def solve(contact: Contact, moves: Floats, count: int, dt: float) -> None:
     """Find the impulses of the points that take part, and the velocities they add to nodes."""
     for a in range(count):
