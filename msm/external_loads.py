@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel
 from msm.lattice import LatticeMesh
 from msm.tool_contact import ACTIVATION_GAP, BEYOND, Contact, resolve_contact
 from study.mesh.quadrature import SurfaceRule
@@ -38,7 +38,7 @@ class ExternalArrays(NamedTuple):
     contact: Contact | None
 
 
-@kernel()
+@inner_kernel()
 def add_external_forces(
     external: ExternalArrays | None, row: Floats, stage: int, force: Floats
 ) -> None:
@@ -54,7 +54,7 @@ def add_external_forces(
             force[d, external.place[i]] += total
 
 
-@kernel()
+@inner_kernel()
 def apply_tool_contact(
     external: ExternalArrays | None, row: Floats, dt: float, u: Floats, v: Floats
 ) -> None:

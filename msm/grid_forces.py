@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from msm.forces import cofactors, corner_shares
 from msm.grid import Grid
 from msm.kernel import inner_kernel
-from msm.kinematics import dot, slopes
+from msm.kinematics import X, Y, Z, dot, slopes
 from msm.laws import law_of_kind, stiffness, tension
 from msm.simd import Lanes, every, inverse_root, load, root, store, where_not_zero
 
@@ -30,22 +30,20 @@ Small = Literal[True] | None
 
 
 @inner_kernel()
-def add_internal_forces(law: Any, grid: Grid, u: Floats, force: Floats) -> None:
+def add_internal_forces(law: Any, grid: Grid, linear: Small, u: Floats, force: Floats) -> None:
     """Add the force [N] (3, m) of springs, cells and foundation on the nodes displaced by u."""
-    add_spring_forces(law, grid, grid.linear, u, force)
-    add_volume_forces(grid, grid.linear, u, force)
+    add_spring_forces(law, grid, linear, u, force)
+    add_volume_forces(grid, linear, u, force)
     add_foundation_forces(grid, u, 1.0, force)
 
 
 @inner_kernel()
 def add_stiffness_damping(
-    law: Any, grid: Grid, beta: float | None, u: Floats, v: Floats, force: Floats
+    law: Any, grid: Grid, linear: Small, beta: float, u: Floats, v: Floats, force: Floats
 ) -> None:
-    """Add the stiffness part of Rayleigh damping [N], if there is one, see `msm.rayleigh`."""
-    if beta is None:
-        return
-    add_spring_damping(law, grid, grid.linear, beta, u, v, force)
-    add_volume_damping(grid, grid.linear, beta, u, v, force)
+    """Add the stiffness part of Rayleigh damping [N], see `msm.rayleigh`."""
+    add_spring_damping(law, grid, linear, beta, u, v, force)
+    add_volume_damping(grid, linear, beta, u, v, force)
     add_foundation_forces(grid, v, beta, force)
 
 
@@ -262,17 +260,17 @@ def _volume_change(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> 
 
 
 def _volume_change_displaced(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
-    a, b, e = gradient(grid.lanes, grid.corner, u, 0, i, to_gradient)
-    f, g, h = gradient(grid.lanes, grid.corner, u, 1, i, to_gradient)
-    p, q, r = gradient(grid.lanes, grid.corner, u, 2, i, to_gradient)
+    a, b, e = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
+    f, g, h = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
+    p, q, r = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
     return cofactors(a, b, e, f, g, h, p, q, r)
 
 
 def _volume_change_at_rest(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
     """The divergence of u, and the cofactors of the identity."""
-    x, _, _ = gradient(grid.lanes, grid.corner, u, 0, i, to_gradient)
-    _, y, _ = gradient(grid.lanes, grid.corner, u, 1, i, to_gradient)
-    _, _, z = gradient(grid.lanes, grid.corner, u, 2, i, to_gradient)
+    x, _, _ = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
+    _, y, _ = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
+    _, _, z = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
     return x + y + z, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -297,9 +295,9 @@ def add_volume_damping(
         i = grid.cell_start[c]
         _, x, y, z = volume_change(grid, linear, u, i, to_gradient)
         growth = (
-            dot(x, gradient(grid.lanes, grid.corner, v, 0, i, to_gradient))
-            + dot(y, gradient(grid.lanes, grid.corner, v, 1, i, to_gradient))
-            + dot(z, gradient(grid.lanes, grid.corner, v, 2, i, to_gradient))
+            dot(x, gradient(grid.lanes, grid.corner, v, X, i, to_gradient))
+            + dot(y, gradient(grid.lanes, grid.corner, v, Y, i, to_gradient))
+            + dot(z, gradient(grid.lanes, grid.corner, v, Z, i, to_gradient))
         )
         pressure = load(grid.bulk, c, 0, grid.lanes) * growth * (beta * to_gradient)
         scatter_pressure(grid.lanes, grid.corner, force, i, pressure, (x, y, z))
