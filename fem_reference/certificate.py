@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from fem_reference.direct import EPSILON, Solve, factorised
+from fem_reference.direct import EPSILON, Solve
 from fem_reference.elasticity import Body
+from fem_reference.solvers import by_factors
 from fem_reference.stiffness_bound import StiffnessBound, stiffness_lower_bound
 from fem_reference.subspace import Subspace, empty, extended
 
@@ -220,7 +221,7 @@ def comparison(body: Body, lowest: float, count: int = VECTORS) -> Comparison:
     `lowest` [1/s^2]: upper bound of the lowest eigenvalue, the tighter the better. The stiffness is
     factored twice. ValueError if it is not positive definite beyond rounding.
     """
-    bound, solve = stiffness_lower_bound(body, lowest), direct(body)
+    bound, solve = stiffness_lower_bound(body, lowest), by_factors(body)
     space = krylov_space(body, solve, min(count, body.stiffness.size))
     squares, modes = eigh(space.stiffness)
     found = residual(body, space, solve, bound)
@@ -235,13 +236,6 @@ def certificate(
     lowest = float(np.linalg.eigvalsh(subspace.stiffness)[0])
     wanted = max(vectors, subspace.load.size)
     return comparison(body, lowest, wanted).certificate(subspace, at_probes)
-
-
-def direct(body: Body) -> Solve:
-    """Direct solver of K u = f, to rounding; the pressures are not returned."""
-    solve, size = factorised(body.stiffness.system()), body.stiffness.size
-    padding = np.zeros(body.unknowns - size)
-    return lambda load: solve(np.concatenate([load, padding]))[:size]
 
 
 def _stiffness_times(body: Body, vectors: Floats) -> Floats:

@@ -73,6 +73,17 @@ def symmetric_factors(matrix: csc_array) -> Any:
         return None
 
 
+def has_inertia(factors: Any, negative: int = 0) -> bool:
+    """Whether symmetric factors show so many negative eigenvalues, and all others positive.
+
+    By Sylvester's law of inertia, which needs all pivots on the diagonal; False without factors.
+    """
+    if factors is None or not (factors.perm_r == factors.perm_c).all():
+        return False
+    pivot = factors.U.diagonal()
+    return bool((pivot < 0.0).sum() == negative and (pivot > 0.0).sum() == len(pivot) - negative)
+
+
 def _factors(matrix: csc_array) -> Any:
     found = symmetric_factors(matrix)
     if found is None:

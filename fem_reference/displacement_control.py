@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.direct import symmetric_factors
+from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
 from study.continuation import Increments, follow
@@ -195,7 +195,7 @@ def _newton(body: MixedSolid, loading: Loading, start: _Iterate, factor: float) 
         if residuals[-1] <= TOLERANCE and not increment.any():
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if _is_stable(factors, body.pressures) else "the body gives way"
+            failure = "" if has_inertia(factors, body.pressures) else "the body gives way"
             break
         step = _newton_step(factors, matrix, residual, increment, free)
         length = _step_length(body, load, free, w, step, prescribing=bool(increment.any()))
@@ -249,10 +249,3 @@ def _step_length(
                 break
         length = 0.5 * length if length > SHORTEST_STEP else 0.0
     return length
-
-
-def _is_stable(factors: Any, pressures: int) -> bool:
-    """Whether all pivots are diagonal and as many are negative as there are pressures."""
-    if factors is None or not (factors.perm_r == factors.perm_c).all():
-        return False
-    return int((factors.U.diagonal() < 0.0).sum()) == pressures

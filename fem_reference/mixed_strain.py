@@ -115,7 +115,7 @@ class MixedSolid:
         return float((density * self.weights).sum() + 0.5 * u @ (self.support @ u))
 
     def gradient(self, w: Floats) -> Floats:
-        """Derivative of L, shape of w: forces [N], then what volumes [m^3] miss."""
+        """Derivative of L, shape of w: forces [N], then residual volumes [m^3]."""
         found = kinematics(self.deformation(w))
         p, slopes = self._pressure(w), self._spatial(found)
         nodal = self._stretching @ w[self.unknowns] + self._unstretched
@@ -131,8 +131,8 @@ class MixedSolid:
     def tangent(self, w: Floats) -> csc_array:
         """Second derivative of L, symmetric and indefinite, in the order of w.
 
-        With h_a = F^-T dN_a/dX, of displacements mu dN_a . dN_b delta_ik + (mu - p) h_ak h_bi, and
-        of a displacement and a pressure h_ai N.
+        With h_a = F^-T dN_a/dX, the integrand is mu dN_a . dN_b delta_ik + (mu - p) h_ak h_bi for
+        two displacements, and h_ai N for a displacement and a pressure.
         """
         found = kinematics(self.deformation(w))
         slopes = self._spatial(found)
@@ -157,12 +157,12 @@ class MixedSolid:
         return self.assembled(whole) + self.padded_support
 
     def linear(self) -> csc_array:
-        """The tangent without deformation: that of linear elasticity."""
+        """The tangent at zero displacement, that of linear elasticity."""
         return self.tangent(np.zeros(self.size + self.pressures))
 
     @property
     def carried(self) -> Any:
-        """Of lambda [Pa], what goes by the pressure."""
+        """Part of lambda [Pa] that the pressure represents."""
         return self.lame - self.pointwise
 
     def _pressure(self, w: Floats) -> Floats:

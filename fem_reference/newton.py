@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.direct import symmetric_factors
+from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.displacement_control import EquilibriumState, Loading, equilibrium_path
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
@@ -159,7 +159,7 @@ def _newton(problem: HyperelasticSolid, start: _Iterate, factor: float) -> _Iter
         if residuals[-1] <= TOLERANCE:
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if _is_definite(factors) else "the body gives way"
+            failure = "" if has_inertia(factors) else "the body gives way"
             break
         step = _newton_step(factors, residual)
         length = _step_length(problem, load, u, step, float(residual @ step))
@@ -193,10 +193,3 @@ def _step_length(
 def _newton_step(factors: Any, residual: Floats) -> Floats:
     """Newton step [m]; zero for a singular tangent."""
     return np.zeros_like(residual) if factors is None else np.asarray(factors.solve(residual))
-
-
-def _is_definite(factors: Any) -> bool:
-    """Whether the matrix is positive definite: all pivots are diagonal and positive."""
-    if factors is None:
-        return False
-    return bool((factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all())

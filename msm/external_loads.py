@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import kernel
+from msm.kernel import inner_kernel
 from msm.lattice import LatticeMesh
 from msm.tool_contact import ACTIVATION_GAP, BEYOND, Contact, resolve_contact
 from study.mesh.quadrature import SurfaceRule
@@ -38,7 +38,7 @@ class ExternalArrays(NamedTuple):
     contact: Contact | None
 
 
-@kernel()
+@inner_kernel()
 def add_external_forces(
     external: ExternalArrays | None, row: Floats, stage: int, force: Floats
 ) -> None:
@@ -54,7 +54,7 @@ def add_external_forces(
             force[d, external.place[i]] += total
 
 
-@kernel()
+@inner_kernel()
 def apply_tool_contact(
     external: ExternalArrays | None, row: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -136,6 +136,7 @@ def _contact(
     gamma_0: Floats,
     gamma_1: Floats,
 ) -> Contact:
+    """Contact of the surface with the tools. ValueError without a surface."""
     surface, tools = external_loads.surface, external_loads.tools
     if surface is None:
         raise ValueError("rigid tools need the surface that they meet; give it with them")
@@ -144,9 +145,7 @@ def _contact(
     of_tool = np.repeat(np.arange(len(tools)), [len(points) for points in candidates])
     points = surface.points[which]
     weights, _ = lattice.interpolation(points)
-    count, nodes = len(points), len(mass)
     bonded = np.array([tool.bonded for tool in tools], dtype=bool)[of_tool]
-    vectors, zeros = np.zeros((4, count, 3)), np.zeros((4, count))
     return Contact(
         tool=of_tool.astype(np.int64),
         rest=points,
@@ -154,9 +153,8 @@ def _contact(
         node=weights.indices.astype(np.int64),
         weight=weights.data.astype(np.float64),
         bonded=bonded,
-        anchor=vectors[0],
         weight_sum=float(np.abs(weights).sum(axis=1).max(initial=0.0)),
-        place=np.arange(nodes),
+        place=np.arange(len(mass)),
         mass=mass,
         gamma_0=gamma_0,
         gamma_1=gamma_1,
@@ -166,20 +164,28 @@ def _contact(
         axis=np.array([tool.axis for tool in tools]),
         friction=np.array([tool.friction for tool in tools]),
         activation_gap=ACTIVATION_GAP * lattice.spacing,
-        body_force=vectors[1],
-        previous_gap=zeros[0],
-        wake_travel=zeros[1],
-        totals=np.zeros(2),
-        tool_force=np.zeros((len(tools), 3)),
-        active=np.zeros(count, dtype=np.int64),
-        normal=vectors[2],
-        free_velocity=vectors[3],
-        impulse=np.zeros((count, 3)),
-        bias=zeros[2],
-        inverse_effective_mass=zeros[3],
-        inverse_mass=np.zeros(nodes),
-        velocity_change=np.zeros((nodes, 3)),
+        **_zero_arrays(len(points), len(mass), len(tools)),
     )
+
+
+def _zero_arrays(points: int, nodes: int, tools: int) -> dict[str, Any]:
+    """State and work arrays of a contact, zero until `reset_contact` and the first step."""
+    return {
+        "anchor": np.zeros((points, 3)),
+        "body_force": np.zeros((points, 3)),
+        "previous_gap": np.zeros(points),
+        "wake_travel": np.zeros(points),
+        "totals": np.zeros(2),
+        "tool_force": np.zeros((tools, 3)),
+        "active": np.zeros(points, dtype=np.int64),
+        "normal": np.zeros((points, 3)),
+        "free_velocity": np.zeros((points, 3)),
+        "impulse": np.zeros((points, 3)),
+        "bias": np.zeros(points),
+        "inverse_effective_mass": np.zeros(points),
+        "inverse_mass": np.zeros(nodes),
+        "velocity_change": np.zeros((nodes, 3)),
+    }
 
 
 def _candidate_points(tool: RigidTool, surface: SurfaceRule) -> Ints:

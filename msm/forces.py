@@ -20,7 +20,7 @@ from msm.network import Network
 Floats = NDArray[np.float64]
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Set the force [N] (n, 3) of springs, cells and foundation at the displacement u."""
     force[:] = 0.0
@@ -42,7 +42,7 @@ def hold(fixed: Any, force: Floats) -> None:
         force[fixed[f, 0], fixed[f, 1]] = 0.0
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
     """Add the force [N] of each spring at its two ends."""
     for s in range(net.ends.shape[0]):

@@ -46,9 +46,7 @@ class Grid(NamedTuple):
     Cells, blocks of their lowest corners: `cell_start`, `corner` (8,) offsets, `bulk` [J],
     `spacing` [m]. Foundation: `held_start`, `held_offset`, `held` [N/m]. Nodes, each (b, l):
     `mass`, `gamma_0`, `gamma_1` as in `Network`, `kept` and `share`, which integrators fill;
-    `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement. `beta`
-    [s] and `linear` as in `Network`, but None for no: kernels are compiled without what is not
-    wanted.
+    `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement.
     """
 
     lanes: Lanes
@@ -75,15 +73,15 @@ class Grid(NamedTuple):
     share: Floats
     load: Floats
     uneven: bool
-    beta: float | None
-    linear: Literal[True] | None
 
 
 class Grids(NamedTuple):
     """A lattice as `grids`, one per cell size, with their motion in shared arrays.
 
     `place` (n,): primary place of each node. `joints`: coupling of the grids, None for one grid.
-    `fixed` (f, 2): component and place of constrained displacements. `external` as in `Network`.
+    `fixed` (f, 2): component and place of constrained displacements. `external`, `beta` [s] and
+    `linear` as in `Network`, but None for no damping and for nonlinear forces: kernels are compiled
+    without unused parts. They are not in `Grid`, so that kernels of a grid are compiled once.
     """
 
     grids: tuple[Grid, ...]
@@ -91,6 +89,8 @@ class Grids(NamedTuple):
     joints: Joints | None
     fixed: Ints
     external: ExternalArrays | None
+    beta: float | None
+    linear: Literal[True] | None
 
 
 def grids_of(
@@ -125,6 +125,8 @@ def grids_of(
         None if len(parts) == 1 else joined(parts, place, primary, net),
         np.stack([net.fixed[:, 1], primary[net.fixed[:, 0]]], axis=1).astype(np.int64),
         None if net.external is None else renumbered(net.external, primary),
+        net.beta or None,
+        True if net.linear else None,
     )
     return _in_single(grids) if single else grids
 
@@ -165,8 +167,6 @@ def _grid(
         share=blocks.rows(own, 0, 0.0),
         load=blocks.rows(own[:, None], np.arange(3), net.load[node], 3),
         uneven=bool(net.gamma_1.any()),
-        beta=net.beta or None,
-        linear=True if net.linear else None,
     )
 
 

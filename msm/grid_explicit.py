@@ -19,18 +19,20 @@ from msm.kernel import inner_kernel, kernel
 from msm.simd import every, load, store
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
-@kernel(nogil=True)
+@kernel(nogil=True, makes_arrays=False)
 def symplectic_euler(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """V += dt a(u), damped at the end; then u += dt v. Load at the end of the step."""
-    take_in(of, u, v)
     moving = of.grids[0]
+    take_in(moving, of.place, u, v)
+    follow_all(of)
     for grid in of.grids:
         set_shares(grid, dt)
     for n in range(factors.shape[0]):
         add_forces(law, of, factors[n], 0, moving.u)
-        add_damping(law, of, moving.beta)
+        add_damping(law, of, of.beta)
         for grid in of.grids:
             if grid.uneven:
                 set_shares(grid, dt)
@@ -39,14 +41,15 @@ def symplectic_euler(law: Any, of: Grids, factors: Floats, dt: float, u: Floats,
         hold(of.fixed, moving.u)
         hold(of.fixed, moving.v)
         follow_all(of)
-    give_back(of, u, v)
+    give_back(moving, of.place, u, v)
 
 
-@kernel(nogil=True)
+@kernel(nogil=True, makes_arrays=False)
 def velocity_verlet(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """Half a kick, a drift, half a kick; damping implicit in the first half, explicit after."""
-    take_in(of, u, v)
     moving = of.grids[0]
+    take_in(moving, of.place, u, v)
+    follow_all(of)
     for grid in of.grids:
         set_shares(grid, 0.5 * dt)
     if factors.shape[0] > 0:
@@ -61,14 +64,15 @@ def velocity_verlet(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, 
         for grid in of.grids:
             kick_again(grid, factors[n, 1], 0.5 * dt)
         follow(of.joints, moving.v)
-    give_back(of, u, v)
+    give_back(moving, of.place, u, v)
 
 
 @kernel(nogil=True)
 def runge_kutta_4(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
     """The classical four stages."""
-    take_in(of, u, v)
     moving = of.grids[0]
+    take_in(moving, of.place, u, v)
+    follow_all(of)
     at, speed = moving.u.copy(), moving.v.copy()
     du, dv = np.zeros_like(at), np.zeros_like(at)
     for n in range(factors.shape[0]):
@@ -85,7 +89,7 @@ def runge_kutta_4(law: Any, of: Grids, factors: Floats, dt: float, u: Floats, v:
             finish(grid, du, dv)
         follow_all(of)
         at[:], speed[:] = moving.u, moving.v
-    give_back(of, u, v)
+    give_back(moving, of.place, u, v)
 
 
 @inner_kernel()
@@ -93,7 +97,7 @@ def add_forces(law: Any, of: Grids, row: Floats, stage: int, u: Floats) -> None:
     """Add all forces [N] on the nodes displaced by u (3, m), but those of the first load."""
     force = of.grids[0].force
     for grid in of.grids:
-        add_internal_forces(law, grid, u, force)
+        add_internal_forces(law, grid, of.linear, u, force)
     add_joint_foundation(of.joints, u, 1.0, force)
     add_external_forces(of.external, row, stage, force)
     share_out(of.joints, force)
@@ -107,7 +111,7 @@ def add_damping(law: Any, of: Grids, beta: float | None) -> None:
         return
     moving = of.grids[0]
     for grid in of.grids:
-        add_stiffness_damping(law, grid, beta, moving.u, moving.v, moving.force)
+        add_stiffness_damping(law, grid, of.linear, beta, moving.u, moving.v, moving.force)
     add_joint_foundation(of.joints, moving.v, beta, moving.force)
     share_out(of.joints, moving.force)
     hold(of.fixed, moving.force)
@@ -121,31 +125,24 @@ def follow_all(of: Grids) -> None:
 
 
 @inner_kernel()
-def take_in(of: Grids, u: Floats, v: Floats) -> None:
+def take_in(moving: Grid, place: Ints, u: Floats, v: Floats) -> None:
     """Set the motion in the grids to that of the nodes, beyond them to rest, forces to zero."""
-    for grid in of.grids:
-        none = every(0.0, grid.lanes)
-        for b in range(grid.start.shape[0]):
-            for d in range(3):
-                store(grid.u, d, grid.start[b], none)
-                store(grid.v, d, grid.start[b], none)
-                store(grid.force, d, grid.start[b], none)
-    moving = of.grids[0]
-    for n in range(of.place.shape[0]):
+    for d in range(3):
+        for p in range(moving.u.shape[1]):
+            moving.u[d, p] = moving.v[d, p] = moving.force[d, p] = 0.0
+    for n in range(place.shape[0]):
         for d in range(3):
-            moving.u[d, of.place[n]] = u[n, d]
-            moving.v[d, of.place[n]] = v[n, d]
-    follow_all(of)
+            moving.u[d, place[n]] = u[n, d]
+            moving.v[d, place[n]] = v[n, d]
 
 
 @inner_kernel()
-def give_back(of: Grids, u: Floats, v: Floats) -> None:
+def give_back(moving: Grid, place: Ints, u: Floats, v: Floats) -> None:
     """Set the motion of the nodes to that in the grids."""
-    moving = of.grids[0]
-    for n in range(of.place.shape[0]):
+    for n in range(place.shape[0]):
         for d in range(3):
-            u[n, d] = moving.u[d, of.place[n]]
-            v[n, d] = moving.v[d, of.place[n]]
+            u[n, d] = moving.u[d, place[n]]
+            v[n, d] = moving.v[d, place[n]]
 
 
 @inner_kernel()

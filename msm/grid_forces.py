@@ -1,11 +1,10 @@
-"""Forces of a network over a regular grid, compiled: those of `msm.forces`, a block at a time.
+"""Forces of `msm.forces` over a regular grid, compiled, one vector block at a time.
 
-Each loop takes the nodes or cells of one block at once, whatever the number of lanes. All add to
-the force of a grid, of which integrators set to zero what they have used. Entries beyond the organ
-are touched but have no weight. As in `msm.forces`, a spring pressed to a point gives NaN.
+Each loop iteration processes the nodes or cells of one block. All functions add to the force of a
+grid; integrators reset it to zero after use. Entries outside the organ are read but have no weight.
+As in `msm.forces`, a spring of zero length gives NaN.
 
-What is done for a block is chosen when a kernel is compiled: by the law, by the precision, and by
-whether displacements are small (`linear`).
+The law, the precision and the choice of small displacements (`linear`) are resolved at compilation.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from msm.forces import cofactors, corner_shares
 from msm.grid import Grid
 from msm.kernel import inner_kernel
-from msm.kinematics import dot, slopes
+from msm.kinematics import X, Y, Z, dot, slopes
 from msm.laws import law_of_kind, stiffness, tension
 from msm.simd import Lanes, every, inverse_root, load, root, store, where_not_zero
 
@@ -31,22 +30,20 @@ Small = Literal[True] | None
 
 
 @inner_kernel()
-def add_internal_forces(law: Any, grid: Grid, u: Floats, force: Floats) -> None:
+def add_internal_forces(law: Any, grid: Grid, linear: Small, u: Floats, force: Floats) -> None:
     """Add the force [N] (3, m) of springs, cells and foundation on the nodes displaced by u."""
-    add_spring_forces(law, grid, grid.linear, u, force)
-    add_volume_forces(grid, grid.linear, u, force)
+    add_spring_forces(law, grid, linear, u, force)
+    add_volume_forces(grid, linear, u, force)
     add_foundation_forces(grid, u, 1.0, force)
 
 
 @inner_kernel()
 def add_stiffness_damping(
-    law: Any, grid: Grid, beta: float | None, u: Floats, v: Floats, force: Floats
+    law: Any, grid: Grid, linear: Small, beta: float, u: Floats, v: Floats, force: Floats
 ) -> None:
-    """Add the stiffness part of Rayleigh damping [N], if there is one, see `msm.rayleigh`."""
-    if beta is None:
-        return
-    add_spring_damping(law, grid, grid.linear, beta, u, v, force)
-    add_volume_damping(grid, grid.linear, beta, u, v, force)
+    """Add the stiffness part of Rayleigh damping [N], see `msm.rayleigh`."""
+    add_spring_damping(law, grid, linear, beta, u, v, force)
+    add_volume_damping(grid, linear, beta, u, v, force)
     add_foundation_forces(grid, v, beta, force)
 
 
@@ -93,7 +90,7 @@ def add_spring_forces(law: Any, grid: Grid, linear: Small, u: Floats, force: Flo
 def add_spring_damping(
     law: Any, grid: Grid, linear: Small, beta: float, u: Floats, v: Floats, force: Floats
 ) -> None:
-    """Add a dashpot along each spring, of beta times its stiffness at the present strain."""
+    """Add a dashpot along each spring, of beta times its stiffness at the current strain."""
     lanes, directions = grid.lanes, grid.offset.shape[0]
     none = every(0.0, lanes)
     for b in range(grid.start.shape[0]):
@@ -112,7 +109,7 @@ def add_spring_damping(
 
 
 def pulled(law: Any, grid: Grid, linear: Small, d: int, dx: Any, dy: Any, dz: Any) -> Any:
-    """Force [N/m] over spring vector and weight, and that vector, of ends so far moved apart."""
+    """Spring force over weight and spring vector [N/m], and that vector."""
     raise NotImplementedError(law, grid, linear, d, dx, dy, dz)
 
 
@@ -122,7 +119,7 @@ def _pulled(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any)
 
 
 def _pulled_along(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any) -> Any:  # noqa: ARG001 - numba matches names
-    """Along the springs as they are; `stretched` is their squared length less that at rest."""
+    """Along the deformed springs; `stretched` is the change of their squared length."""
     x, y, z = grid.rest[d, 0], grid.rest[d, 1], grid.rest[d, 2]
     stretched = 2.0 * (x * dx + y * dy + z * dz) + (dx * dx + dy * dy + dz * dz)
     dx, dy, dz = x + dx, y + dy, z + dz
@@ -131,14 +128,14 @@ def _pulled_along(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz
 
 
 def _pulled_at_rest(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any, dz: Any) -> Any:  # noqa: ARG001 - numba matches names
-    """Along the springs at rest."""
+    """Along the undeformed springs."""
     x, y, z = grid.rest[d, 0], grid.rest[d, 1], grid.rest[d, 2]
     strain = (x * dx + y * dy + z * dz) * (grid.per_length[d] * grid.per_length[d])
     return tension(law, strain), x, y, z
 
 
 def resisted(law: Any, grid: Grid, linear: Small, d: int, dx: Any, dy: Any, dz: Any) -> Any:
-    """Slope [N/m] over weight and squared length [m^2], and the spring vector, likewise."""
+    """Spring stiffness over weight and squared length [m^2], and the spring vector."""
     raise NotImplementedError(law, grid, linear, d, dx, dy, dz)
 
 
@@ -160,12 +157,12 @@ def _resisted_at_rest(law: Any, grid: Any, linear: Any, d: Any, dx: Any, dy: Any
 
 
 def _displaced(linear: Any) -> bool:
-    """Whether forces follow the displaced nodes, from the compiler's type of `linear`."""
+    """Whether geometric nonlinearity is included, from the numba type of `linear`."""
     return linear is types.none
 
 
 def pull(law: Any, length: float, per_length: float, squared: Any, stretched: Any) -> Any:
-    """T(X) L_0 / L [N/m], from the rest length, the squared length and its growth."""
+    """T(X) L_0 / L [N/m], from rest length, squared length and its change."""
     raise NotImplementedError(law, length, per_length, squared, stretched)
 
 
@@ -263,17 +260,17 @@ def _volume_change(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> 
 
 
 def _volume_change_displaced(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
-    a, b, e = gradient(grid.lanes, grid.corner, u, 0, i, to_gradient)
-    f, g, h = gradient(grid.lanes, grid.corner, u, 1, i, to_gradient)
-    p, q, r = gradient(grid.lanes, grid.corner, u, 2, i, to_gradient)
+    a, b, e = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
+    f, g, h = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
+    p, q, r = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
     return cofactors(a, b, e, f, g, h, p, q, r)
 
 
 def _volume_change_at_rest(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
     """The divergence of u, and the cofactors of the identity."""
-    x, _, _ = gradient(grid.lanes, grid.corner, u, 0, i, to_gradient)
-    _, y, _ = gradient(grid.lanes, grid.corner, u, 1, i, to_gradient)
-    _, _, z = gradient(grid.lanes, grid.corner, u, 2, i, to_gradient)
+    x, _, _ = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
+    _, y, _ = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
+    _, _, z = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
     return x + y + z, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -298,9 +295,9 @@ def add_volume_damping(
         i = grid.cell_start[c]
         _, x, y, z = volume_change(grid, linear, u, i, to_gradient)
         growth = (
-            dot(x, gradient(grid.lanes, grid.corner, v, 0, i, to_gradient))
-            + dot(y, gradient(grid.lanes, grid.corner, v, 1, i, to_gradient))
-            + dot(z, gradient(grid.lanes, grid.corner, v, 2, i, to_gradient))
+            dot(x, gradient(grid.lanes, grid.corner, v, X, i, to_gradient))
+            + dot(y, gradient(grid.lanes, grid.corner, v, Y, i, to_gradient))
+            + dot(z, gradient(grid.lanes, grid.corner, v, Z, i, to_gradient))
         )
         pressure = load(grid.bulk, c, 0, grid.lanes) * growth * (beta * to_gradient)
         scatter_pressure(grid.lanes, grid.corner, force, i, pressure, (x, y, z))
@@ -311,7 +308,7 @@ def add_volume_damping(
 
 @inner_kernel()
 def add_foundation_forces(grid: Grid, u: Floats, times: float, force: Floats) -> None:
-    """Subtract S u, so many times."""
+    """Subtract `times` S u, with S the foundation."""
     lanes, couplings = grid.lanes, grid.held_offset.shape[0]
     none = every(0.0, lanes)
     for b in range(grid.held_start.shape[0]):

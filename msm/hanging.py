@@ -53,7 +53,7 @@ def tied(masters: csr_array | None) -> Ties:
     )
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def interpolate(net: Network, x: Floats) -> None:
     """Interpolate x (n, 3) at the hanging nodes from their masters."""
     for k in range(net.hanging.shape[0]):
@@ -72,7 +72,7 @@ def interpolate_both(net: Network, u: Floats, v: Floats) -> None:
     interpolate(net, v)
 
 
-@kernel()
+@inner_kernel()
 def share_out(net: Network, force: Floats) -> None:
     """Move the forces (n, 3) on hanging nodes to their masters."""
     for k in range(net.hanging.shape[0]):
@@ -84,7 +84,7 @@ def share_out(net: Network, force: Floats) -> None:
             force[i, d] = 0.0
 
 
-@kernel()
+@inner_kernel()
 def share_out_values(net: Network, values: Floats) -> None:
     """Add values (n,) of hanging nodes to their masters, and set them to a mean of the masters'."""
     for k in range(net.hanging.shape[0]):

@@ -43,13 +43,19 @@ def _stands_here(thing: Any) -> bool:
 
 
 def kernel(
-    *, nogil: bool = False, inline: Literal["never", "always"] = "never"
+    *,
+    nogil: bool = False,
+    inline: Literal["never", "always"] = "never",
+    makes_arrays: bool = True,
 ) -> Callable[[F], F]:
     """Compile a function as a kernel, cached on disk if it belongs to this package.
 
-    The options are numba's. Division by zero follows IEEE.
+    With `makes_arrays` false neither it nor any kernel that it calls makes one, by array arithmetic
+    either: then nobody counts who holds the many arrays of a network, which is a sixth of the time
+    that it takes to compile. An array made all the same would never be freed. `nogil` and `inline`
+    are numba's. Division by zero follows IEEE.
     """
-    return _compiled(nogil=nogil, inline=inline)
+    return _compiled(nogil=nogil, inline=inline, _nrt=makes_arrays)
 
 
 def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F], F]:
@@ -57,12 +63,13 @@ def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F
 
     Without a Python wrapper and reference counting it compiles in half the time.
     """
-    return _compiled(inline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
+    return _compiled(inline=inline, no_cpython_wrapper=True, _nrt=False)
 
 
 def _compiled(**options: Any) -> Callable[[F], F]:
     def compiled(function: F) -> F:
-        made = numba.njit(error_model="numpy", **options)(function)
+        # The way in from C is left out: no kernel is handed on as a value.
+        made = numba.njit(error_model="numpy", no_cfunc_wrapper=True, **options)(function)
         if _stands_here(function):
             made._cache = _OwnTypes(function)  # what cache=True sets
         return made  # type: ignore[no-any-return] # numba publishes no types

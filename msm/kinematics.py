@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from msm.kernel import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
+
+X, Y, Z = (cast("int", axis) for axis in np.arange(3))
+"""Components. Of a plain number numba would compile what it is given to once for each."""
 
 
 @inner_kernel()
@@ -36,9 +39,9 @@ def slopes(
 def deformation(cell: Any, spacing: float, u: Floats) -> Any:
     """Rows of the mean deformation gradient F of a cell."""
     to_gradient = 0.25 / spacing
-    xx, xy, xz = gradient_of(cell, u, 0, to_gradient)
-    yx, yy, yz = gradient_of(cell, u, 1, to_gradient)
-    zx, zy, zz = gradient_of(cell, u, 2, to_gradient)
+    xx, xy, xz = gradient_of(cell, u, X, to_gradient)
+    yx, yy, yz = gradient_of(cell, u, Y, to_gradient)
+    zx, zy, zz = gradient_of(cell, u, Z, to_gradient)
     return (xx + 1.0, xy, xz), (yx, yy + 1.0, yz), (zx, zy, zz + 1.0)
 
 
@@ -54,7 +57,7 @@ def dot(a: Any, b: Any) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def inverted_cells(cells: NDArray[np.int64], edges: Floats, u: Floats) -> int:
     """Number of cells (c, 8) that u [m] (n, 3) inverts: J <= 0 of the mean F.
 

@@ -36,6 +36,9 @@ EXTRAPOLATION = 0.75
 class LatticeMesh(Protocol):
     """Interface of a lattice of any type of cell."""
 
+    def __hash__(self) -> int:
+        """Of the object: one lattice is equal to itself alone."""
+
     @property
     def nodes(self) -> Floats:
         """Nodes [m] (n, 3)."""
@@ -55,7 +58,7 @@ class LatticeMesh(Protocol):
         """Number of cells that a displacement [m] (n, 3) inverts."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CellLattice:
     """Cubic cells of one size: nodes [m] (n, 3), and cells (c, 8) of nodes in the order of CORNERS.
 

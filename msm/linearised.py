@@ -41,7 +41,7 @@ def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
     return rx / length, ry / length, rz / length, along, across
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
     """Set nodal values [1/s^2] (n,) whose maximum is an upper bound of omega_max^2 at u.
 
@@ -80,7 +80,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
     return cofactor + np.sqrt(3.0) * abs(dot(f, gh) - 1.0 - net.swollen[c]) * size
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def farthest(u: Floats) -> tuple[float, int]:
     """Largest absolute component [m] of u (n, 3) and its node; NaN counts as infinite."""
     size, node = 0.0, 0
@@ -93,7 +93,7 @@ def farthest(u: Floats) -> tuple[float, int]:
     return size, node
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def largest_vector_change(net: Network, u: Floats, before: Floats) -> float:
     """Largest change of a spring vector between two displacements [m], over its rest length."""
     largest = 0.0
@@ -106,7 +106,7 @@ def largest_vector_change(net: Network, u: Floats, before: Floats) -> float:
     return float(np.sqrt(largest))
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def largest_strain(net: Network, u: Floats) -> float:
     """Largest absolute strain of a spring at the displacement u [m] (n, 3)."""
     largest = 0.0

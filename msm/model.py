@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from msm.assembly import Assembly, Material, arrays, assemble, of_tissue
 from msm.checkpoint import Checkpoint, Keeper, identity, program
@@ -336,6 +338,17 @@ def _result(
     )
 
 
+@lru_cache(maxsize=1)
+def _seen(lattice: LatticeMesh, observation: Observation) -> tuple[csr_array, csr_array, csr_array]:
+    """Weights (q, n) of probes, points in the volume and points of the surface.
+
+    Those of the last lattice are kept: one is run with springs of several kinds, and at half steps.
+    """
+    points = observation.probes, observation.volume_points, observation.surface_points
+    probes, volume, surface = (lattice.interpolation(some)[0] for some in points)
+    return probes, volume, surface
+
+
 class _Recorder:
     """Writes the observed quantities of each sample into arrays; repeated samples overwrite."""
 
@@ -349,9 +362,7 @@ class _Recorder:
         self.overlap = np.zeros(len(observation.times))
         self.strain = np.zeros(len(observation.times))
         self.inverted = np.zeros(len(observation.times), dtype=np.int64)
-        self.at_probes, _ = lattice.interpolation(observation.probes)
-        self.in_volume, _ = lattice.interpolation(observation.volume_points)
-        self.on_surface, _ = lattice.interpolation(observation.surface_points)
+        self.at_probes, self.in_volume, self.on_surface = _seen(lattice, observation)
 
     def record(self, sample: int, stepper: LatticeStepper) -> None:
         """Record the motion at one sample."""

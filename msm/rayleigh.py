@@ -21,7 +21,7 @@ from msm.forces import (
     volume_change,
 )
 from msm.hanging import share_out
-from msm.kernel import kernel
+from msm.kernel import inner_kernel, kernel
 from msm.kinematics import dot, gradient_of
 from msm.laws import stiffness
 from msm.network import Network
@@ -29,7 +29,7 @@ from msm.network import Network
 Floats = NDArray[np.float64]
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add the damping [N] (n, 3) of nodes at u with velocities v, `ahead` = beta v [m]."""
     add_spring_damping(law, net, u, ahead, force)
@@ -42,7 +42,7 @@ def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, forc
     hold(net.fixed, force)
 
 
-@kernel()
+@inner_kernel()
 def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add a dashpot along each spring, of beta times its stiffness at the current strain."""
     for s in range(net.ends.shape[0]):
@@ -68,7 +68,7 @@ def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: 
         force[j, 2] -= pull * z
 
 
-@kernel()
+@inner_kernel()
 def add_volume_damping(net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
     """Add -beta kappa V (dJ/dt) cof(F) B_a for each corner a of a cell; dJ/dt = cof(F) : dF/dt."""
     for c in range(net.cells.shape[0]):

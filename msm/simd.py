@@ -1,11 +1,10 @@
-"""Several numbers at once inside compiled kernels: vectors of doubles, or of twice as many singles.
+"""Explicit SIMD in compiled kernels: vectors of doubles, or of twice as many singles.
 
-Loops over the short rows of a grid are not vectorised by the compiler to any profit, so here the
-vectors are written out: `load` and `store` move neighbouring entries of an array, and what is
-loaded takes +, -, *, /, abs, min, max and mixes with plain numbers. A kernel written in these terms
-knows neither width nor precision: it has those of its argument `lanes`, see `lanes_of`, and with
-one lane its numbers are plain doubles. Plain numbers are rounded to the precision of a vector that
-they meet. Products and sums may be fused where the processor can.
+The compiler does not vectorise loops over the short rows of a grid profitably, so vectors are
+explicit: `load` and `store` move neighbouring entries of an array, and vectors support +, -, *, /,
+abs, min and max, also with scalars. A kernel is independent of width and precision, which come from
+its argument `lanes` (`lanes_of`); with one lane its numbers are plain doubles. Scalars are rounded
+to the precision of the vector. Multiplication and addition may be fused where the processor can.
 """
 
 from __future__ import annotations
@@ -32,15 +31,15 @@ from numba.extending import (
 Lanes = tuple[float | np.float32, ...]
 
 WIDTHS = (1, 2, 4, 8)
-"""Of doubles; vectors of singles are twice as wide."""
+"""Widths of vectors of doubles; vectors of singles are twice as wide."""
 WORD, INDEX = ir.IntType(64), ir.IntType(32)
 FUSED = ("contract",)
 ROOT_GUESS = 0x5FE6EB50C7B537A9
-"""From which half the bits of q are taken for 1 / sqrt(q), within 3.5 %: Lomont 2003."""
+"""This minus half the bits of q has the bits of 1 / sqrt(q), within 3.5 %: Lomont 2003."""
 
 
 class Format(NamedTuple):
-    """A floating-point format as the compiler knows it: how it calls it, and its type."""
+    """A floating-point format of the compiler: its name and its type."""
 
     name: str
     number: Any
@@ -53,9 +52,9 @@ FORMATS = {
 
 
 def lanes_of(width: int, *, single: bool = False) -> Lanes:
-    """The argument that tells a kernel how many numbers of which precision it takes at once.
+    """The argument that determines the vector width and precision of a kernel by its type.
 
-    The numbers in it mean nothing.
+    Its values are not used.
     """
     widths = tuple(2 * n for n in WIDTHS) if single else WIDTHS
     if width not in widths:
@@ -64,14 +63,14 @@ def lanes_of(width: int, *, single: bool = False) -> Lanes:
 
 
 def widest() -> int:
-    """Lanes that the processor computes at once, of those that numba compiles for."""
+    """Vector width in doubles of the processor that numba compiles for."""
     features = numba.config.CPU_FEATURES or get_host_cpu_features()
     known = {"+avx512f": 8, "+avx": 4, "+sse2": 2, "+neon": 2}
     return max((known.get(name, 1) for name in features.split(",")), default=1)
 
 
 class LanesType(types.Type):
-    """The compiler's type of a vector of so many numbers of one type."""
+    """Numba type of a vector of numbers of one type."""
 
     def __init__(self, count: int, dtype: Any) -> None:
         self.count, self.dtype = count, dtype
@@ -79,7 +78,7 @@ class LanesType(types.Type):
 
     @property
     def format(self) -> Format:
-        """Of its numbers."""
+        """Floating-point format of the numbers."""
         return FORMATS[self.dtype]
 
 
@@ -97,7 +96,7 @@ def _kind(lanes: Any) -> Any:
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any, value: Any) -> Any:
-    """Where the entry (row, column) of an array stands, as vectors of a type do."""
+    """Address of the entry (row, column) of an array, as a pointer to vectors of a type."""
     made = context.make_array(kind)(context, builder, array)
     columns = cgutils.unpack_tuple(builder, made.shape)[1]
     entry = builder.gep(made.data, [builder.add(builder.mul(at[0], columns), at[1])])
@@ -106,7 +105,7 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any, value: An
 
 @intrinsic
 def load(_: Any, array: Any, row: Any, column: Any, lanes: Any) -> Any:  # noqa: ARG001 - typed alone
-    """As many entries of a matrix in a row, from a column on, as there are lanes, of their type."""
+    """Vector of the entries of a matrix in a row, from a column on."""
     if array.dtype is not lanes.dtype:
         return None
     kind = _kind(lanes)
@@ -120,7 +119,7 @@ def load(_: Any, array: Any, row: Any, column: Any, lanes: Any) -> Any:  # noqa:
 
 @intrinsic
 def store(_: Any, array: Any, row: Any, column: Any, value: Any) -> Any:  # noqa: ARG001 - typed alone
-    """Set the entries of a matrix in a row, from a column on, to a vector of their type."""
+    """Set the entries of a matrix in a row, from a column on, to a vector."""
     if array.dtype is not getattr(value, "dtype", value):
         return None
 
@@ -136,7 +135,7 @@ def store(_: Any, array: Any, row: Any, column: Any, value: Any) -> Any:  # noqa
 
 
 def _splat(context: Any, builder: Any, x: Any, plain: Any, kind: LanesType) -> Any:
-    """A plain number of its type in every lane of a vector, rounded to its precision."""
+    """A scalar in every lane of a vector, rounded to its precision."""
     x, count = context.cast(builder, x, plain, kind.dtype), kind.count
     nothing = ir.Constant(ir.VectorType(kind.format.number, count), ir.Undefined)
     first = builder.insert_element(nothing, x, ir.Constant(INDEX, 0))
@@ -159,7 +158,7 @@ def every(_: Any, x: Any, lanes: Any) -> Any:  # noqa: ARG001 - typed alone
 
 
 def _function(builder: Any, name: str, kind: LanesType) -> Any:
-    """The compiler's own function of a vector."""
+    """An intrinsic function of the compiler for a vector."""
     vector = ir.VectorType(kind.format.number, kind.count)
     full_name = f"llvm.{name}.v{kind.count}{kind.format.name}"
     return cgutils.get_or_insert_function(
@@ -186,7 +185,7 @@ PAIRED: dict[Callable[..., Any], Callable[..., Any]] = {
 
 
 def _teach_pair(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
-    """Let kernels apply a function of two numbers to vectors, or to a vector and a number."""
+    """Define a binary function for two vectors, or for a vector and a scalar."""
 
     @type_callable(function)
     def _(_: Any) -> Any:
@@ -276,7 +275,7 @@ def inverse_root(q: Any) -> Any:
 
 @overload(inverse_root)
 def _inverse_root(q: Any) -> Any:
-    """Of doubles two steps of high order from a guess, which take a third of the time."""
+    """For doubles, two iterations of high order from a guess, which take a third of the time."""
     if not isinstance(q, LanesType) or q.dtype is types.float32:
 
         def plain(q: Any) -> Any:
@@ -319,7 +318,7 @@ def with_lane(_: Any, x: Any, n: Any, value: Any) -> Any:  # noqa: ARG001 - type
 
 
 def lanewise(function: Callable[..., Any], kind: Any) -> Callable[..., Any]:
-    """A function of (law, number) as one of a number of this compiler's type: lane by lane."""
+    """A function of (law, scalar), applied to each lane of a vector."""
     if not isinstance(kind, LanesType):
         return function
     count, one = kind.count, register_jitable(function)

@@ -1,4 +1,4 @@
-"""The lattice at rest under its full load, linearised where it is free of load."""
+"""Linear static solution of a lattice under its full load."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOLERANCE = 1e-10
 
 
 def static_displacement(assembly: Assembly, material: Material) -> Floats:
-    """Displacement [m] (n, 3) at rest under the full load, linearised at rest.
+    """Static displacement [m] (n, 3) under the full load, linearised about the unloaded state.
 
     ValueError if the support does not hold the lattice.
     """
@@ -41,12 +41,12 @@ def sag(assembly: Assembly, material: Material) -> Floats:
 
 
 def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> Floats:
-    """Displacement [m] (3 n,) under nodal forces [N] (3 n,), to a residual of `tolerance` of them.
+    """Displacement [m] (3 n,) under nodal forces [N] (3 n,), to a relative residual of `tolerance`.
 
     ValueError if the support does not hold the lattice.
     """
-    # Factors of a 3-D lattice fill in: at 20 000 nodes they take gigabytes. The lattice is well
-    # conditioned but for a stiff support, which the diagonal takes care of.
+    # Factors of a 3-D lattice have large fill-in: gigabytes at 20 000 nodes. The matrix is well
+    # conditioned except for a stiff support, for which Jacobi preconditioning suffices.
     preconditioner, most = diags_array(1.0 / stiffness.diagonal()), 7 * len(load)
     found, failed = cg(stiffness, load, rtol=tolerance, maxiter=most, M=preconditioner)
     if failed:
@@ -57,8 +57,8 @@ def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> 
 def stiffness_at_rest(assembly: Assembly, material: Material) -> csr_array:
     """Stiffness [N/m] (3 n, 3 n) of springs, volume term and support at rest.
 
-    A fixed unknown is coupled to nothing, and has a stiffness of its own. Hanging nodes are held at
-    zero in it, each by itself; see `extended`.
+    Constrained unknowns are decoupled and keep their diagonal stiffness. Hanging nodes are
+    decoupled with zero displacement; `extended` interpolates them.
     """
     count = len(assembly.mass)
     springs = stiffness_matrix(assembly.springs, count, initial_stiffness(material.law))
@@ -74,14 +74,14 @@ def stiffness_at_rest(assembly: Assembly, material: Material) -> csr_array:
 
 
 def extended(assembly: Assembly, motion: Floats) -> Floats:
-    """A motion (3 n, ...) of which that of hanging nodes is left out, with it."""
+    """A displacement (3 n, ...) with its values at hanging nodes interpolated from the masters."""
     if assembly.masters is None:
         return motion
     return np.asarray(kron(assembly.masters, eye_array(3), format="csr") @ motion)
 
 
 def _decoupled(matrix: csr_array, fixed: NDArray[np.bool_]) -> csr_array:
-    """Without the entries that couple fixed unknowns (3 n,) to any other."""
+    """The matrix without entries that couple constrained unknowns (3 n,) to others."""
     found = matrix.tocoo()
     kept = ~(fixed[found.row] | fixed[found.col]) | (found.row == found.col)
     entries = (found.data[kept], (found.row[kept], found.col[kept]))

@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from msm.forces import hold, scatter
 from msm.hanging import share_out
 from msm.kernel import inner_kernel, kernel
-from msm.kinematics import cross, dot, gradient_of
+from msm.kinematics import X, Y, Z, cross, dot, gradient_of
 from msm.linearised import spring_state
 from msm.network import Network
 
@@ -41,7 +42,6 @@ class Tangent(NamedTuple):
     pressure: Floats
 
 
-@kernel()
 def empty_tangent(net: Network) -> Tangent:
     """Uninitialised arrays for the tangent of a lattice."""
     springs, cells = net.ends.shape[0], net.cells.shape[0]
@@ -56,7 +56,10 @@ def empty_tangent(net: Network) -> Tangent:
     )
 
 
-@kernel()
+register_jitable(empty_tangent)  # for kernels too
+
+
+@kernel(makes_arrays=False)
 def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
     """Set the tangent at the displacement u [m] (n, 3)."""
     for s in range(net.ends.shape[0]):
@@ -96,7 +99,7 @@ def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
     return swelling - net.swollen[c]
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def make_definite(at: Tangent) -> None:
     """Drop the terms that can make the tangent indefinite.
 
@@ -108,7 +111,7 @@ def make_definite(at: Tangent) -> None:
     at.pressure[:] = 0.0
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
     """Add `share` times the tangent times p (n, 3), with zeros at constrained components."""
     add_spring_product(net, at, p, share, out)
@@ -147,9 +150,9 @@ def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Fl
         cell, f, g = net.cells[c], at.deformation[c], at.cofactor[c]
         swelling = 0.0
         rate = (
-            gradient_of(cell, p, 0, to_gradient),
-            gradient_of(cell, p, 1, to_gradient),
-            gradient_of(cell, p, 2, to_gradient),
+            gradient_of(cell, p, X, to_gradient),
+            gradient_of(cell, p, Y, to_gradient),
+            gradient_of(cell, p, Z, to_gradient),
         )
         for d in range(3):
             swelling += dot(rate[d], g[d])
@@ -164,7 +167,7 @@ def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Fl
             scatter(cell, out, d, x, y, z)
 
 
-@kernel()
+@kernel(makes_arrays=False)
 def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
     """Add `share` times the diagonal (n, 3) of the tangent after `make_definite`."""
     for s in range(net.ends.shape[0]):

@@ -39,7 +39,7 @@ OUTSIDE = 1e-9
 """A point with a barycentric coordinate below minus this lies outside; above, on a face."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TetrahedralLattice:
     """A tetrahedral mesh as a lattice."""
 

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from msm.kernel import inner_kernel, kernel
+from msm.kernel import inner_kernel
 from msm.kinematics import dot
 from study.problem.rigid import PLATE, SPHERE
 
@@ -129,7 +129,7 @@ def contact_state(contact: Contact | None) -> ContactState:
     )
 
 
-@kernel()
+@inner_kernel()
 def resolve_contact(
     contact: Contact | None, tip_motion: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
@@ -289,7 +289,7 @@ def set_effective_mass(contact: Contact, p: int, a: int, dt: float, u: Floats) -
     contact.inverse_effective_mass[a] = inverse
 
 
-@kernel()
+@inner_kernel()
 def solve_impulses(contact: Contact, tip_motion: Floats, count: int, dt: float) -> None:
     """Find the impulses of the active points and the velocity changes of the nodes.
 

@@ -8,7 +8,7 @@ from msm.calibration import reference_stiffness
 from msm.damping import NodalDamping
 from msm.forces import internal_forces
 from msm.grid import grids_of
-from msm.grid_explicit import add_forces, take_in
+from msm.grid_explicit import add_forces, follow_all, take_in
 from msm.integrators import INTEGRATORS
 from msm.kernel import kernel
 from msm.laws import Basafa, Hooke, piecewise
@@ -41,7 +41,8 @@ EXPLICIT = [name for name, method in INTEGRATORS.items() if method.on_grid is no
 
 @kernel()
 def set_forces(law, of, u):
-    take_in(of, u, u)
+    take_in(of.grids[0], of.place, u, u)
+    follow_all(of)
     add_forces(law, of, NOTHING, 0, of.grids[0].u)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
 from numpy.linalg import eigvals, eigvalsh, norm
 from scipy.sparse import csr_array, eye_array, kron
 
@@ -10,6 +11,7 @@ from msm import volume as volumes
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
 from msm.forces import internal_forces
+from msm.grid import grids_of
 from msm.integrators import INTEGRATORS, UNBOUNDED, Integrator
 from msm.kernel import kernel
 from msm.lattice import build, interpolation, node_volumes
@@ -421,6 +423,48 @@ def test_the_definite_tangent_is_positive_and_has_the_diagonal_it_says(rng):
     assert eigvalsh(definite)[0] > 0.0
     add_diagonal(net, tangent, 1.0, diagonal)
     assert np.diag(definite) == pytest.approx(diagonal.ravel(), rel=1e-12)
+
+
+# Memory --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("on_grid", [False, True])
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_every_array_that_a_kernel_makes_is_freed(name, on_grid):
+    """One compiled with `makes_arrays` false would keep those that kernels below it make."""
+    body = Held()
+    net, method, (u, v) = body.arrays(), INTEGRATORS[name], body.still()
+    step, of = method.advance, net
+    if on_grid:
+        step, of = method.on_grid, grids_of(body.lattice, net)
+        if step is None:
+            pytest.skip("has no grid")
+    factors, dt = np.ones((3, len(method.at))), 0.1 * body.critical_step()
+    assert balance(lambda: step(body.law, of, factors, dt, u, v)) == 0
+    assert norm(u) > 0.0
+
+
+def test_an_array_that_is_never_freed_is_seen():
+    keep = kernel(makes_arrays=False)(lambda n: made(n).shape[0])
+    assert balance(lambda: keep(3)) == 1
+
+
+@kernel()
+def made(n):
+    return np.empty(n)
+
+
+def balance(work):
+    """How many more arrays were made than freed."""
+    work()  # compiled before they are counted
+    _nrt_python.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats()
+        work()
+        after = rtsys.get_allocation_stats()
+    finally:
+        _nrt_python.memsys_disable_stats()
+    return (after.mi_alloc - before.mi_alloc) - (after.mi_free - before.mi_free)
 
 
 # An integrator from elsewhere ----------------------------------------------------------------

@@ -1,1 +1,1 @@
-"""The discrete problem in the files of other codes, so that they can solve it again."""
+"""Export of the discrete problem to the input files of other codes."""

@@ -1,8 +1,8 @@
 """CalculiX input decks (Dhondt, CalculiX CrunchiX manual 2.20): static and dynamic.
 
-The foundation couples its nodes. Per direction its matrix S is springs of -S_ij between nodes i
-and j (SPRING2) and of the row's sum to the ground (SPRING1): exact, also where a constant is
-negative. Its Rayleigh damping has them in it, as the reference's has.
+The foundation couples its nodes. Per direction, its matrix S is represented exactly by springs of
+-S_ij between nodes i and j (SPRING2) and of the row sum to ground (SPRING1); constants may be
+negative. Rayleigh damping includes these springs, as in the reference.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Transient:
     """Steps of a motion from rest by HHT with `alpha`, and its Rayleigh damping.
 
     `factors` (count + 1,) or (count + 1, loads) at 0, `step` [s], 2 `step`, ...; the first is zero,
-    for CalculiX takes the first acceleration under load otherwise than HHT. All nodes are printed
+    since CalculiX and HHT differ in the initial acceleration under load. All nodes are printed
     after every `kept` steps and after the last.
     """
 
@@ -52,7 +52,7 @@ class Transient:
 
     @property
     def times(self) -> Floats:
-        """At which the factors are [s]."""
+        """Times [s] of the factors."""
         return np.asarray(self.step * np.arange(len(self.factors)), dtype=np.float64)
 
     @property
@@ -68,8 +68,8 @@ class Transient:
 def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, str]:
     """Text of the decks and of their parts by file name; dynamic.inp only if there is a motion.
 
-    Of loads that meet at a node, as those of a tool that travels do, CalculiX would give all forces
-    there the history of one: each node has a history of its own instead, of its force [N].
+    Where loads share a node, as those of a travelling tool do, CalculiX would apply one history to
+    all forces there. Each node then has a history of its own force [N] instead.
     """
     loads = (problem.full_load,) if problem.is_merged else problem.loads
     parts = dict(zip(load_files(problem), loads, strict=True))
@@ -88,7 +88,7 @@ def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, s
 
 
 def load_files(problem: NodalProblem) -> list[str]:
-    """Name of the file of each load that has a history, of all where these meet."""
+    """Name of the file of each load with a history, of a single file where loads share a node."""
     if problem.is_merged:
         return ["load.inp"]
     return ["load.inp", *(f"load.{n}.inp" for n in range(2, len(problem.loads) + 1))]
@@ -99,7 +99,7 @@ def _lines(lines: Iterable[str]) -> str:
 
 
 def _number(value: float) -> str:
-    """As many digits as CalculiX reads: it takes 20 characters."""
+    """A number in 20 characters, as many as CalculiX reads."""
     text = f"{value:.13e}"
     return text if len(text) <= FIELD else f"{value:.12e}"
 
@@ -134,7 +134,7 @@ def _foundation(problem: NodalProblem) -> Iterator[str]:
 
 
 def _sets(problem: NodalProblem) -> dict[tuple[str, int, int], list[tuple[int, ...]]]:
-    """Springs by what one set has in common: constant, number of nodes, direction."""
+    """Springs grouped by constant, number of nodes and direction."""
     found: dict[tuple[str, int, int], list[tuple[int, ...]]] = {}
     for nodes, constant in springs(problem):
         for direction in range(1, DIRECTIONS + 1):
@@ -159,7 +159,7 @@ def _load(forces: Floats) -> Iterator[str]:
 
 
 def _static(problem: NodalProblem, parts: Iterable[str]) -> Iterator[str]:
-    """All in one step, in which forces on a node add up."""
+    """All loads in one static step, in which forces on a node add up."""
     yield from MODEL
     yield from ("*STEP", "*STATIC")
     for part in parts:
@@ -172,7 +172,7 @@ def _static(problem: NodalProblem, parts: Iterable[str]) -> Iterator[str]:
 
 
 def _dynamic(problem: NodalProblem, motion: Transient) -> Iterator[str]:
-    """From rest under gravity, which leaves a linear motion as it is and is not in it."""
+    """Motion from equilibrium under gravity, which does not enter a linear motion."""
     yield from MODEL
     times = motion.times
     histories = ["HISTORY", *(f"HISTORY{n}" for n in range(2, len(problem.loads) + 1))]

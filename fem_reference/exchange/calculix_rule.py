@@ -1,7 +1,7 @@
 """Stiffness and mass with the quadrature of CalculiX, for a comparison to all printed digits.
 
-C3D4 has one point, C3D10 four: enough for the stiffness of straight elements, too few for the mass
-and for curved elements. The reference itself integrates with more.
+C3D4 has one point, C3D10 four: exact for the stiffness of straight elements, too few for the mass
+and for curved elements. The reference itself uses more points.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ FOUR_POINTS = (
     np.full(4, 1.0 / 24.0),
 )
 RULES = {12: ONE_POINT, 30: FOUR_POINTS}
-"""By the number of unknowns of an element."""
+"""Quadrature rules by the number of unknowns of an element."""
 
 
 def integrated(body: Body, tissue: Tissue, given: NodalProblem | None = None) -> Body:
-    """The body with stiffness, mass and weight as CalculiX integrates them, all else as before.
+    """The body with the quadrature of CalculiX for stiffness, mass and weight.
 
     For displacement elements alone. Attached weights have no mass in it, but act as `given` has it.
     """

@@ -51,20 +51,20 @@ class NodalProblem:
 
     @property
     def full_load(self) -> Floats:
-        """Nodal forces [N] (n, 3) of all loads in full: of one that travels, at one place."""
+        """Nodal forces [N] (n, 3) of all loads in full; a travelling load acts at one place."""
         full = np.ones(len(self.loads)) if self.full is None else self.full
         return np.asarray(np.einsum("k,knd->nd", full, np.array(self.loads)))
 
     @property
     def is_merged(self) -> bool:
-        """Whether loads meet at a node, or are not all there in full at once."""
+        """Whether loads share a node, or are not all in full at once."""
         loaded = [forces != 0.0 for forces in self.loads]
         meet = bool((np.sum(loaded, axis=0) > 1).any())
         return meet or (self.full is not None and bool((self.full != 1.0).any()))
 
     @property
     def loads(self) -> tuple[Floats, ...]:
-        """Nodal forces [N] (n, 3) of each load that has a history."""
+        """Nodal forces [N] (n, 3) of each load with a history."""
         return (self.load, *self.others)
 
     @property
@@ -82,7 +82,7 @@ class NodalProblem:
 def nodal_problem(
     body: Body, tissue: Tissue, foundation: Support, external: ExternalLoads = WEIGHTLESS
 ) -> NodalProblem:
-    """The problem that a body is, as plain arrays.
+    """The problem of a body as plain arrays.
 
     ValueError for Taylor-Hood elements: only the displacement elements have counterparts.
     """

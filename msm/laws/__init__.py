@@ -1,10 +1,10 @@
 """Spring laws: tension over strain, relative to the spring's weight and rest length.
 
 A spring of rest length L_0, weight w (its stiffness relative to k_ref) and strain
-X = (L - L_0) / L_0 pulls with w L_0 `tension(law, X)`; `stiffness(law, X)` is the slope. A law is a
-named tuple of constants, and the record of its type in LAWS has the functions; the kernel compiles
-them into a loop of their own with nothing left to decide inside. A new law is a file with its named
-tuple and its `ForceLaw`, and a line in LAWS, where a scene finds it by name.
+X = (L - L_0) / L_0 has the force w L_0 `tension(law, X)`; `stiffness(law, X)` is the slope. A law
+is a named tuple of constants. The record of its type in LAWS has the functions, which are compiled
+into the loops of the kernels without a branch on the law. A new law is a file with its named tuple
+and its `ForceLaw`, and an entry in LAWS, by whose name a scene selects it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def force_law_of(law: Law) -> ForceLaw:
 
 
 def law_of_kind(law: Any) -> ForceLaw | None:
-    """The record in LAWS of what the compiler knows of a law, its type."""
+    """The record in LAWS of a law's numba type; None for another type."""
     return _record(getattr(law, "instance_class", None))
 
 
@@ -71,7 +71,7 @@ def stiffness(law: Law, strain: float) -> float:
 
 @overload(tension, strict=False)  # whatever a law calls its arguments
 def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:
-    """Choose the tension by the type of the law, when a kernel is compiled."""
+    """Select the tension by the type of the law, at compilation."""
     found = law_of_kind(law)
     if found is None:
         return None
@@ -80,7 +80,7 @@ def _compiled_tension(law: Any, strain: Any) -> Callable[..., Any] | None:
 
 @overload(stiffness, strict=False)
 def _compiled_stiffness(law: Any, strain: Any) -> Callable[..., Any] | None:
-    """Choose the slope by the type of the law, when a kernel is compiled."""
+    """Select the stiffness by the type of the law, at compilation."""
     found = law_of_kind(law)
     if found is None:
         return None
@@ -88,12 +88,12 @@ def _compiled_stiffness(law: Any, strain: Any) -> Callable[..., Any] | None:
 
 
 def initial_stiffness(law: Law) -> float:
-    """Slope [N/m] of the tension at rest, towards stretching if the law has a corner there."""
+    """Slope [N/m] of the tension at zero strain, in extension if the law has a kink there."""
     return stiffness(law, 0.0)
 
 
 def stiffness_at_rest(law: Law) -> tuple[float, float]:
-    """Slopes [N/m] of the tension just below and just above no strain."""
+    """Slopes [N/m] of the tension just below and just above zero strain."""
     return stiffness(law, float(np.nextafter(0.0, -1.0))), initial_stiffness(law)
 
 

@@ -1,4 +1,4 @@
-"""Springs of the Basafa benchmark, eqs. (6), (7): cubic up to a strain, then straight on."""
+"""Springs of the Basafa benchmark, eqs. (6), (7): cubic up to a strain, linear beyond."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from msm.laws.force_law import ForceLaw
 
 
 class Basafa(NamedTuple):
-    """Eq. (6), (7): K_1 X + K_2 X^3 up to the strain x_c, then straight on.
+    """Eqs. (6), (7): K_1 X + K_2 X^3 up to the strain x_c, with constant slope beyond.
 
-    `k1`, `k2` [N/m] are K_1 / h and K_2 / h of an edge: a face diagonal thus has sqrt(2) times the
-    force constants of an edge, which keeps the lattice isotropic.
+    `k1`, `k2` [N/m] are K_1 / h and K_2 / h of an edge. A face diagonal has sqrt(2) times the force
+    constants of an edge, which keeps the lattice isotropic.
     """
 
     k1: float

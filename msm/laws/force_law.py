@@ -1,4 +1,4 @@
-"""What a spring law is told by: one record for each kind."""
+"""Definition of a kind of spring law."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ Law: TypeAlias = tuple[Any, ...]
 class ForceLaw(NamedTuple):
     """One kind of spring law.
 
-    `type`: the named tuple of its constants, numbers and arrays. `tension(law, strain)` and its
-    slope `stiffness(law, strain)` [N/m]: plain functions that numba can compile, for the
-    kernels take them in. `largest_stiffness(law)` [N/m]: largest slope at any
-    strain. `make(k, ...)`: the law in proportion to a linear spring of k [N/m]; its other arguments
-    are what a scene gives by their names, each a dimensionless number or a sequence of them, and a
-    ValueError says why they make no law. `linear`: whether the tension is proportional to the
-    strain, whatever the constants. `branchless`: whether tension and stiffness do the same at every
-    strain and use no more than +, -, *, /, abs, min and max, so that the kernels may give them
-    several strains at once; another law is asked strain by strain.
+    `type`: named tuple of its constants, numbers and arrays. `tension(law, strain)` and its slope
+    `stiffness(law, strain)` [N/m]: plain functions that numba can compile into the kernels.
+    `largest_stiffness(law)` [N/m]: largest slope at any strain. `make(k, ...)`: the law scaled by a
+    linear spring of k [N/m]; a scene gives its other arguments by name, each a dimensionless number
+    or a sequence of them. ValueError, with the reason, for invalid ones. `linear`: whether the
+    tension is proportional to the strain for any constants. `branchless`: whether tension and
+    stiffness use the same operations at every strain, and only +, -, *, /, abs, min and max, so
+    that the kernels can evaluate a vector of strains; other laws are evaluated strain by strain.
     """
 
     type: type[Law]

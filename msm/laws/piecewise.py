@@ -1,4 +1,4 @@
-"""Springs of a measured law: straight pieces between points of strain and tension."""
+"""Springs of a measured law: linear interpolation between points of strain and tension."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from msm.laws.force_law import ForceLaw
 Floats = NDArray[np.float64]
 
 ZERO = 1e-12
-"""How far from zero, relative to its largest entry, a table's tension at rest may round."""
+"""Rounding of the tension at zero strain, relative to the largest entry of the table."""
 
 
 class Piecewise(NamedTuple):
-    """Straight pieces between measured points, the first and last carried on; see `piecewise`.
+    """Linear interpolation between measured points, extrapolated at both ends; see `piecewise`.
 
-    `strains` and `tensions` [N/m], each (p,), both rising. Where two pieces meet, the slope is that
-    of the piece of larger strain.
+    `strains` and `tensions` [N/m], each (p,), both ascending. At a point the slope is that of the
+    interval of larger strain.
     """
 
     strains: Floats
@@ -31,8 +31,8 @@ class Piecewise(NamedTuple):
 def piecewise(strains: Sequence[float] | Floats, tensions: Sequence[float] | Floats) -> Piecewise:
     """Law through points of strain and tension [N/m], relative as for every law.
 
-    ValueError unless there are two points or more, finite and rising, none of a strain below -1,
-    on a line through (0, 0).
+    ValueError unless there are two or more finite and ascending points, with no strain below -1 and
+    no tension at zero strain.
     """
     x, t = np.array(strains, dtype=np.float64), np.array(tensions, dtype=np.float64)
     if x.ndim != 1 or x.shape != t.shape or len(x) < 2:
@@ -82,7 +82,7 @@ def in_proportion(
 
 @register_jitable
 def _piece(law: Piecewise, strain: float) -> int:
-    """Which piece a strain lies on, counted without a branch, which strains about 0 would mislead.
+    """Interval of a strain, found without a branch, which strains about 0 would mispredict.
 
     For NaN it is the first.
     """

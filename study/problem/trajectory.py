@@ -13,7 +13,7 @@ Status = Literal["finished", "diverged", "not finished"]
 """"not finished": no next state was found, or the resources of the run did not suffice."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observation:
     """When and where a model is observed.
 

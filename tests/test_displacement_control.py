@@ -1,4 +1,4 @@
-"""Bodies and lattices whose faces are moved: closed forms, derivatives, declared ends."""
+"""Bodies and lattices under displacement control: closed forms, derivatives, stated failures."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from fem_reference import natural_frequency
 from fem_reference.displacement_control import Loading, solve_linear
-from fem_reference.displacement_control import equilibrium_path as solve_driven
+from fem_reference.displacement_control import equilibrium_path as solid_path
 from fem_reference.grid import curved, straight
 from fem_reference.laws import NeoHookean
 from fem_reference.mixed_strain import mixed_solid
@@ -15,7 +15,7 @@ from msm import displacement_control, volume
 from msm import lattice as cells
 from msm.calibration import lame, reference_stiffness
 from msm.damping import UNDAMPED
-from msm.displacement_control import equilibrium_path
+from msm.displacement_control import equilibrium_path as lattice_path
 from msm.laws import Hooke
 from msm.network import network
 from msm.springs import connect
@@ -62,7 +62,7 @@ def uniaxial(nu, stretch):
 def test_sliding_plates_take_the_closed_form(nu):
     solid = body(nu)
     prescribed, high = plates(solid.points, 0.3)
-    path = solve_driven(solid, Loading(prescribed, np.zeros(solid.size)))
+    path = solid_path(solid, Loading(prescribed, np.zeros(solid.size)))
     (state,) = path.states
     lateral, stress = uniaxial(nu, 0.7)
     exact = solid.points * (np.array([lateral, lateral, 0.7]) - 1.0)
@@ -97,7 +97,7 @@ def test_patch_at_finite_strain(rng):
     x = solid.points
     inner = np.all((x > 1e-9) & (x < x.max(axis=0) - 1e-9), axis=1)
     prescribed = np.where(inner[:, None], np.nan, x @ (F - EYE).T)
-    (state,) = solve_driven(solid, Loading(prescribed, np.zeros(solid.size))).states
+    (state,) = solid_path(solid, Loading(prescribed, np.zeros(solid.size))).states
     assert np.abs(state.displacement - x @ (F - EYE).T).max() < 1e-9 * EDGE
     first, mu = lame(E, 0.499)
     assert state.pressure == pytest.approx(first * np.log(np.linalg.det(F)), rel=1e-6)
@@ -123,22 +123,22 @@ def test_small_strain_is_the_limit_of_large():
     solid = body(0.499)
     prescribed, high = plates(solid.points, 1e-5, bonded=True)
     loading = Loading(prescribed, np.zeros(solid.size))
-    (large,), small = solve_driven(solid, loading).states, solve_linear(solid, loading)
+    (large,), small = solid_path(solid, loading).states, solve_linear(solid, loading)
     assert large.reaction[high, 2].sum() == pytest.approx(small.reaction[high, 2].sum(), rel=1e-4)
 
 
 def test_a_body_that_is_not_held_or_turned_inside_out_ends_declared():
     solid = body(0.499)
     prescribed, _ = plates(solid.points, 0.99, bonded=True)
-    path = solve_driven(solid, Loading(prescribed, np.zeros(solid.size)), (0.1, 1.0))
+    path = solid_path(solid, Loading(prescribed, np.zeros(solid.size)), (0.1, 1.0))
     assert not path.converged
     assert len(path.states) == 1
     assert 0.1 <= path.reached < 1.0
     assert "times what is asked for" in path.failure
     with pytest.raises(ValueError, match="do not fit"):
-        solve_driven(solid, Loading(prescribed[1:], np.zeros(solid.size)))
+        solid_path(solid, Loading(prescribed[1:], np.zeros(solid.size)))
     with pytest.raises(ValueError, match="not zero"):
-        solve_driven(solid, Loading(prescribed, np.zeros(solid.size)), (0.0,))
+        solid_path(solid, Loading(prescribed, np.zeros(solid.size)), (0.0,))
     for nu in (0.0, -0.2):
         with pytest.raises(ValueError, match=r"tissue\.poisson_ratio"):
             mixed_solid(straight(block_mesh((EDGE,) * 3, EDGE)), Tissue(poisson_ratio=nu))
@@ -152,7 +152,7 @@ def test_a_slender_column_buckles_under_its_own_weight():
     prescribed = np.where(x[:, 2:] < 1e-9, 0.0, np.full_like(x, np.nan))
     greatest = 7.837 * E * side**4 / 12.0 / length**3
     weight = solid.weight(np.array([0.0, 0.0, -greatest / (1000.0 * side**2)]), 1000.0)
-    path = solve_driven(solid, Loading(prescribed, weight), (0.8, 1.2))
+    path = solid_path(solid, Loading(prescribed, weight), (0.8, 1.2))
     assert np.abs(path.states[0].displacement[:, :2]).max() < 0.02 * length
     # Two cells of the elements more in width would come nearer; bent, it is followed no further.
     assert 0.95 < path.reached < 1.15
@@ -174,7 +174,7 @@ def test_a_rod_between_walls_vibrates_at_its_closed_form():
     stretch = 1.2
     pulled = prescribed.copy()
     pulled[solid.points[:, 2] > length - 1e-9, 2] = (stretch - 1.0) * length
-    (state,) = solve_driven(solid, Loading(pulled, np.zeros(solid.size))).states
+    (state,) = solid_path(solid, Loading(pulled, np.zeros(solid.size))).states
     slope = (first * (1.0 - np.log(stretch)) + mu * (stretch**2 + 1.0)) / stretch**2
     found = natural_frequency.lowest_frequency(solid, loading, rho, state)
     assert found == pytest.approx(np.sqrt(slope / rho) / (4.0 * length), rel=1e-3)
@@ -228,7 +228,7 @@ def lattice(nu, spacing=0.01):
 def test_the_lattice_between_sliding_plates_has_its_modulus(nu):
     nodes, law, net = lattice(nu)
     prescribed, high = plates(nodes, 1e-6)
-    (rest,) = equilibrium_path(law, net, prescribed).states
+    (rest,) = lattice_path(law, net, prescribed).states
     assert rest.reaction[high, 2].sum() == pytest.approx(-1e-6 * E * EDGE**2, rel=1e-4)
     across = rest.displacement[:, 0].max() / EDGE
     assert across == pytest.approx(nu * 1e-6, rel=1e-4)
@@ -239,7 +239,7 @@ def test_forces_that_hold_the_lattice_are_the_slope_of_its_energy():
     nodes, law, net = lattice(0.499)
     prescribed, high = plates(nodes, 0.2, bonded=True)
     factors = tuple(np.linspace(0.0, 1.0, 21)[1:])
-    found = equilibrium_path(law, net, prescribed, factors)
+    found = lattice_path(law, net, prescribed, factors)
     assert not found.failure
     force = np.array([0.0, *(rest.reaction[high, 2].sum() for rest in found.states)])
     work = np.trapezoid(force, -0.2 * EDGE * np.array([0.0, *factors]))
@@ -254,7 +254,7 @@ def test_forces_that_hold_the_lattice_are_the_slope_of_its_energy():
 def test_newtons_method_converges_quadratically_near_incompressibility():
     nodes, law, net = lattice(0.4999)
     prescribed, _ = plates(nodes, 0.1, bonded=True)
-    (rest,) = equilibrium_path(law, net, prescribed).states
+    (rest,) = lattice_path(law, net, prescribed).states
     assert len(rest.residuals) <= 7
     assert rest.residuals[-1] < 0.1 * rest.residuals[-2] ** 1.5 or rest.residuals[-1] < 1e-12
 
@@ -263,17 +263,17 @@ def test_a_lattice_that_gives_way_says_so():
     nodes, law, net = lattice(0.25)
     free = np.full_like(nodes, np.nan)
     loaded = net._replace(load=np.tile([0.0, 0.0, -1e-3], (len(nodes), 1)))
-    found = equilibrium_path(law, loaded, free)
+    found = lattice_path(law, loaded, free)
     assert found.failure
     assert found.reached == 0.0
     prescribed, _ = plates(nodes, 0.999, bonded=True)
-    found = equilibrium_path(law, net, prescribed, (0.1, 1.0))
+    found = lattice_path(law, net, prescribed, (0.1, 1.0))
     assert found.failure
     assert len(found.states) == 1
     with pytest.raises(ValueError, match="does not fit"):
-        equilibrium_path(law, net, prescribed[1:])
+        lattice_path(law, net, prescribed[1:])
     with pytest.raises(ValueError, match="not zero"):
-        equilibrium_path(law, net, prescribed, (0.0,))
+        lattice_path(law, net, prescribed, (0.0,))
 
 
 def test_a_wrong_volume_term_is_seen():
@@ -281,7 +281,7 @@ def test_a_wrong_volume_term_is_seen():
     nodes, law, net = lattice(0.45)
     wrong = replace_bulk(net)
     prescribed, high = plates(nodes, 1e-6)
-    (rest,) = equilibrium_path(law, wrong, prescribed).states
+    (rest,) = lattice_path(law, wrong, prescribed).states
     assert rest.reaction[high, 2].sum() != pytest.approx(-1e-6 * E * EDGE**2, rel=1e-3)
 
 
