@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.spatial import cKDTree
 
 from fem_reference import model as fem
 from fem_reference.contact.law import Areas, dragged, forces
@@ -31,6 +32,7 @@ TOP = np.array([0.03, 0.03, 0.03])
 TISSUE = Tissue(poisson_ratio=0.4)
 DAMPING = RayleighDamping(30.0)
 NOTHING = np.zeros((0, 3))
+ASIDE = np.array([1.0, 0.0, 0.0])
 
 
 def observed(duration, samples, peak):
@@ -173,6 +175,110 @@ def test_friction_stays_inside_its_cone(friction):
     smooth = at_peak(body, (RigidTool("tool", SPHERE, 0.015, TOP, DOWN, travel),), seen).forces[0]
     assert found[0] < smooth[0] - 1e-3  # dragged back by what it rubs on
     assert abs(found[0]) < 1.5 * (friction + 0.2) * abs(found[2])
+
+
+def turned(one, Q):
+    """A tool and its way in axes that are turned."""
+    return replace(one, tip=Q @ one.tip, axis=Q @ one.axis, travel=lambda t: one.travel(t) @ Q.T)
+
+
+def rubbing(shape, friction, along=(0.0, 1e-3), **settings):
+    """Pressed in by 2 mm until a half, then dragged from one place to the next."""
+    corners = np.linspace(0.5, 1.0, len(along))
+
+    def travel(times):
+        down = np.interp(times, [0.0, 0.5], [0.0, 2e-3])
+        return np.outer(down, DOWN) + np.outer(np.interp(times, corners, along), ASIDE)
+
+    return replace(tool(shape, friction=friction, **settings), travel=travel)
+
+
+@pytest.mark.parametrize(("shape", "friction"), [(SPHERE, 0.3), (PUNCH, 0.3), (PUNCH, 0.0)])
+def test_a_problem_in_turned_axes_has_turned_forces(shape, friction):
+    """The tool's axis, its normals and the way that it slips are its own."""
+    one = rubbing(shape, friction)
+    Q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    Q *= np.linalg.det(Q)
+    mesh = block_mesh(SIZE, 0.015)
+    blunt, base = ToolPatch(Q @ TOP, Q @ DOWN, 0.02, 0.0), Foundation(Q @ DOWN, 0.0, 1e-3, 1e7)
+    body = discretise(replace(mesh, points=mesh.points @ Q.T), TISSUE, base, blunt, "p2")
+    seen = observed(1.0, 9, 8)
+    found = at_peak(body, (turned(one, Q),), seen).forces[0]
+    exact = at_peak(block(), (one,), seen).forces[0]
+    assert (abs(exact[0]) > 0.05 * abs(exact[2])) == (friction > 0.0)
+    assert found == pytest.approx(Q @ exact, abs=1e-4 * np.linalg.norm(exact))
+
+
+@pytest.mark.parametrize("shape", [SPHERE, PUNCH])
+def test_hardly_any_friction_is_as_none(shape):
+    """Two laws, of normals alone and with tangents, agree where both hold."""
+    seen = observed(1.0, 9, 8)
+    none, little = (at_peak(block(), (rubbing(shape, mu),), seen).forces[0] for mu in (0.0, 1e-7))
+    assert little == pytest.approx(none, abs=1e-4 * np.linalg.norm(none))
+
+
+def test_friction_remembers_the_way():
+    """Of a tool that went aside and came back, it holds against the way back."""
+    seen = observed(1.0, 9, 8)
+    found = at_peak(block(), (rubbing(PUNCH, 0.3, (0.0, 4e-3, 0.0)),), seen).forces[0]
+    assert found[0] > 0.1 * abs(found[2])
+
+
+def test_the_edge_of_a_punch_stays_where_it_was_on_a_linear_body():
+    """What moves aside takes neither more nor less of the surface under it."""
+    given = patch(block(), tool(PUNCH), np.zeros(1), 0.015)
+    nodes = given.shapes.shape[1]
+    lifted, aside = np.zeros((2, nodes, 3))
+    lifted[:, 2] = aside[:, 2] = 1e-3
+    aside[:, 0] = 0.01
+    still, moved = given.gaps(lifted, 0.0), given.gaps(aside, 0.0)
+    assert still.distance == pytest.approx(np.full(given.count, -1e-3))
+    assert (moved.distance == still.distance).all()
+
+
+def test_a_bonded_tool_is_the_same_beside_one_that_could_rub():
+    """The law with tangents holds it as that of normals alone does."""
+    held = rubbing(PUNCH, 0.0, bonded=True, depth=1e-3)
+    lifted = replace(rubbing(SPHERE, 0.5), radius=0.01, tip=TOP + 0.02 * ASIDE)
+    lifted = replace(lifted, name="lifted", travel=lambda t: np.outer(-1e-3 * t, DOWN))
+    held = replace(held, radius=0.01, tip=TOP - 0.015 * ASIDE)
+    seen = observed(1.0, 9, 8)
+    both, alone = (at_peak(block(), tools, seen).forces for tools in ((held, lifted), (held,)))
+    assert abs(alone[0, 0]) > 0.05 * abs(alone[0, 2])
+    assert both[0] == pytest.approx(alone[0], rel=1e-4)
+    assert (both[1] == 0.0).all()
+
+
+def test_each_tool_has_its_own_friction():
+    """Whichever comes first."""
+    rough, smooth = (
+        replace(rubbing(SPHERE, mu, (0.0, 2e-3)), name=name, radius=0.012, tip=TOP + side * ASIDE)
+        for mu, name, side in ((0.5, "rough", -0.015), (0.0, "smooth", 0.015))
+    )
+    seen = observed(1.0, 9, 8)
+    found = at_peak(block(), (rough, smooth), seen).forces
+    other = at_peak(block(), (smooth, rough), seen).forces
+    assert found == pytest.approx(other[::-1], abs=1e-4 * np.abs(found).max())
+    assert found[0, 0] - found[1, 0] < -0.05 * found[0, 2]
+
+
+def lopsided(cell, one):
+    """Difference of the vertices' displacement from its mirror image, over it, and of the force."""
+    body = block(cell)
+    rest, count = at_peak(body, (one,), observed(0.4, 41, 15)), len(body.mesh.points)
+    x, u = body.points[:count], rest.displacement.reshape(-1, 3)[:count]
+    _, image = cKDTree(x).query(np.array([SIZE[0], 0.0, 0.0]) + [-1.0, 1.0, 1.0] * x)
+    off = np.linalg.norm(u - [-1.0, 1.0, 1.0] * u[image]) / np.linalg.norm(u)
+    return off, abs(rest.forces[0, 0] / rest.forces[0, 2])
+
+
+def test_a_symmetric_contact_is_as_lopsided_as_its_mesh_and_less_so_on_a_finer_one():
+    """All diagonals of the mesh lean one way. The contact is as wide as one facet, then as two."""
+    wide = replace(tool(SPHERE), radius=0.05)
+    coarse, fine = (lopsided(cell, wide) for cell in (0.015, 0.0075))
+    assert fine[0] < 0.5 * coarse[0]
+    assert fine[1] < 1e-4
+    assert fine[1] < 0.5 * coarse[1]
 
 
 def test_friction_of_nothing_is_none():

@@ -242,7 +242,7 @@ def _by_mesh(measure: Measure, elements: Sequence[AtRest]) -> float:
 
 
 def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
-    """Lattices corrected by elements, with predicted errors and costs; none where they cannot be used."""
+    """Lattices corrected by elements, with predicted errors and costs, where they apply."""
     if seen.beyond is None or seen.elements is None:
         return
     last, base = seen.elements.elements[-1].size, seen.elements.problem.geometry.level(0)
