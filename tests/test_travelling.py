@@ -23,7 +23,9 @@ from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
-from study.tradeoff.contenders import contenders_of
+from study.tradeoff.contenders import contender, contenders_of
+from study.tradeoff.recommend import bound
+from study.tradeoff.request import _refuse_demand
 from tests.benchmarks import travelling
 from tests.benchmarks.corrected_places import TOLERANCE
 
@@ -385,3 +387,23 @@ def test_contenders_are_those_that_follow(scene):
     found = contenders_of(scene)
     assert {"corrected", "corrected-graded", "region", "finite-elements", "springs"} <= set(found)
     assert "superposition" not in found
+
+
+def test_where_the_way_is_known_all_that_is_chosen_from_follows_it(scene, problem):
+    """First the elements alone, which are the linear part of what is beside them, and no more."""
+    chosen = list(bound(scene))
+    assert [one.contender for one in chosen] == [
+        *("fem", "corrected", "corrected", "corrected"),
+        *("corrected-graded", "region", "corrected-graded", "region"),
+    ]
+    assert not any(contender(one.contender).lacks(scene) for one in chosen)
+    alone, both = (one.model(scene).prepare(problem) for one in chosen[:2])
+    linear = alone.simulate().trajectory.displacement
+    np.testing.assert_allclose(both.fine.simulate().trajectory.displacement, linear, rtol=1e-9)
+
+
+def test_where_the_place_is_known_tools_that_are_moved_are_refused():
+    moved_tool = read_scene("press")
+    with pytest.raises(ValueError, match=r"--known-place: .* leave it out"):
+        _refuse_demand(moved_tool, None, known_place=True)
+    _refuse_demand(moved_tool, None, known_place=False)
