@@ -16,6 +16,7 @@ from study.organ.block import block_mesh
 from study.problem.heterogeneous import HeterogeneousTissue, barycentric_samples, of_tetrahedra
 from study.results.provenance import organ_sha256
 from study.scene.file import read_scene, resolved, validate, write_scene
+from study.scene.nifti import read_image
 from study.scene.problem import problem_of
 
 nibabel = pytest.importorskip("nibabel")
@@ -177,6 +178,82 @@ def test_an_image_of_no_use_is_refused(tmp_path, make, unit, message):
         return
     with pytest.raises(ValueError, match=message):
         problem_of(scene)
+
+
+def edited(path, change):
+    """A sound image whose header, or whose bytes, are changed."""
+    image(path, halves)
+    if path.suffix == ".gz":
+        path.write_bytes(change(path.read_bytes()))
+        return path
+    read = nibabel.load(path, mmap=False)  # it is written over
+    nibabel.save(change(read) or read, path)
+    return path
+
+
+def without_place(read):
+    read.header["sform_code"] = read.header["qform_code"] = 0
+    return nibabel.Nifti1Image(read.dataobj, None, read.header)
+
+
+def with_another_qform(read):
+    moved = np.array(read.affine)
+    moved[0, 3] += 3.0
+    read.set_qform(moved, 1)
+
+
+def stored(kind):
+    return lambda read: nibabel.Nifti1Image(np.zeros(read.shape, kind), read.affine)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        # nibabel makes a place up where there is none, and takes the one of two.
+        ("m.nii", without_place, "says not where its voxels are"),
+        ("m.nii", with_another_qform, "its sform and its qform are up to 3 mm apart"),
+        ("m.nii", stored(np.complex64), "holds complex numbers"),
+        ("m.nii", stored([("R", "u1"), ("G", "u1"), ("B", "u1")]), "holds no numbers"),
+        ("m.nii.gz", lambda data: data[: len(data) // 2], "is no NIfTI image"),
+        ("m.nii.gz", lambda data: data[:100] + b"\xff" * 60 + data[160:], "is no NIfTI image"),
+    ],
+)
+def test_an_image_that_is_damaged_or_nowhere_is_refused(tmp_path, name, change, message):
+    path = edited(tmp_path / name, change)
+    with pytest.raises(ValueError, match=rf"^tissue\.stiffness_map\.file: .*{message}"):
+        read_image(path)
+
+
+@pytest.mark.parametrize(
+    ("offset", "patch"),
+    [
+        (40, b"\xff" * 4),
+        (42, b"\xff\xff"),
+        (42, b"\xff\x7f" * 3),
+        (70, b"\x99\x99"),
+        (123, b"\x07"),
+    ],
+)
+def test_a_header_of_nonsense_is_refused(tmp_path, offset, patch):
+    path = image(tmp_path / "m.nii", halves)
+    data = bytearray(path.read_bytes())
+    data[offset : offset + len(patch)] = patch
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match="is no NIfTI image"):
+        read_image(path)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("meter", 1e-3), ("micron", 1e3), ("mm", 1.0)])
+def test_the_unit_of_an_image_counts(tmp_path, unit, factor):
+    def scaled(read):
+        found = nibabel.Nifti1Image(read.dataobj, np.diag([factor] * 3 + [1.0]) @ read.affine)
+        found.header.set_xyzt_units(unit)
+        return found
+
+    found, affine = read_image(edited(tmp_path / "m.nii", scaled))
+    voxels, expected = read_image(image(tmp_path / "n.nii", halves))
+    assert affine == pytest.approx(expected, rel=1e-6)
+    assert (found == voxels).all()
 
 
 # Inclusions as a scene states them -------------------------------------------------------------

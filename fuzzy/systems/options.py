@@ -28,6 +28,8 @@ OUT_OF_RANGE: dict[str, OutOfRange] = {
     "matlab": OutOfRange("taken as it is", middle=True),
 }
 
+FEWEST, MOST = 11, 1_000_000
+"""Samples of an output's universe."""
 CHOICES: dict[str, Mapping[str, object]] = {
     "sampling": SAMPLINGS,
     "sugeno_aggregation": MERGES,
@@ -62,8 +64,10 @@ class InferenceOptions:
     out_of_range: str = "clamp"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.samples, int) or self.samples < 11:
-            raise ValueError(f"samples = {self.samples!r}: give a whole number of at least 11")
+        if not isinstance(self.samples, int) or not FEWEST <= self.samples <= MOST:
+            raise ValueError(
+                f"samples = {self.samples!r}: give a whole number from {FEWEST} to {MOST}"
+            )
         require_choices(self, CHOICES)
 
     @property

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from study.commands.flags import Whole
+
 PATIENTS = 20_000
 SEED = 1
 
 
-def cohort(*, patients: int = PATIENTS, seed: int = SEED, out: Path | None = None) -> None:
+def cohort(*, patients: Whole = PATIENTS, seed: Whole = SEED, out: Path | None = None) -> None:
     """Judge every fuzzy system on virtual patients whose stiffness is known, beside baselines.
 
     Parameters

@@ -5,7 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from study.commands.flags import AS_DEFAULT, AS_MATLAB, AsJson, Inference, LiverReading, Switch
+from study.commands.flags import (
+    AS_DEFAULT,
+    AS_MATLAB,
+    AsJson,
+    Inference,
+    LiverReading,
+    Switch,
+    WholeOrNone,
+)
 from study.commands.flags import given as given_flags
 
 
@@ -21,7 +29,7 @@ def estimate(
     out: Path | None = None,
     system: list[str] | None = None,
     explain: Switch = False,
-    row: int | None = None,
+    row: WholeOrNone = None,
     figures: Path | None = None,
     surface: tuple[str, str] | None = None,
     as_json: AsJson = False,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 EXIT_FAILED_CHECK = 1
 EXIT_BAD_INPUT = 2
@@ -17,6 +19,18 @@ Overrides = Annotated[list[str] | None, Parameter(name="--set")]
 Switch = Annotated[bool, Parameter(negative=())]
 """A flag that is off unless it is given."""
 AsJson = Annotated[bool, Parameter(name="--json", negative=())]
+
+
+def _whole(_: object, tokens: Sequence[Token]) -> int:
+    """The whole number of a flag; cyclopts would round 1.5 to 2."""
+    text = tokens[0].value
+    if not re.fullmatch(r"[+-]?[0-9]{1,12}", text):
+        raise ValueError(f"{text!r} is no whole number of at most 12 digits")
+    return int(text)
+
+
+Whole = Annotated[int, Parameter(converter=_whole)]
+WholeOrNone = Annotated[int | None, Parameter(converter=_whole)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +45,7 @@ class WorkerFlags:
         Address of a running Dask scheduler to use instead, tcp://HOST:PORT.
     """
 
-    workers: int = 0
+    workers: Whole = 0
     scheduler: str | None = None
 
 
@@ -94,7 +108,7 @@ class InferenceFlags:
     """
 
     sampling: str | None = None
-    samples: int | None = None
+    samples: WholeOrNone = None
     sugeno_aggregation: str | None = None
     reducer: str | None = None
     out_of_range: str | None = None

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.flags import HERE, Overrides, Switch, Workers
+from study.commands.flags import HERE, Overrides, Switch, Whole, WholeOrNone, Workers
 
 if TYPE_CHECKING:
     from study.robustness.organ_request import OrganRequest
@@ -19,10 +19,10 @@ def robustness(
     scene: str | None = None,
     *,
     set_: Overrides = None,
-    size: int | None = None,
-    seed: int = 0,
+    size: WholeOrNone = None,
+    seed: Whole = 0,
     spacing: str | None = None,
-    again: int | None = None,
+    again: WholeOrNone = None,
     out: Path | None = None,
     dry_run: Switch = False,
     where: Workers = HERE,

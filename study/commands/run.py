@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch
+from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch, WholeOrNone
 from study.folders import tell
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def run(
     save_mesh: Switch = False,
     resume: Switch = False,
     fresh: Switch = False,
-    workers: int | None = None,
+    workers: WholeOrNone = None,
     minutes: float | None = None,
 ) -> None:
     """Run a scene through every model it names and write a results folder with its report.

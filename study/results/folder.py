@@ -182,6 +182,10 @@ def read(folder: Path) -> Results:
         raise ResultsError(
             f"{folder}: no results here ({missing} is missing); make some with liver-study run"
         ) from None
+    except NotADirectoryError:
+        raise ResultsError(
+            f"{folder}: is a file; name the results folder that liver-study run made"
+        ) from None
     except ResultsError:
         raise
     except (OSError, ValueError) as error:

@@ -18,6 +18,12 @@ def check_size(size: int) -> None:
         raise ValueError(f"size: {size} is no power of two; give 256, 4096 or the like")
 
 
+def check_seed(seed: int) -> None:
+    """ValueError for a seed below zero, of which there is no sequence."""
+    if seed < 0:
+        raise ValueError(f"seed: {seed} is negative; give 0 or more")
+
+
 def shares(seed: int, size: int, unknowns: Sequence[Unknown] = UNKNOWNS) -> Floats:
     """Shares (size, groups + 2, unknowns) of the unknowns' ranges.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study.results.tables import write_table
 from study.robustness import rows, summary
-from study.robustness.design import check_size
+from study.robustness.design import check_seed, check_size
 from study.robustness.finer import TIMES, changes
 from study.robustness.organ_block import (
     CONTENDERS,
@@ -96,6 +96,7 @@ class OrganRequest:
     def tasks(self) -> list[Task]:
         """A task per row of the design. ValueError unless the size is a power of two."""
         check_size(self.size)
+        check_seed(self.seed)
         points = len(groups(unknowns(self.about))) + POINTS_APART
         return [self._task(row, points) for row in range(self.size)]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from study.results.tables import write_table
 from study.robustness import rows, summary
-from study.robustness.design import check_size, shares
+from study.robustness.design import check_seed, check_size, shares
 from study.robustness.patient import SYSTEMS
 from study.robustness.ranges import write_ranges
 from study.robustness.spacing import over_spacing
@@ -62,6 +62,7 @@ class RobustnessRequest:
     def tasks(self) -> list[Task]:
         """A task per block. ValueError unless the size is a power of two."""
         check_size(self.size)
+        check_seed(self.seed)
         return [
             Task(
                 "study.robustness.block:run",

@@ -24,6 +24,7 @@ from study.problem.heterogeneous import (
     of_tetrahedra,
 )
 from study.problem.tissue import Tissue
+from study.scene.nifti import read_image
 from study.scene.place import resolve
 from study.scene.schema import Inclusion, OrganTissue, Place, StiffnessMap
 
@@ -153,7 +154,7 @@ def _lies_in(mesh: TetrahedralMesh, tissue: HeterogeneousTissue) -> bool:
 
 def _mapped(given: StiffnessMap, tissue: Tissue, geometry: Geometry) -> Distance:
     """Young's modulus [Pa] at points of the scene, NaN where the image has none."""
-    voxels, affine = _image(Path(given.file))
+    voxels, affine = read_image(Path(given.file))
     of_young = 1.0 if given.quantity == "youngs-modulus" else 2.0 * (1.0 + tissue.poisson_ratio)
     modulus = voxels * PASCALS[given.unit] * of_young
     known = np.isfinite(modulus) & (modulus > 0.0)
@@ -203,37 +204,3 @@ class _Sampled:
         known = map_coordinates(self.known, at, order=1, mode="grid-constant", cval=0.0)
         values = map_coordinates(self.values, at, order=1, mode="grid-constant", cval=0.0)
         return np.where(known >= 0.5, values / np.maximum(known, 0.5), np.nan)
-
-
-def _image(path: Path) -> tuple[Floats, Floats]:
-    """Voxels (i, j, k), and the affine (4, 4) that takes their numbers to millimetres in RAS."""
-    try:
-        import nibabel
-        from nibabel.filebasedimages import ImageFileError
-    except ImportError:
-        raise ValueError(
-            "tissue.stiffness_map: needs nibabel, which is not installed; install "
-            "liver-study[images]"
-        ) from None
-    try:
-        image = nibabel.load(path)
-        voxels = np.asarray(image.get_fdata(dtype=np.float64))
-    except FileNotFoundError:
-        raise ValueError(f"tissue.stiffness_map.file: {path}: no such file") from None
-    except (OSError, ValueError, EOFError, ImageFileError) as error:
-        raise ValueError(
-            f"tissue.stiffness_map.file: {path} is no NIfTI image ({error}); name a .nii or "
-            ".nii.gz file"
-        ) from error
-    voxels = (
-        voxels.reshape(voxels.shape[:3]) if voxels.size == np.prod(voxels.shape[:3]) else voxels
-    )
-    if voxels.ndim != 3:
-        raise ValueError(
-            f"tissue.stiffness_map.file: {path} has {voxels.ndim} axes of {voxels.shape}; give one "
-            "volume"
-        )
-    affine = np.asarray(image.affine, dtype=float)
-    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-12:
-        raise ValueError(f"tissue.stiffness_map.file: {path} has no usable affine; write one")
-    return voxels, affine
