@@ -337,8 +337,15 @@ def test_an_exit_that_was_swallowed_is_made_up_for_at_the_next_stage(monkeypatch
 def test_a_scene_is_shown_as_a_file_that_can_be_run(typed, tmp_path):
     done = typed("scenes", "--show", "block")
     assert done.returncode == 0
+    assert typed("scenes", "block").stdout == done.stdout
     (tmp_path / "mine.toml").write_text(done.stdout)
     assert read_scene(str(tmp_path / "mine.toml")) == read_scene("block")
+
+
+def test_a_word_too_many_is_named(typed):
+    done = typed("scenes", "block", "paper")
+    assert done.returncode == 2
+    assert done.stderr.startswith("liver-study: paper: the command takes no more")
 
 
 def test_a_page_is_not_opened_that_is_not_made(typed):

@@ -253,6 +253,21 @@ def test_a_slider_without_a_reading_starts_at_the_reading_of_the_other():
     assert found.unread == ("hbv",)
 
 
+def test_the_page_has_the_front_of_those_that_follow_any_load():
+    """None of them beats one on it in time and error, and one is on no other front."""
+    shown = page(results_of()).tradeoff.configurations
+    free = [one for one in shown if one.any_load]
+    front = [one for one in shown if one.on_any_load_front]
+    assert front
+    assert all(one.any_load for one in front)
+    assert any(not one.on_front for one in front)
+    for one in front:
+        assert not any(
+            other.wall < one.wall and (other.error or 0.0) < (one.error or 0.0) - one.bar
+            for other in free
+        )
+
+
 def test_digits_of_the_table_of_motion_follow_the_error_of_the_curve():
     """Of 1 mm and 3.1 mm/s known to 1 and 1.2 %, and of curves whose error is a thousandth."""
     lines = {one.model: one for one in page(results_of()).probes[0].lines}

@@ -9,7 +9,7 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 
 from study import signals
 from study.commands.bundle import bundle
@@ -93,10 +93,18 @@ def _ending(error: BaseException) -> tuple[int, str]:
             given = f" ({error})" if str(error) else ""
             return EXIT_MACHINE, f"out of memory{given}; make the scene smaller"
         case ValueError() | CycloptsError():
-            return EXIT_BAD_INPUT, " ".join(str(error).split())
+            return EXIT_BAD_INPUT, _refusal(error)
         case _:
             _show(error)
             return EXIT_MACHINE, "a defect of the program, please report it with the lines above"
+
+
+def _refusal(error: ValueError | CycloptsError) -> str:
+    """What is wrong with the input, in one line."""
+    if isinstance(error, UnusedCliTokensError):
+        rest = " ".join(error.unused_tokens or ())
+        return f"{rest}: the command takes no more; --help lists what it takes"
+    return " ".join(str(error).split())
 
 
 def _show(error: BaseException) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def scenes(*, show: str | None = None) -> None:
+def scenes(show: str | None = None) -> None:
     """List the built-in scenes, or print one of them.
 
     Parameters

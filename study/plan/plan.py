@@ -24,6 +24,11 @@ from study.scene.problem import problem_of
 FIELD = "field"
 """The required quantity that includes the whole organ."""
 
+NOTHING_REQUIRED = (
+    'the scene requires nothing; give it a table require, or for example --set require.error="5 %"'
+)
+"""Why a scene is run as it stands, and how it would be planned."""
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -66,7 +71,7 @@ def plan(scene: Scene) -> Plan:
     """
     required = scene.require
     if required is None:
-        return Plan(scene, tuple(_as_stated(scene, "the scene has no table require")))
+        return Plan(scene, tuple(_as_stated(scene, NOTHING_REQUIRED)))
     if scene.is_point:
         return Plan(scene, tuple(_point(scene)))
     problem = problem_of(scene)
