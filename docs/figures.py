@@ -589,7 +589,8 @@ TOOLS_HEAD = (
 
 def planned_tools() -> Iterator[tuple[str, str]]:
     """What a plan foretells under moved tools, and what two lattices without a factor would."""
-    lines, rows = measured("planned_tools"), []
+    every, rows = measured("planned_tools"), []
+    lines = [one for one in every if float(one["found"]) > 1e-3]  # else a bonded tool holds it
     yield "planned-tools-scenes", str(len({one["scene"] for one in lines}))
     for quantity in dict.fromkeys(one["quantity"] for one in lines):
         ratios, by_two = (

@@ -203,6 +203,14 @@ def test_a_bonded_tool_holds_and_pulls():
     assert probe[held] == pytest.approx(-2e-3, rel=1e-2)
 
 
+def test_what_is_bonded_is_met_at_no_more_points_than_a_flat_tool():
+    def points(*overrides):
+        return len(posed(*overrides)[1].assembly.burden.surface.points)
+
+    flat, bonded = points("tool.shape=punch"), points("tool.contact=bonded")
+    assert points() > 2 * bonded == 2 * flat
+
+
 def test_a_bonded_sphere_is_moved_to_the_end_by_any_step():
     """Many of its points hang on a node: what a solution leaves does not grow from step to step."""
     small = "tool.contact=bonded", "tool.radius=12 mm", "lattice.spacing=12 mm"

@@ -14,7 +14,10 @@ from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 Floats = NDArray[np.float64]
 
 APART = {SPHERE: 0.2, PUNCH: 0.35, PLATE: 0.35}
-"""Of the spacing of a lattice, how far apart the points are at which tools of a shape are met."""
+"""Of the spacing of a lattice, how far apart the points are at which tools of a shape are met.
+
+What is bonded follows no shape: those of a bonded sphere are as far apart as a punch's.
+"""
 MOST_POINTS = 20_000
 
 
@@ -37,7 +40,7 @@ def touchable(
         return over_surface(kept, 1)
     corner = kept.points[kept.triangles]
     edge = float(np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).mean())
-    apart = min(APART[tool.shape] for tool in tools) * spacing
+    apart = min(APART[PUNCH if tool.bonded else tool.shape] for tool in tools) * spacing
     most = np.sqrt(MOST_POINTS / len(corner))
     per_direction = max(1, int(min(np.ceil(edge / apart), most)))
     return over_surface(kept, per_direction)
