@@ -1,8 +1,8 @@
-"""Products with sparse matrices of dense blocks, compiled: they are bound by what is read.
+"""Products with block-sparse matrices, compiled; they are limited by memory bandwidth.
 
-Nothing is reassociated: a compiler that may reorder sums gathers entries of many rows at once,
-which takes several times as long. A product has two parts, which two threads compute where a
-process has them, see `study.stages.threads`; the bits are those of one thread.
+Sums are not reassociated: a compiler that may reorder them gathers entries of many rows at once,
+which takes several times as long. A product is divided into two parts for two threads where the
+process has them (`study.stages.threads`); the result is that of one thread bit by bit.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ Ints = NDArray[np.int32]
 kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 
 WORTHWHILE = 50_000
-"""Blocks of a matrix from which a second thread gains more than it costs to wake it."""
+"""Number of blocks above which a second thread saves time."""
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Row i of blocks has entries `first[i]` to `last[i]` of `data`, in columns `indices`.
+    """Block row i has entries `first[i]` to `last[i]` of `data`, in block columns `indices`.
 
-    `data` (entries, r, c), r and c multiples of 3, may be in single precision, which halves what is
-    read.
+    `data` (entries, r, c), with r and c multiples of 3, may be in single precision, which halves
+    the memory traffic.
     """
 
     first: Ints
@@ -41,13 +41,13 @@ class Blocks:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows, and columns of a square matrix."""
+        """Numbers of rows and columns, assuming as many block rows as block columns."""
         rows, columns = self.data.shape[1:]
         return (rows * len(self.first), columns * len(self.first))
 
     @cached_property
     def _parts(self) -> tuple[tuple[int, int], ...]:
-        """Rows from and to of parts with as many entries each: two, or one where they are few."""
+        """Ranges of rows of two parts with equal numbers of entries, or one part of few entries."""
         count = len(self.first)
         ends = np.cumsum(self.last - self.first, dtype=np.int64)
         if count == 0 or ends[-1] < WORTHWHILE:
@@ -62,7 +62,7 @@ class Blocks:
         return found
 
     def add_product(self, x: Floats, total: Floats, share: float = 1.0) -> None:
-        """Add a share of the product to a total."""
+        """Add `share` times the product to `total` in place."""
         given = (
             self.first,
             self.last,
@@ -75,7 +75,7 @@ class Blocks:
         side_by_side(*(partial(_add_product, *rows, *given) for rows in self._parts))
 
     def magnitudes(self, x: Floats) -> Floats:
-        """The product of the magnitudes of the matrix and of a vector, without a copy of either."""
+        """Product of the absolute values of the matrix and of a vector, without copies."""
         found = np.zeros(len(self.first) * self.data.shape[1])
         _add_magnitudes(self.first, self.last, self.indices, self.data, x, found)
         return found
@@ -83,9 +83,9 @@ class Blocks:
 
 @dataclass(frozen=True)
 class SymmetricBlocks:
-    """A symmetric matrix by blocks of 3 x 3: the first of each row on its diagonal, others above.
+    """Upper triangle of a symmetric matrix in blocks of 3 x 3; each row starts at its diagonal.
 
-    There are none below. The data are in single precision, a quarter of a matrix in full.
+    In single precision it takes a quarter of the memory of the full matrix.
     """
 
     upper: Blocks
@@ -107,17 +107,17 @@ class SymmetricBlocks:
         return found
 
     def magnitudes(self, x: Floats) -> Floats:
-        """The product of the magnitudes of the matrix and of a vector."""
+        """Product of the absolute values of the matrix and of a vector."""
         return SymmetricBlocks(replace(self.upper, data=np.abs(self.upper.data))) @ np.abs(x)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Solves row after row of blocks for its own unknowns: a sweep of Gauss and Seidel.
+    """Block Gauss-Seidel sweep through `rows` in a given order.
 
-    Entries lie in the order of the `rows` in which it goes, those on the diagonal left out: to go
-    backward through what is stored forward takes many times as long. `inverses` (rows, r, r) are
-    those of the diagonal blocks, in the order of the matrix.
+    The off-diagonal entries are stored in the order of the sweep: a backward sweep through entries
+    stored forward takes many times as long. `inverses` (rows, r, r): inverses of the diagonal
+    blocks, in the order of the matrix.
     """
 
     rows: Ints
@@ -125,13 +125,13 @@ class Sweep:
     inverses: Floats
 
     def __call__(self, right: Floats, x: Floats) -> None:
-        """Change x."""
+        """Update x in place for the right-hand side."""
         one = self.entries
         _sweep(self.rows, one.first, one.last, one.indices, one.data, self.inverses, right, x)
 
 
 def sweep(matrix: Blocks, inverses: Floats, *, backward: bool = False) -> Sweep:
-    """Through the entries of a square matrix, forward or backward."""
+    """Gauss-Seidel sweep of a square matrix, forward or backward."""
     rows = np.arange(len(matrix.first), dtype=np.int32)[:: -1 if backward else 1]
     kept = _entries(matrix, rows)
     owners = np.repeat(rows, (matrix.last - matrix.first)[rows])
@@ -142,7 +142,7 @@ def sweep(matrix: Blocks, inverses: Floats, *, backward: bool = False) -> Sweep:
 
 
 def _entries(matrix: Blocks, rows: Ints) -> NDArray[np.int64]:
-    """Numbers of the entries of rows, one row after another."""
+    """Indices of the entries of the given rows, row by row."""
     first, counts = matrix.first[rows], (matrix.last - matrix.first)[rows]
     starts = np.cumsum(counts) - counts
     return np.asarray(np.repeat(first - starts, counts) + np.arange(counts.sum()))
@@ -151,16 +151,16 @@ def _entries(matrix: Blocks, rows: Ints) -> NDArray[np.int64]:
 def _packed(
     matrix: Blocks, kept: NDArray[np.int64], counts: NDArray[Any], dtype: Any = None
 ) -> Blocks:
-    """Entries of a matrix by their numbers, so many in a row."""
+    """Matrix of the chosen entries, with the given number in each row."""
     ends = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     data = matrix.data[kept].astype(dtype or matrix.data.dtype, copy=False)
     return Blocks(ends[:-1], ends[1:], matrix.indices[kept], data)
 
 
 def blocks_of(matrix: Any, dtype: Any = np.float64) -> Blocks:
-    """Those of a matrix of scipy's by blocks, in order of their columns.
+    """Blocks of a scipy BSR matrix, sorted by column.
 
-    ValueError for blocks whose sides are no multiples of 3.
+    ValueError for blocks whose sides are not multiples of 3.
     """
     if any(side % 3 for side in matrix.blocksize):
         raise ValueError(f"blocks of {matrix.blocksize}: products go by blocks of 3 x 3")
@@ -171,14 +171,14 @@ def blocks_of(matrix: Any, dtype: Any = np.float64) -> Blocks:
 
 
 def symmetric(matrix: Blocks) -> SymmetricBlocks:
-    """A symmetric matrix by blocks of 3 x 3, in half and in single precision."""
+    """Upper triangle of a symmetric matrix of 3 x 3 blocks, in single precision."""
     upper = replace(matrix, first=diagonal_of(matrix))
     kept = _entries(upper, np.arange(len(upper.first), dtype=np.int32))
     return SymmetricBlocks(_packed(upper, kept, upper.last - upper.first, np.float32))
 
 
 def diagonal_of(blocks: Blocks) -> Ints:
-    """Entry of each diagonal block (rows,) of a square matrix that has all of them."""
+    """Index (rows,) of each diagonal block of a square matrix, which has all of them."""
     rows = np.repeat(np.arange(len(blocks.first)), blocks.last - blocks.first)
     return np.flatnonzero(rows == blocks.indices).astype(np.int32)
 

@@ -1,7 +1,8 @@
-"""What a bound of a subspace's error needs to know of the body, computed once and small.
+"""Data of an error bound for motions in a subspace, computed once per body and subspace.
 
-Of a Krylov space of the load, solved to rounding, and of how a given subspace lies in it. See
-`fem_reference.certified` for what is made of it.
+Their size does not depend on that of the body. They describe a Krylov space of the load, solved to
+rounding, and the position of a given subspace relative to it. `fem_reference.certified` evaluates
+the bound.
 """
 
 from __future__ import annotations
@@ -15,21 +16,22 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from fem_reference.definite import StiffnessFloor, stiffness_floor
 from fem_reference.direct import EPSILON, Solve, factorised
 from fem_reference.elasticity import Body
+from fem_reference.stiffness_bound import StiffnessBound, stiffness_lower_bound
 from fem_reference.subspace import Subspace, empty, extended
 
 Floats = NDArray[np.float64]
 
 VECTORS = 128
-"""Of the Krylov space: the more, the nearer the bound is to the error."""
+"""Dimension of the Krylov space: the larger, the tighter the bound."""
 EXHAUSTED = 1e-9
-"""Share of a vector outside of the Krylov space, in the mass, at which the space is complete."""
+"""Mass norm of the part of a vector outside the Krylov space, relative to the vector, at which the
+space is complete."""
 
 
 def krylov_space(body: Body, solve: Solve, count: int) -> Subspace:
-    """At most `count` vectors K^-1 f, K^-1 M K^-1 f, ..., solved as exactly as `solve` does."""
+    """Krylov space of at most `count` vectors K^-1 f, K^-1 M K^-1 f, ... by the solver `solve`."""
     found = extended(body, empty(body.stiffness.size), solve(body.load))
     while found.load.size < count:
         vector = solve(body.mass @ found.vectors[:, -1])
@@ -45,10 +47,10 @@ def _norm(body: Body, vector: Floats) -> float:
 
 
 class Residual(NamedTuple):
-    """K^-1 w of the one direction w of a Krylov space's residual, and its energy norm.
+    """Solution K^-1 w for the single direction w of a Krylov space's residual, and its energy norm.
 
-    `defect`: energy norm of K^-1 times all that is wrong with the other directions, and with this
-    one; `static_defect`: with the static displacement.
+    `defect`: bound of the energy norm of K^-1 times the rounding errors of all directions;
+    `static_defect`: the same for the static displacement.
     """
 
     solution: Floats
@@ -57,45 +59,47 @@ class Residual(NamedTuple):
     static_defect: float
 
 
-def residual(body: Body, space: Subspace, solve: Solve, floor: StiffnessFloor) -> Residual:
-    """Of a Krylov space, with the rounding of what it is computed from.
+def residual(body: Body, space: Subspace, solve: Solve, bound: StiffnessBound) -> Residual:
+    """Residual direction of a Krylov space, with bounds of its rounding errors.
 
     For coordinates y the residual is s w_0 - sum_k (y_k'' + a y_k') w_k, where w_k is M v_k and w_0
-    is f, less what K V balances of it; all but the last w_k vanish.
+    is f, each minus its projection K V (V^T K V)^-1 V^T. All but the last w_k vanish but for
+    rounding.
     """
     V, K = space.vectors, body.stiffness
-    wanted = np.column_stack([space.load, np.eye(len(V.T))])
-    balanced = np.asarray(np.linalg.solve(space.stiffness, wanted), np.float64)
-    whole = np.column_stack([body.load, body.mass @ V]) - _pushed(body, V) @ balanced
-    solution = solve(whole[:, -1])
-    whole[:, -1] -= K @ solution
-    wrong = np.abs(whole) + _rounding(body, V, balanced, solution)
-    sizes = np.sqrt((wrong**2 / floor.diagonal[:, None]).sum(axis=0))
+    projected = np.column_stack([space.load, np.eye(len(V.T))])
+    coordinates = np.asarray(np.linalg.solve(space.stiffness, projected), np.float64)
+    forces = np.column_stack([body.load, body.mass @ V])
+    directions = forces - _stiffness_times(body, V) @ coordinates
+    solution = solve(directions[:, -1])
+    directions[:, -1] -= K @ solution
+    errors = np.abs(directions) + _rounding(body, V, coordinates, solution)
+    sizes = np.sqrt((errors**2 / bound.diagonal[:, None]).sum(axis=0))
     norm = float(np.sqrt(solution @ (K @ solution)))
     return Residual(solution, norm, float(np.linalg.norm(sizes[1:])), float(sizes[0]))
 
 
-def _rounding(body: Body, V: Floats, balanced: Floats, solution: Floats) -> Floats:
-    """Of each entry of the residual's directions: eps times entries of a row times magnitudes."""
+def _rounding(body: Body, V: Floats, coordinates: Floats, solution: Floats) -> Floats:
+    """Rounding bound of each entry of the directions: eps, entries per row, magnitudes."""
     matrix = body.stiffness.matrix
     entries = int(np.diff(csr_array(matrix).indptr).max()) + len(V.T)
-    size = np.abs(V) @ np.abs(balanced)
+    size = np.abs(V) @ np.abs(coordinates)
     size[:, -1] += np.abs(solution)
-    pushed = abs(matrix) @ size
+    magnitude = abs(matrix) @ size
     pressure = body.stiffness.pressure
     if pressure is not None:
         nodal = pressure.lame * (abs(pressure.divergence) @ size)
-        pushed += abs(pressure.divergence).T @ (nodal / pressure.mass.diagonal()[:, None])
-    pushed[:, 0] += np.abs(body.load)
-    pushed[:, 1:] += abs(body.mass) @ np.abs(V)
-    return np.asarray(EPSILON * entries * pushed)
+        magnitude += abs(pressure.divergence).T @ (nodal / pressure.mass.diagonal()[:, None])
+    magnitude[:, 0] += np.abs(body.load)
+    magnitude[:, 1:] += abs(body.mass) @ np.abs(V)
+    return np.asarray(EPSILON * entries * magnitude)
 
 
-class Seen(NamedTuple):
-    """Control points' displacement: of the modes (p, 3, M), K^-1 w (p, 3), and left-out parts.
+class ProbeResponse(NamedTuple):
+    """Displacement of the control points in the `modes` (p, 3, M) and the `solution` K^-1 w (p, 3).
 
-    `outside` (p, 3, m): of what the subspace's modes have outside of the Krylov space;
-    `compliance` (p,) [m/sqrt(J)]: largest displacement of unit energy norm.
+    `outside` (p, 3, m): parts of the subspace's modes outside the Krylov space;
+    `compliance` (p,) [m/sqrt(J)]: largest displacement in a motion of unit energy norm.
     """
 
     modes: Floats
@@ -106,13 +110,14 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What the bound needs to know of a body and a subspace, none of it of the body's size.
+    """Data of the bound for a body and a subspace, none of the size of the body.
 
-    `squares` (M,) [1/s^2], `load` (M,): of the Krylov space's modes; `last` (M,): how much of its
-    last vector each has, by which its residual goes; `norm`, `defect`, `static_defect`: of
-    `Residual`; `lowest` [1/s^2]: proven below all eigenvalues; `inside` (M, m): the subspace's
-    modes among those of the Krylov space; `outside` (1 + m, 1 + m): products in the stiffness of
-    K^-1 w and of what of these modes is outside; `own_squares`, `own_load` (m,): of the subspace.
+    Krylov space: `squares` [1/s^2] (M,) of its modes, their `load` (M,), and their component `last`
+    (M,) along its last vector, to which the residual is proportional. `norm`, `defect`,
+    `static_defect`: of `Residual`. `lowest` [1/s^2]: proven lower bound of all eigenvalues.
+    Subspace: `own_squares` [1/s^2] and `own_load` (m,) of its modes; `inside` (M, m): their
+    components in the modes of the Krylov space; `outside` (1 + m, 1 + m): energy products of K^-1 w
+    and of their parts outside. `probes`: displacements of the control points.
     """
 
     squares: Floats
@@ -126,18 +131,18 @@ class Certificate:
     outside: Floats
     own_squares: Floats
     own_load: Floats
-    seen: Seen
+    probes: ProbeResponse
 
     @cached_property
     def rest(self) -> Floats:
-        """Share of each mode in the displacement under the full load at rest."""
+        """Modal coordinates (M,) of the static displacement under the full load."""
         return self.load / self.squares
 
     @property
     def error_at_rest(self) -> float:
-        """Bound of the energy norm's error of the subspace at rest, over the energy norm there.
+        """Bound of the static error of the subspace in the energy norm, relative to the solution.
 
-        Free of constants: the residual at rest is known, and so is its dual norm.
+        It has no unknown constants: the static residual and its dual norm are known.
         """
         own = self.own_load / self.own_squares
         inside = self.squares @ (self.rest - self.inside @ own) ** 2
@@ -147,22 +152,22 @@ class Certificate:
 
     @property
     def rounding(self) -> float:
-        """What rounding adds to a bound at once, relative to the energy norm at rest."""
+        """Contribution of rounding to a bound, relative to the static energy norm."""
         at_rest = float(np.sqrt(self.load @ self.rest))
         return (self.static_defect + self.defect * float(np.linalg.norm(self.load))) / at_rest
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A body's Krylov space, with which any subspaces of the body may be compared.
+    """A Krylov space of a body, with which its subspaces are compared.
 
-    `shapes` (n, M): its modes, the least square of their frequencies first; `load` (M,) and `last`
-    (M,): what each has of the load, and of the space's last vector.
+    `shapes` (n, M): modes in order of `squares`; `load` (M,) and `last` (M,): their components of
+    the load and of the last vector of the space.
     """
 
     body: Body
     solve: Solve
-    floor: StiffnessFloor
+    bound: StiffnessBound
     shapes: Floats
     squares: Floats
     load: Floats
@@ -170,75 +175,75 @@ class Comparison:
     residual: Residual
 
     def certificate(self, subspace: Subspace, at_probes: csr_array) -> Certificate:
-        """Of a subspace, as the body's control points are seen."""
+        """Certificate of a subspace; `at_probes` interpolates at the control points."""
         own_squares, own_modes = eigh(subspace.stiffness)
         own_shapes = subspace.vectors @ own_modes
-        inside = (self.shapes.T @ _pushed(self.body, own_shapes)) / self.squares[:, None]
-        left = np.column_stack([self.residual.solution, own_shapes - self.shapes @ inside])
+        inside = (self.shapes.T @ _stiffness_times(self.body, own_shapes)) / self.squares[:, None]
+        outside = np.column_stack([self.residual.solution, own_shapes - self.shapes @ inside])
         return Certificate(
             self.squares,
             self.load,
             self.last,
             *self.residual[1:],
-            self.floor.eigenvalue,
+            self.bound.eigenvalue,
             inside,
-            left.T @ _pushed(self.body, left),
+            outside.T @ _stiffness_times(self.body, outside),
             own_squares,
             own_modes.T @ subspace.load,
-            self._seen(at_probes, left),
+            self._probe_response(at_probes, outside),
         )
 
-    def _seen(self, at_probes: csr_array, left: Floats) -> Seen:
-        def of(vectors: Floats) -> Floats:
+    def _probe_response(self, at_probes: csr_array, outside: Floats) -> ProbeResponse:
+        def at_points(vectors: Floats) -> Floats:
             count = vectors.shape[1]
             return np.asarray(at_probes @ vectors.reshape(-1, 3 * count)).reshape(-1, 3, count)
 
         compliance = [self._compliance(row) for row in at_probes.toarray()]
-        beside = of(left)
-        return Seen(of(self.shapes), beside[..., 0], beside[..., 1:], np.array(compliance))
+        beside, shapes = at_points(outside), at_points(self.shapes)
+        return ProbeResponse(shapes, beside[..., 0], beside[..., 1:], np.array(compliance))
 
     def _compliance(self, row: Floats) -> float:
-        """Largest length of the displacement of unit energy norm at a point, from above.
+        """Upper bound of the displacement at a point in a motion of unit energy norm.
 
-        `row` (nodes,) has the weights of the nodes there.
+        `row` (nodes,): interpolation weights of the point.
         """
         forces = np.kron(row[:, None], np.eye(3))
-        answers = np.column_stack([self.solve(one) for one in forces.T])
-        balanced = _pushed(self.body, answers)
-        wrong = np.linalg.norm((forces - balanced) / np.sqrt(self.floor.diagonal)[:, None])
-        return float(np.sqrt(np.linalg.eigvalsh(answers.T @ balanced)[-1]) + wrong)
+        solutions = np.column_stack([self.solve(force) for force in forces.T])
+        balanced = _stiffness_times(self.body, solutions)
+        error = np.linalg.norm((forces - balanced) / np.sqrt(self.bound.diagonal)[:, None])
+        return float(np.sqrt(np.linalg.eigvalsh(solutions.T @ balanced)[-1]) + error)
 
 
 def comparison(body: Body, lowest: float, count: int = VECTORS) -> Comparison:
-    """By at most `count` vectors, as many as the load reaches.
+    """Krylov space of at most `count` vectors; fewer where it is exhausted.
 
-    `lowest` [1/s^2]: above the lowest eigenvalue, the nearer the better. The stiffness is factored
-    twice. ValueError if it is not definite beyond rounding.
+    `lowest` [1/s^2]: upper bound of the lowest eigenvalue, the tighter the better. The stiffness is
+    factored twice. ValueError if it is not positive definite beyond rounding.
     """
-    floor, solve = stiffness_floor(body, lowest), direct(body)
+    bound, solve = stiffness_lower_bound(body, lowest), direct(body)
     space = krylov_space(body, solve, min(count, body.stiffness.size))
     squares, modes = eigh(space.stiffness)
-    found = residual(body, space, solve, floor)
+    found = residual(body, space, solve, bound)
     shapes, load = space.vectors @ modes, modes.T @ space.load
-    return Comparison(body, solve, floor, shapes, squares, load, modes[-1], found)
+    return Comparison(body, solve, bound, shapes, squares, load, modes[-1], found)
 
 
 def certificate(
     body: Body, subspace: Subspace, at_probes: csr_array, vectors: int = VECTORS
 ) -> Certificate:
-    """Of one subspace, by so many vectors or as many as it has itself; see `comparison`."""
+    """Certificate of one subspace by a Krylov space of `vectors`, at least its own dimension."""
     lowest = float(np.linalg.eigvalsh(subspace.stiffness)[0])
     wanted = max(vectors, subspace.load.size)
     return comparison(body, lowest, wanted).certificate(subspace, at_probes)
 
 
 def direct(body: Body) -> Solve:
-    """Solution of K u = f by factors, to rounding; the pressures are left out."""
+    """Direct solver of K u = f, to rounding; the pressures are not returned."""
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
     return lambda load: solve(np.concatenate([load, padding]))[:size]
 
 
-def _pushed(body: Body, vectors: Floats) -> Floats:
+def _stiffness_times(body: Body, vectors: Floats) -> Floats:
     """K times each of the vectors (n, m)."""
     return np.column_stack([body.stiffness @ v for v in vectors.T])

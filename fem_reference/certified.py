@@ -1,23 +1,24 @@
-"""A bound, not an estimate, of how far a subspace's motion is from that of all unknowns.
+"""A certified bound of the error of a motion in a subspace against that of all unknowns.
 
-The finite elements M u'' + C u' + K u = f s(t), C = a M + b K, are compared with a motion u_V in a
-subspace. Between the two stands a third, in a longer Krylov space of the same load, whose residual
-has one direction w, since its vectors are solved to rounding. Its distance to u_V is computed; its
-own error is bounded. Its modes of low frequency, the head, keep their residual; those of high
-frequency, the tail, are dropped, and what they would do is bounded by their energy.
+The finite-element motion M u'' + C u' + K u = f s(t), C = a M + b K, is compared with a motion u_V
+in a subspace by means of a third one, in a larger Krylov space of the same load. The vectors of
+that space are solved to rounding, so its residual has a single direction w. The distance of the
+third motion to u_V is computed and its own error bounded. Its modes of low frequency, the head,
+keep their residual; those of high frequency, the tail, are dropped and their motion is bounded by
+its energy.
 
 - In the head the residual is c(t) w. With e_s = K^-1 w c the state (e - e_s, e') obeys the free
   equation of motion, driven by -e_s' in its displacement.
-- In the tail a load linear in time has the particular solution z s - (a K^-1 M z + b z) s' for a
-  displacement z at rest; what is left moves freely from the start and from each kink of the load.
+- In the tail a load linear in time has the particular solution z s - (a K^-1 M z + b z) s' for the
+  static displacement z; the remainder is a free motion from the start and from each kink of s.
 
-Free motion decays in the norm of `fem_reference.free_motion`. Where head and tail part, and how
-fast motion decays, is tried in all ways at once, and the least bound taken. That residuals in a
-dual norm bound the error of a reduced basis is due to Prud'homme et al. (2002), J. Fluids Eng.
-124:70; by the decay of energy, not by Gronwall's lemma, to Stahl (2022), arXiv:2204.05010.
+Free motion decays in the norm of `fem_reference.free_motion`. The bound is the least over all
+divisions into head and tail and over several rates of decay. The bound of reduced-basis errors by
+the dual norm of the residual is due to Prud'homme et al. (2002), J. Fluids Eng. 124:70; that by the
+decay of energy instead of Gronwall's lemma to Stahl (2022), arXiv:2204.05010.
 
-Not covered: the error of the mesh, and of a load that is not linear over the steps. Rounding of
-residuals and solutions is.
+The bound covers rounding of residuals and solutions. It does not cover the error of the mesh, nor
+that of a load that is not linear over the steps.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Floats = NDArray[np.float64]
 
 
 class Bound(NamedTuple):
-    """Of the error's energy norm [sqrt(J)], and at the control points of its length [m] (p,).
+    """Bounds of the error in the energy norm [sqrt(J)] and at the control points [m] (p,).
 
     The energy norm is the square root of u K u, twice the strain energy.
     """
@@ -48,11 +49,11 @@ class Bound(NamedTuple):
 
 
 class CertifiedMotion:
-    """Motion from rest in a subspace and in the Krylov space, and the bound of the first's error.
+    """Motion from rest in a subspace and in the Krylov space, with the error bound of the former.
 
-    The load is the share `factor` of the body's at the ends of each `step` [s], linear between
-    them. `bound` and `time` [s] are those after the steps taken. A step costs some multiple of the
-    square of the Krylov space's size, whatever the body's.
+    The load is that of the body times `factor` at the ends of each `step` [s], linear between them.
+    `bound` and `time` [s] are those after the steps taken. The cost of a step grows with the square
+    of the dimension of the Krylov space and does not depend on the size of the body.
     """
 
     def __init__(
@@ -72,18 +73,18 @@ class CertifiedMotion:
         self._decay = decay(damping, given.lowest)
         self._fade = np.exp(-self._decay.rates * step)
         self._by_kink = _tail_by_kink(given, self._decay)
-        # N of the motion not known, of each number of modes in the head and each rate of decay.
+        # Bounds of the norm N of the unknown motion, by number of head modes and rate of decay.
         self._tail = abs(self.load) * _tail_by_load(given, self._decay)
         self._head = self._quasi_static(self._forces())[:, None] * self._decay.lift
-        self.bound = Bound(0.0, np.zeros(len(given.seen.compliance)))
+        self.bound = Bound(0.0, np.zeros(len(given.probes.compliance)))
 
     @property
     def energy_norm(self) -> float:
-        """Of the motion in the subspace [sqrt(J)], after the steps taken."""
+        """Energy norm [sqrt(J)] of the motion in the subspace after the steps taken."""
         return float(np.sqrt(self.given.own_squares @ self._own.state[:, 0] ** 2))
 
     def take_step(self) -> None:
-        """Go one step on, to the bound there."""
+        """Advance by one step and update the bound."""
         after = float(self.factor(np.array([self.time + self.step]))[0])
         slope = (after - self.load) / self.step
         driven = self._driven(slope)[:, None] * self._decay.lift
@@ -95,25 +96,25 @@ class CertifiedMotion:
         self.bound = self._least()
 
     def _forces(self) -> Floats:
-        """Minus acceleration and mass damping of each mode (M,), by which its residual goes."""
+        """Minus acceleration and mass damping of each mode (M,), proportional to its residual."""
         given, (q, p) = self.given, self._long.state.T
         return np.asarray(given.squares * (q + self.damping.stiffness * p) - given.load * self.load)
 
     def _quasi_static(self, forces: Floats) -> Floats:
-        """Energy norm of K^-1 times the residual of each head, (cuts,)."""
+        """Energy norm of K^-1 times the residual of each head, (divisions,)."""
         along = self.given.norm * np.abs(_heads(self.given.last * forces))
         return np.asarray(along + self._defect(forces))
 
     def _defect(self, forces: Floats) -> Floats:
-        """What of it is rounding."""
+        """Contribution of rounding to `_quasi_static`, (divisions,)."""
         given = self.given
-        wrong = given.defect * np.sqrt(_heads(forces**2))
-        return np.asarray(wrong + given.static_defect * abs(self.load))
+        rounding = given.defect * np.sqrt(_heads(forces**2))
+        return np.asarray(rounding + given.static_defect * abs(self.load))
 
     def _driven(self, slope: float) -> Floats:
-        """Integral over a step of the norm of the rate of that, (cuts,), or more.
+        """Upper bound of the integral over a step of the rate of `_quasi_static`, (divisions,).
 
-        By Schwarz's inequality; within a step the forces' rates move freely.
+        By the Cauchy-Schwarz inequality; within a step the rates of the forces are free motions.
         """
         given, rates = self.given, self._force_rates(slope)
         own = np.maximum(np.einsum("ia,iab,ib->i", rates, self._own_products, rates), 0.0)
@@ -125,7 +126,7 @@ class CertifiedMotion:
         return np.asarray(np.sqrt(self.step) * whole + given.static_defect * self.step * abs(slope))
 
     def _force_rates(self, slope: float) -> Floats:
-        """Rate of `_forces` after a kink, and over frequency the rate of that, (M, 2)."""
+        """Rate of `_forces` after a kink, and its own rate over the frequency, (M, 2)."""
         given, a, b = self.given, self.damping.mass, self.damping.stiffness
         squares, (q, p) = given.squares, self._long.state.T
         drag = a + b * squares
@@ -135,29 +136,29 @@ class CertifiedMotion:
         return np.column_stack([rate, np.sqrt(squares) * (acceleration + b * jerk)])
 
     def _least(self) -> Bound:
-        """The least of all cuts."""
+        """The least bound over all divisions into head and tail."""
         forces, given = self._forces(), self.given
         parts, along = self._difference(), self._along(forces)
         unknown = self._unknown(forces)
         energy = _distance(given, parts, along, self._own.state[:, 0]) + unknown
-        points = _moved(given, parts, along, self._own.state[:, 0])
-        points = points + given.seen.compliance[:, None] * unknown
+        points = _probe_distance(given, parts, along, self._own.state[:, 0])
+        points = points + given.probes.compliance[:, None] * unknown
         return Bound(float(energy.min()), points.min(axis=1))
 
     def _difference(self) -> tuple[Floats, Floats]:
-        """From the subspace's motion to that of a mode in the head, and of one in the tail (M,)."""
+        """Difference of each mode to the subspace's motion, as part of the head and of the tail."""
         given, damping = self.given, self.damping
         inside = given.inside @ self._own.state[:, 0]
         late = self._slope * (damping.mass / given.squares + damping.stiffness)
         return self._long.state[:, 0] - inside, given.rest * (self.load - late) - inside
 
     def _along(self, forces: Floats) -> Floats:
-        """How much of K^-1 w there is beside, (cuts,)."""
+        """Coefficient of K^-1 w in the error, (divisions,)."""
         given, late = self.given, self._slope * self.damping.mass
         return _heads(given.last * forces) - late * _tails(given.last * given.rest)
 
     def _unknown(self, forces: Floats) -> Floats:
-        """Largest energy norm of what is not known, free motion and rounding, (cuts,)."""
+        """Bound of the energy norm of the unknown error, free motion and rounding, (divisions,)."""
         given, late = self.given, abs(self._slope) * self.damping.mass
         share = np.sqrt(self._decay.margin)
         free = (self._head / share).min(axis=1) + (self._tail / share).min(axis=1)
@@ -166,7 +167,7 @@ class CertifiedMotion:
 
 
 class _Modes:
-    """Displacement and velocity of modes, the columns of `state` (m, 2), by steps of a load."""
+    """Displacement and velocity of modes, the columns of `state` (m, 2), under a stepwise load."""
 
     def __init__(
         self, squares: Floats, load: Floats, damping: RayleighDamping, step: float
@@ -175,7 +176,7 @@ class _Modes:
         self._moved = transitions(squares, damping, step)[:, :2]
 
     def advance(self, before: float, slope: float) -> None:
-        """Go one step on, under a load that is linear over it."""
+        """Advance by one step under a load of given start value and slope."""
         whole = np.column_stack([self.state, self._load * before, self._load * slope])
         self.state = np.einsum("mij,mj->mi", self._moved, whole)
 
@@ -183,22 +184,24 @@ class _Modes:
 def _distance(
     given: Certificate, parts: tuple[Floats, Floats], along: Floats, own: Floats
 ) -> Floats:
-    """Energy norm of what is known of the error, (cuts,)."""
+    """Energy norm of the computed part of the error, (divisions,)."""
     head, tail = (given.squares * part**2 for part in parts)
     beside = np.column_stack([along, np.broadcast_to(-own, (len(along), len(own)))])
     outside = np.einsum("ki,ij,kj->k", beside, given.outside, beside)
     return np.asarray(np.sqrt(np.maximum(_heads(head) + _tails(tail) + outside, 0.0)))
 
 
-def _moved(given: Certificate, parts: tuple[Floats, Floats], along: Floats, own: Floats) -> Floats:
-    """Length [m] of what is known of the error at the control points, (p, cuts)."""
-    head, tail = (given.seen.modes * part for part in parts)
-    beside = given.seen.solution[..., None] * along - (given.seen.outside @ own)[..., None]
+def _probe_distance(
+    given: Certificate, parts: tuple[Floats, Floats], along: Floats, own: Floats
+) -> Floats:
+    """Computed part [m] of the error at the control points, (p, divisions)."""
+    head, tail = (given.probes.modes * part for part in parts)
+    beside = given.probes.solution[..., None] * along - (given.probes.outside @ own)[..., None]
     return np.asarray(np.linalg.norm(_heads(head) + _tails(tail) + beside, axis=1))
 
 
 def _tail_by_kink(given: Certificate, found: Decay) -> Floats:
-    """N of each tail's free motion by a unit change of the load's slope, (cuts, rates)."""
+    """N of the free motion of each tail after a unit change of load slope, (divisions, rates)."""
     a, rest = found.damping.mass, given.rest
     late = rest * (a / given.squares + found.damping.stiffness)
     own = _tails(found.squared(-late, rest, given.squares)).T
@@ -208,24 +211,24 @@ def _tail_by_kink(given: Certificate, found: Decay) -> Floats:
 
 
 def _tail_by_load(given: Certificate, found: Decay) -> Floats:
-    """N of each tail's free motion by a unit load that is there from the start, (cuts, rates)."""
+    """N of the free motion of each tail after a unit initial load, (divisions, rates)."""
     own = _tails(found.squared(given.rest, np.zeros_like(given.rest), given.squares)).T
     return np.asarray(np.sqrt(np.maximum(own, 0.0)))
 
 
 def _heads(values: Floats) -> Floats:
-    """Sums of the first none, one, ... all of the last axis."""
+    """Sums of the first 0, 1, ... M entries of the last axis."""
     start = np.zeros((*values.shape[:-1], 1))
     return np.concatenate([start, np.cumsum(values, axis=-1)], axis=-1)
 
 
 def _tails(values: Floats) -> Floats:
-    """Sums of all, all but the first, ... none of the last axis."""
+    """Sums of the last M, M - 1, ... 0 entries of the last axis."""
     return np.asarray(_heads(values[..., ::-1])[..., ::-1])
 
 
 def _leading_products(products: Floats) -> Floats:
-    """What each mode adds to the form of those before it, (2 M, 2 M), from forms (M, 2, M, 2)."""
+    """Increments of the quadratic form by each mode, (2 M, 2 M), from forms (M, 2, M, 2)."""
     count = len(products)
     twice = np.tril(np.full((count, count), 2.0), -1) + np.eye(count)
     return np.asarray((products * twice[:, None, :, None]).reshape(2 * count, 2 * count))

@@ -1,4 +1,4 @@
-"""Sparse factors, for systems that are small or solved many times."""
+"""Sparse direct solvers, for systems that are small or solved many times."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ Solve = Callable[[Floats], Floats]
 
 EPSILON = float(np.finfo(np.float64).eps)
 IMBALANCE = 1e-6
-"""Share of the load by which no answer is out of balance, whatever rounding is to be expected."""
+"""Largest admissible residual relative to the load, whatever rounding is to be expected."""
 
 
 def factorised(matrix: Any) -> Solve:
-    """Solution by factors of a symmetric sparse matrix, in an ordering that keeps them small.
+    """Direct solver of a symmetric sparse matrix, in a fill-reducing ordering.
 
-    The matrix is positive definite, or that of a saddle point with definite blocks, which has such
-    factors in any ordering too. ValueError if it is singular: nothing holds the body.
+    The matrix is positive definite, or that of a saddle point with definite blocks, which can be
+    factored without pivoting in any ordering too. ValueError if it is singular.
     """
     factors = _factors(matrix)
     return lambda f: np.asarray(factors.solve(f))
 
 
 class Pivots(NamedTuple):
-    """Of a symmetric matrix: how many are negative, and whether all were taken from the diagonal.
+    """Pivots of a symmetric matrix: number of negative ones, and whether all are diagonal.
 
-    They are those of a matrix that differs by rounding: by no more, as a quadratic form, than
-    `rounding` times the magnitudes of the diagonal.
+    They are the exact pivots of a perturbed matrix. As a quadratic form, the perturbation is at
+    most `rounding` times the magnitudes of the diagonal.
     """
 
     negative: int
@@ -41,7 +41,7 @@ class Pivots(NamedTuple):
 
 
 def pivots(matrix: csc_array) -> Pivots:
-    """Of the factors of a symmetric matrix. ValueError if it is singular.
+    """Pivots of the factors of a symmetric matrix. ValueError if it is singular.
 
     Rounding changes an entry by k eps (|L| |U|) at most, with k entries in the fullest row of L;
     with |L| |U| = S S^T the spectral norm is below the product of the largest sums of rows and of

@@ -5,9 +5,9 @@ formula, on the first-order system in u and v. Both stages share one matrix, and
 L-stable: an overdamped velocity settles within a few steps, however long. Bank et al. (1985), IEEE
 Trans. CAD 4:436; Hosea and Shampine (1996), Appl. Numer. Math. 20:21.
 
-HHT-alpha is Newmark's scheme with forces taken between the ends of the step, which damps what the
-step cannot follow; alpha = 0 is the average acceleration. Hilber, Hughes and Taylor (1977),
-Earthquake Eng. Struct. Dyn. 5:283.
+HHT-alpha is Newmark's scheme with the forces evaluated inside the step, which damps frequencies
+that the step does not resolve; alpha = 0 is the average acceleration method. Hilber, Hughes and
+Taylor (1977), Earthquake Eng. Struct. Dyn. 5:283.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ ALPHA = -0.05
 
 @dataclass(frozen=True)
 class Oscillator:
-    """M u'' + C u' + K u = load factor(t), of one load (n,) or of several (n, k)."""
+    """M u'' + C u' + K u = load factor(t), with one load (n,) or several (n, k)."""
 
     mass: csc_array
     stiffness: Stiffness
@@ -44,24 +44,24 @@ class Oscillator:
     damping: RayleighDamping
 
     def shifted(self, damped: float, elastic: float) -> Solve:
-        """Solution of (M + damped C + elastic K) u = f by factors."""
-        share = damped * self.damping.stiffness + elastic
+        """Direct solver of (M + damped C + elastic K) u = f."""
+        factor = damped * self.damping.stiffness + elastic
         mass = (1.0 + damped * self.damping.mass) * self.mass
-        solve = factorised(self.stiffness.system(mass, share))
-        size, more = self.stiffness.size, self.stiffness.unknowns - self.stiffness.size
-        return lambda f: solve(np.concatenate([f, np.zeros(more)]))[:size]
+        solve = factorised(self.stiffness.system(mass, factor))
+        size, pressures = self.stiffness.size, self.stiffness.unknowns - self.stiffness.size
+        return lambda f: solve(np.concatenate([f, np.zeros(pressures)]))[:size]
 
     @property
     def rest(self) -> Floats:
-        """No displacement (n,)."""
+        """Zero displacement [m] (n,)."""
         return np.zeros(len(self.load))
 
-    def pushed(self, factor: Floats) -> Floats:
-        """Nodal forces [N] (n,) at a factor, or one of each load (k,)."""
+    def applied_force(self, factor: Floats) -> Floats:
+        """Nodal forces [N] (n,) at a load factor, or at one factor per load (k,)."""
         return np.asarray(self.load.reshape(len(self.load), -1) @ np.atleast_1d(factor))
 
-    def force(self, u: Floats, v: Floats) -> Floats:
-        """C v + K u [N]."""
+    def internal_force(self, u: Floats, v: Floats) -> Floats:
+        """C v + K u [N] (n,)."""
         a, b = self.damping.mass, self.damping.stiffness
         return np.asarray(a * (self.mass @ v) + self.stiffness @ (u + b * v))
 
@@ -78,11 +78,11 @@ def march(
     b = (1.0 - GAMMA) ** 2 * a
     for n in range(count):
         start, middle, end = factor(step * (n + np.array([0.0, GAMMA, 1.0])))
-        force = system.pushed(start + middle) - system.force(2.0 * u + theta * v, v)
+        force = system.applied_force(start + middle) - system.internal_force(2.0 * u + theta * v, v)
         v_mid = solve(M @ v + theta * force)
         u_mid = u + theta * (v + v_mid)
         u_hat, v_hat = a * u_mid - b * u, a * v_mid - b * v
-        v = solve(M @ v_hat + theta * (system.pushed(end) - system.stiffness @ u_hat))
+        v = solve(M @ v_hat + theta * (system.applied_force(end) - system.stiffness @ u_hat))
         u = u_hat + theta * v
         yield u, v
 
@@ -96,8 +96,8 @@ def hht(
 ) -> Iterator[tuple[Floats, Floats]]:
     """Displacement and velocity by HHT-alpha, from rest, at 0, step, ..., count * step [s].
 
-    The first acceleration is that of the load at the start. ValueError for an alpha outside -1/3 to
-    0.
+    The initial acceleration balances the load at time zero. ValueError for an alpha outside
+    [-1/3, 0].
     """
     if not -1.0 / 3.0 <= alpha <= 0.0:
         raise ValueError(f"alpha of HHT is {alpha:g}; give -1/3 to 0")
@@ -105,25 +105,26 @@ def hht(
     solve = system.shifted((1.0 + alpha) * gamma * step, (1.0 + alpha) * beta * step**2)
     u, v = system.rest, system.rest
     before = factor(np.zeros(1))[0]
-    a = factorised(system.mass)(system.pushed(before))
+    a = factorised(system.mass)(system.applied_force(before))
     yield u, v
     for n in range(count):
         after = factor(np.array([step * (n + 1)]))[0]
         u_hat = u + step * v + step**2 * (0.5 - beta) * a
         v_hat = v + step * (1.0 - gamma) * a
-        load = system.pushed((1.0 + alpha) * after - alpha * before)
-        resisted = (1.0 + alpha) * system.force(u_hat, v_hat) - alpha * system.force(u, v)
-        a = solve(load - resisted)
+        load = system.applied_force((1.0 + alpha) * after - alpha * before)
+        internal = (1.0 + alpha) * system.internal_force(u_hat, v_hat)
+        internal = internal - alpha * system.internal_force(u, v)
+        a = solve(load - internal)
         u, v = u_hat + step**2 * beta * a, v_hat + step * gamma * a
         before = after
         yield u, v
 
 
 def hermite(before: State, after: State, share: float, step: float) -> State:
-    """Displacement and velocity at a share of a step [s] by the cubic through both its ends.
+    """Displacement and velocity at a fraction of a step [s] by cubic Hermite interpolation.
 
-    Its error is of the fourth order in displacement and of the third in velocity, that of the steps
-    of the second.
+    The interpolation error is of order 4 in displacement and 3 in velocity; that of the time
+    stepping is of order 2.
     """
     (u, v), (u_end, v_end), s = before, after, share
     if s == 1.0:
@@ -136,10 +137,10 @@ def hermite(before: State, after: State, share: float, step: float) -> State:
 
 
 class SteppedMotion:
-    """Motion from rest by steps in time, each of a `step` [s]; the factors are made at the start.
+    """Motion from rest by time steps of `step` [s]; the constructor factors the matrix.
 
-    `factor`: share of the load at times [s]. `displacement` [m] (n,) of all unknowns after the
-    steps taken.
+    `factor`: load factor at times [s]. `displacement` [m] (n,) of all unknowns after the steps
+    taken.
     """
 
     def __init__(
@@ -154,5 +155,5 @@ class SteppedMotion:
         self.displacement = next(self._states)[0]
 
     def take_step(self) -> None:
-        """Go one step on, to the displacement there."""
+        """Advance by one step."""
         self.displacement = next(self._states)[0]

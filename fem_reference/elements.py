@@ -1,4 +1,4 @@
-"""Tetrahedral elements that a body may be made of, and what each asks for."""
+"""Tetrahedral elements of the reference, with their orders and memory."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ ElementName = str
 
 @dataclass(frozen=True)
 class Element:
-    """Shape functions of a displacement component, and what goes with them.
+    """Properties of an element.
 
-    `shapes`: scikit-fem's class. `gradient_order`: degree that the quadrature of the stiffness
-    integrates, which squares of gradients have in straight cells. `formal_order`: of convergence of
-    the displacement in L2. `bytes_per_unknown`: at the peak of assembly and iterative solution,
-    measured at 20 000 to 100 000 unknowns, of `p2` to 220 000. `quadratic`: it has nodes on edges
-    too, and may be curved. `mixed`: it has a linear, continuous pressure of its own.
+    `shapes`: scikit-fem's class of the shape functions of one displacement component.
+    `gradient_order`: degree of the quadrature of the stiffness, that of squared gradients in
+    straight cells. `formal_order`: order of convergence of the displacement in L2.
+    `bytes_per_unknown`: peak memory of assembly and iterative solution, measured at 20 000 to
+    100 000 unknowns, of `p2` up to 220 000. `quadratic`: it has edge nodes and may be curved.
+    `mixed`: it has a continuous linear pressure.
     """
 
     shapes: Any
@@ -39,11 +40,11 @@ AUTO = "auto"
 CHOICES = (AUTO, *ELEMENTS)
 """Names that `chosen_element` takes."""
 LOCKING = 0.48
-"""Poisson ratio above which a pressure pays: at 0.49 it leaves a seventh of the error."""
+"""Poisson ratio above which mixed elements pay: at 0.49 they have a seventh of the error."""
 
 
 def chosen_element(element: str, poisson_ratio: float) -> ElementName:
-    """The element that is meant: `auto` is quadratic, with a pressure of its own above nu 0.48.
+    """The element of a name; `auto` is `p2`, and `taylor-hood` above a Poisson ratio of 0.48.
 
     ValueError for a name that is not one of `CHOICES`.
     """

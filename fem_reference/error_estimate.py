@@ -1,4 +1,4 @@
-"""Discretisation error from systematically refined meshes.
+"""Discretisation error estimated from systematically refined meshes.
 
 Two meshes and the order of convergence give the error of the finer one by Richardson's
 extrapolation; three give the order too. As a grid convergence index, the estimate is multiplied by
@@ -6,9 +6,9 @@ a safety factor, larger where the order is assumed: Roache (1994), J. Fluids Eng
 al. (2008), J. Fluids Eng. 130:078001. Where three results alternate, half their range takes the
 place of the extrapolation: Stern et al. (2001), J. Fluids Eng. 123:793.
 
-Meshes that are refined where the error is are not similar, and show no order. Of them the error is
-taken to fall with that of their elements in smooth solutions, which grading keeps where solutions
-are not smooth: a saturation assumption, Bank and Smith (1993), SIAM J. Numer. Anal. 30:921.
+Adaptively refined meshes are not geometrically similar and show no order. Their error is assumed to
+decrease with the order of the elements for smooth solutions, which adaptive refinement recovers
+for singular ones: a saturation assumption, Bank and Smith (1993), SIAM J. Numer. Anal. 30:921.
 """
 
 from __future__ import annotations
@@ -25,24 +25,25 @@ Floats = NDArray[np.float64]
 
 SAFETY = 1.25
 SAFETY_ASSUMED = 3.0
-"""Where the order is assumed: of two meshes, and of three that do not converge at one in reach."""
+"""Where the order is assumed: two meshes, or three without an observed order in range."""
 SAFETY_GRADED = 1.5
-"""Of graded meshes: 1.25 held over seven organs of tests/benchmarks, by 0.88 of it at most."""
+"""Graded meshes. In tests/benchmarks, 1.25 held for seven organs, with true errors up to 0.88 of
+the estimate."""
 ASSUMED_ORDER = 2.0
-"""Of two meshes: that of flat facets, of edges of a support, and of most user's meshes."""
+"""Order of flat facets, of edges of a support, and of most users' meshes."""
 LEAST_ORDER = 1.0
 BEYOND = 0.5
-"""An observed order outside by more shows meshes that are not yet in the range of convergence."""
+"""Distance of an observed order from its range above which meshes count as not yet asymptotic."""
 FLATTEST, STEEPEST = 1e-6, 12.0
 TINY = 1e-300
 
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Relative error of the finest mesh, and the order behind it.
+    """Estimated relative error of the finest mesh, and the observed order.
 
-    `observed`: order that the three finest meshes show; none of two meshes, or where their results
-    alternate or differ more and more.
+    `observed`: order of convergence of the three finest meshes; None for two meshes, and for
+    results that alternate or diverge.
     """
 
     error: float
@@ -52,10 +53,10 @@ class ErrorEstimate:
 def discretisation_error(
     results: Sequence[Floats], sizes: Sequence[float], formal: float, weights: Floats | None = None
 ) -> ErrorEstimate:
-    """From results (n, 3) on at least two meshes, coarse to fine by element size, in relative L2.
+    """Relative L2 error from results (n, 3) on meshes of element `sizes`, coarse to fine.
 
-    `weights` (n,) of the points. An order outside 1 to `formal`, the element's own, counts as the
-    nearer of the two; well outside, it is an assumed one.
+    `weights` (n,): of the points. An observed order outside [1, `formal`], `formal` the order of
+    the element, is clipped to that range; far outside, the larger safety factor applies.
     """
     w = np.ones(len(results[-1])) if weights is None else weights
     steps = [fine - coarse for coarse, fine in pairwise(results)]
@@ -76,10 +77,10 @@ def discretisation_error(
 def graded_error(
     results: Sequence[Floats], sizes: Sequence[float], order: float, weights: Floats | None = None
 ) -> ErrorEstimate:
-    """The same of meshes refined where the error is, with an `order` at which they converge.
+    """The same for adaptively refined meshes with an assumed `order` of convergence.
 
-    The last change is no less than the one before leaves at that order: a change may be small by
-    chance.
+    The last change counts at least as much as the one before implies at that order, since a change
+    may be small by coincidence.
     """
     w = np.ones(len(results[-1])) if weights is None else weights
     whole = max(_product(results[-1], results[-1], w), TINY)
@@ -88,7 +89,7 @@ def graded_error(
         for coarse, fine in pairwise(results[-3:])
     ]
     shrunk = [(h / sizes[-1]) ** order for h in sizes[-len(changes) - 1 :]]
-    # Between meshes of errors e r and e, the results change by e (r - 1) at most.
+    # Between meshes with errors e r and e, the results change by at least e (r - 1).
     left = [c / (a - b) for c, (a, b) in zip(changes, pairwise(shrunk), strict=True)]
     safety = SAFETY_GRADED if len(left) > 1 else SAFETY_ASSUMED
     return ErrorEstimate(safety * max(left), None)
@@ -103,7 +104,7 @@ def observed_order(
 ) -> float | None:
     """Order p with (h_1^p - h_2^p) / (h_2^p - h_3^p) equal to the ratio of the differences.
 
-    None if no positive order has it.
+    None if no positive order satisfies it.
     """
     h1, h2, h3 = sizes
     if not (coarse_difference > 0.0 and fine_difference > 0.0):

@@ -1,8 +1,8 @@
 """Integrals over cells of products of shape functions and of their gradients, node by node.
 
-scikit-fem gives the shape functions at the quadrature points; what cells add to a matrix are then
-batched products of small matrices, and their sums share one pattern. As forms of scikit-fem, which
-are called for every pair of shape functions, the same took eight times as long.
+scikit-fem evaluates the shape functions at the quadrature points. The cell matrices are batched
+products of small matrices, and all global matrices share one sparsity pattern. As forms of
+scikit-fem, which are called for every pair of shape functions, this took eight times as long.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CELLS = 2048
-"""Looked at at once: what all add to a matrix would be several times as large as that is."""
+"""Cells per batch: all cell matrices together are several times as large as the global one."""
 
 
 class Pattern(NamedTuple):
-    """Rows `indptr` and columns `indices` of a matrix whose entries are pairs of a cell's nodes.
+    """Sparsity pattern, `indptr` and `indices`, of a matrix that couples the nodes of each cell.
 
-    `place` (cells, a, a): entry of the pair of a cell's nodes.
+    `place` (cells, a, a): number of the entry of each pair of nodes of a cell.
     """
 
     indptr: NDArray[np.int32]
@@ -34,7 +34,7 @@ class Pattern(NamedTuple):
     place: Ints
 
     def summed(self, parts: Floats) -> Floats:
-        """Entries of the matrix from the parts (cells, a, a) of the cells."""
+        """Entries of the global matrix from cell matrices (cells, a, a)."""
         found = np.bincount(self.place.ravel(), parts.ravel(), minlength=len(self.indices))
         return np.asarray(found, dtype=np.float64)
 
@@ -52,18 +52,18 @@ class Gradients:
 
 
 def pattern(basis: Any) -> Pattern:
-    """That of a scikit-fem basis of one component."""
+    """Sparsity pattern of a scikit-fem basis of one component."""
     nodes = np.asarray(basis.element_dofs.T)
     each = nodes.shape[1]
     pairs = np.repeat(nodes, each, axis=1).ravel(), np.tile(nodes, each).ravel()
     shape = (basis.N, basis.N)
-    found = csr_array((np.ones(len(pairs[0]), np.int8), pairs), shape=shape)  # in order, each once
+    found = csr_array((np.ones(len(pairs[0]), np.int8), pairs), shape=shape)
     entries = csr_array((np.arange(found.nnz), found.indices, found.indptr), shape=shape)
     return Pattern(found.indptr, found.indices, entries[pairs].reshape(-1, each, each))
 
 
 def products(basis: Any, where: Pattern, density: Floats | None = None) -> csr_array:
-    """Integrals [m^3] of u v, or of these times a density (cells,)."""
+    """Integrals [m^3] of products u v of shape functions, times a density (cells,) if given."""
     values = np.stack([np.asarray(one[0])[0] for one in basis.basis], axis=-1)
     pairs = (values[:, :, None] * values[:, None, :]).reshape(len(values), -1)
     entries = where.summed(_weighed(basis, density) @ pairs)
@@ -71,7 +71,7 @@ def products(basis: Any, where: Pattern, density: Floats | None = None) -> csr_a
 
 
 def gradients(basis: Any, where: Pattern, density: Floats | None = None) -> Gradients:
-    """Integrals of the products of all pairs of derivatives, times a density (cells,) if given."""
+    """Integrals of products of shape function derivatives, times a density (cells,) if given."""
     weights = _weighed(basis, density)[..., None]
     found = np.zeros((len(where.indices), 3, 3))
     for start in range(0, len(weights), CELLS):

@@ -1,4 +1,4 @@
-"""Tetrahedra for scikit-fem, straight or with the curved boundary of a shape that is known."""
+"""Tetrahedral meshes for scikit-fem, straight or curved along a known surface."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Ints = NDArray[np.int64]
 Projection = Callable[[Floats], Floats]
 
 FARTHEST = 0.2
-"""Share of its edge that a node may move: beyond, the mesh does not follow the surface there."""
+"""Largest displacement of an edge node, relative to its edge; edges beyond stay straight."""
 LEAST_JACOBIAN = 0.2
-"""Of that of the straight tetrahedron, at its corners, edge nodes and centre."""
+"""Smallest Jacobian relative to the straight tetrahedron, at corners, edge nodes and centre."""
 HALVINGS = 4
 NEWTON_STEPS = 8
 NEWTON_TOLERANCE = 1e-9
 """[m]"""
 SETTLED = 1e-9
-"""[m]; from so far off, a step of Newton's method goes as near as numbers do."""
+"""[m]; a Newton step from this distance converges to rounding."""
 # Corners, edge nodes and centre of the reference tetrahedron.
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 _EDGES = 0.5 * (_CORNERS[[0, 0, 0, 1, 1, 2]] + _CORNERS[[1, 2, 3, 2, 3, 3]])
@@ -33,7 +33,7 @@ _LOOKED_AT = np.ascontiguousarray(np.vstack([_CORNERS, _EDGES, np.full((1, 3), 0
 
 
 class _Derivatives(NamedTuple):
-    """At local coordinates in some cells: (3, 3, cells, q) by these, and the inverse if asked."""
+    """Derivatives (3, 3, cells, q) by local coordinates in some cells, and their inverse."""
 
     local: Floats
     cells: Any
@@ -44,8 +44,8 @@ class _Derivatives(NamedTuple):
 class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-fem has no types
     """scikit-fem's quadratic mapping with an inverse that starts in the straight cell.
 
-    scikit-fem's own starts outside the cell and is held to a cube round it, so that it fails for
-    some points of curved cells and for all beyond a face.
+    scikit-fem's own inverse starts outside the cell and is confined to a cube around it. It fails
+    for some points of curved cells and for all points beyond a face.
     """
 
     _kept: _Derivatives | None = None
@@ -53,16 +53,16 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
 
     @cached_property
     def bent(self) -> NDArray[np.bool_]:
-        """Cells (cells,) one of whose edges is no straight line with its node in the middle."""
+        """Cells (cells,) with an edge node off the middle of its edge."""
         nodes = self.mesh.doflocs[:, self.mesh.dofs.element_dofs]
         ends = nodes[:, [0, 1, 0, 0, 1, 2]] + nodes[:, [1, 2, 2, 3, 3, 3]]  # scikit-fem's order
         return np.asarray((np.abs(nodes[:, 4:] - 0.5 * ends) > SETTLED).any(axis=(0, 1)))
 
     def _at(self, X: Floats, tind: Any) -> _Derivatives:
-        """Derivatives at points, kept for the last points alone.
+        """Derivatives at points, cached for the last points only.
 
-        scikit-fem keeps those of every step of Newton's method, as long as there is a mesh, and
-        inverts them for every shape function anew.
+        scikit-fem caches those of every Newton step for the lifetime of the mesh, and inverts them
+        again for every shape function.
         """
         kept = self._kept
         if kept is None or kept.local is not X or kept.cells is not tind:
@@ -70,11 +70,11 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
         return kept
 
     def forget(self) -> None:
-        """Let go of the derivatives at the last points, once no shape function needs them."""
+        """Release the cached derivatives."""
         self._kept = None
 
     def _derivatives(self, X: Floats, tind: Any) -> Floats:
-        """Of coordinate i by local coordinate j (i, j, cells, q); each shape is looked at once."""
+        """Derivatives of coordinate i by local coordinate j, (i, j, cells, q)."""
         nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs
         dofs = dofs if tind is None else dofs[:, tind]
         found = np.zeros((3, 3, dofs.shape[1], X.shape[-1]))
@@ -109,7 +109,7 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
     def invF(self, x: Floats, tind: Any = None, **_: Any) -> Floats:  # noqa: N802 - scikit-fem's
         """Local coordinates (3, cells, q) of points x [m] (3, cells, q), by Newton's method.
 
-        ValueError if a point has none. The last ones are kept: scikit-fem asks for them twice.
+        ValueError without convergence. The last result is cached, as scikit-fem asks for it twice.
         """
         if self._found is not None and self._found[0] is x and np.array_equal(self._found[1], tind):
             return self._found[2]
@@ -120,7 +120,7 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
         return local
 
     def located(self, x: Floats, cells: Ints | None) -> tuple[Floats, Floats]:
-        """The same for cells and points that may not belong together, and how far off [m]."""
+        """Local coordinates of points that may lie outside their cells, and their error [m]."""
         corners = self.mesh.p[:, self.mesh.t if cells is None else self.mesh.t[:, cells]]
         edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0)
         offset = np.moveaxis(x - corners[:, 0][:, :, None], 1, 0)
@@ -136,9 +136,10 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
 
 
 class _Entities:
-    """Edges and facets of a mesh as scikit-fem numbers them, found in a fraction of its time.
+    """Edges and facets in the numbering of scikit-fem, found in a fraction of its time.
 
-    It sorts rows of numbers, which numpy compares as bytes; here each row is one number.
+    scikit-fem sorts rows of vertex numbers, which numpy compares as bytes; here each row is encoded
+    as one integer.
     """
 
     @staticmethod
@@ -159,7 +160,7 @@ class _Entities:
 
     @staticmethod
     def build_inverse(t: Any, mapping: Any) -> Any:
-        """First and last cell (2, e) of each entity, -1 for the last where it has one alone."""
+        """First and last cell (2, e) of each entity; the last is -1 for an entity of one cell."""
         cells, entities = np.tile(np.arange(t.shape[1]), len(mapping)), mapping.ravel()
         found = np.zeros((2, mapping.max() + 1), dtype=np.int32)
         found[0, entities[::-1]] = cells[::-1]  # of several the last one stays
@@ -176,7 +177,7 @@ class CurvedGrid(_Entities, skfem.MeshTet2):  # type: ignore[misc] # scikit-fem 
     """scikit-fem's tetrahedra with quadratic edges."""
 
     def on(self, nodes: Floats) -> CurvedGrid:
-        """The same cells with other nodes [m] (3, n): neither edges nor facets are sought again."""
+        """The same cells with other nodes [m] (3, n), reusing edges and facets."""
         found = CurvedGrid(nodes, self.t)
         _share(self, found)
         found._dofs = self.dofs
@@ -184,14 +185,14 @@ class CurvedGrid(_Entities, skfem.MeshTet2):  # type: ignore[misc] # scikit-fem 
 
 
 def _share(known: Any, other: Any) -> None:
-    """Give a mesh the entities of another of the same cells."""
+    """Copy the edges and facets of a mesh to another with the same cells."""
     for name in ("_edges", "_t2e", "_facets", "_t2f", "_f2t"):
         if hasattr(known, name):
             setattr(other, name, getattr(known, name))
 
 
 def mapping(grid: Any) -> Any:
-    """What takes the reference cell to a grid's cells."""
+    """Mapping from the reference cell to the cells of a grid."""
     if isinstance(grid, skfem.MeshTet2):
         return CurvedMapping(grid, grid.elem(), grid.bndelem)
     return grid.mapping()
@@ -205,10 +206,10 @@ def straight(mesh: TetrahedralMesh) -> Any:
 
 
 def curved(mesh: TetrahedralMesh, project: Projection) -> Any:
-    """The mesh with the middle nodes of its boundary edges on the surface: quadratic geometry.
+    """The mesh with quadratic geometry, its boundary edge nodes on the surface.
 
-    `project` takes points [m] (n, 3) to the surface. Where a tetrahedron would be distorted, as in
-    a groove that the mesh is too coarse for, its edges stay straight, or half-way.
+    `project` maps points [m] (n, 3) onto the surface. Where a tetrahedron would be distorted, as in
+    a groove that the mesh does not resolve, its edge nodes move part of the way or not at all.
     """
     flat = straight(mesh)
     edges = flat.boundary_edges()

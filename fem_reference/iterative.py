@@ -1,10 +1,10 @@
-"""Conjugate gradients on two levels of elements, and for mixed elements minimal residuals.
+"""Preconditioned conjugate gradients, and minimal residuals (MINRES) for mixed elements.
 
-Quadratic elements are preconditioned by a solution with linear elements on the same mesh, an eighth
-of the unknowns, added to that of every node alone: the iterations do not grow as the mesh is
-refined. The linear elements are solved by factors, or, when they are many, by a cycle of algebraic
-multigrid. The iterations go by a matrix in single precision, half of what is read, and what this
-leaves of a residual is iterated on again.
+The preconditioner of quadratic elements is the sum of block Jacobi and of a solution with linear
+elements on the same mesh, an eighth of the unknowns. The number of iterations does not grow as the
+mesh is refined. The linear elements are solved by factors, or, when they are many, by a cycle of
+algebraic multigrid. The iterations use a matrix in single precision, which halves the memory
+traffic; iterative refinement recovers double precision.
 """
 
 from __future__ import annotations
@@ -26,63 +26,64 @@ Floats = NDArray[np.float64]
 
 MAX_ITERATIONS = 3000
 REFINEMENTS = 6
-STRICTER = {cg: 0.5, minres: 1e-6}
-"""Minimal residuals stop by a residual relative to the matrix's norm times the solution's."""
-GUIDED, LED = 1e-4, 0.1
-"""Residual to which a matrix in single precision is followed at once, and at which it is left."""
+TOLERANCE_FACTOR = {cg: 0.5, minres: 1e-6}
+"""Inner over outer tolerance; MINRES stops relative to the norms of matrix times solution."""
+SINGLE_TOLERANCE, LEAST_REDUCTION = 1e-4, 0.1
+"""Smallest inner tolerance with the matrix in single precision, and the reduction of the residual
+without which refinement continues in double precision."""
 ROUNDING = 1e-15
-"""Of the sum of magnitudes that make up a residual."""
+"""Rounding of a residual relative to the sum of magnitudes of its terms."""
 FACTORED_BELOW = 6_000
-"""Linear unknowns that are solved by factors as fast as by a cycle."""
-SHARE = 0.7
-"""Of the solution of every node alone: the sum with that of linear elements overshoots."""
+"""Unknowns of linear elements below which factors are as fast as a multigrid cycle."""
+JACOBI_WEIGHT = 0.7
+"""Damping of block Jacobi: undamped, its sum with the coarse solution overshoots."""
 
 
 class Solver(Protocol):
-    """Solution of K u = f for loads f [N] (n,), however many."""
+    """Solver of K u = f for loads f [N] (n,)."""
 
     def __call__(
         self, load: Floats, tolerance: float | None = None, start: Floats | None = None
     ) -> Floats:
-        """Displacement [m] (n,) to a residual of `tolerance` times the load, from a `start`."""
+        """Displacement [m] (n,) to a residual of `tolerance` times the load, from `start`."""
 
 
 def preconditioner(body: Body) -> Solve:
-    """Approximate inverse of the displacements' part of the stiffness, symmetric and positive."""
+    """Symmetric positive approximate inverse of the displacement block of the stiffness."""
     matrix = body.stiffness.matrix.tobsr(blocksize=(3, 3))
     if not ELEMENTS[body.element].quadratic:
         return _linear_level(matrix, body.points)
     prolong = _from_vertices(body.nodes.mesh, body.node_count)
     coarse = _linear_level(_on_vertices(matrix, prolong), body.points[: prolong.shape[1]])
-    restrict, alone = csr_array(prolong.T), _of_nodes_alone(matrix)
+    restrict, jacobi = csr_array(prolong.T), _block_jacobi(matrix)
 
     def both(residual: Floats) -> Floats:
         found = coarse((restrict @ residual.reshape(-1, 3)).ravel())
         found = np.asarray(prolong @ found.reshape(-1, 3)).ravel()
-        alone.add_product(residual, found)
+        jacobi.add_product(residual, found)
         return found
 
     return both
 
 
 def _on_vertices(matrix: bsr_array, prolong: csr_array) -> bsr_array:
-    """The matrix of linear elements, as quadratic ones that are linear."""
+    """The matrix of linear elements, by Galerkin projection of that of quadratic ones."""
     blocks = prolong.data[:, None, None] * np.eye(3)
     shape = (3 * prolong.shape[0], 3 * prolong.shape[1])
     by_node = bsr_array((blocks, prolong.indices, prolong.indptr), shape=shape)
     return by_node.T @ matrix @ by_node
 
 
-def _of_nodes_alone(matrix: bsr_array) -> Blocks:
-    """A share of the inverses of the diagonal blocks."""
+def _block_jacobi(matrix: bsr_array) -> Blocks:
+    """Damped inverses of the diagonal blocks."""
     whole = blocks_of(matrix)
-    inverses = SHARE * np.linalg.inv(whole.data[diagonal_of(whole)])
+    inverses = JACOBI_WEIGHT * np.linalg.inv(whole.data[diagonal_of(whole)])
     places = np.arange(len(inverses) + 1, dtype=np.int32)
     return Blocks(places[:-1], places[1:], places[:-1], inverses.astype(np.float32))
 
 
 def _from_vertices(mesh: Any, nodes: int) -> csr_array:
-    """Matrix from values at vertices to values at all nodes: edge nodes take the mean."""
+    """Interpolation from vertices to all nodes: an edge node takes the mean of its ends."""
     count, ends = int(mesh.nvertices), mesh.edges
     edges = count + np.arange(ends.shape[1])
     rows = np.concatenate([np.arange(count), edges, edges])
@@ -98,14 +99,15 @@ def _linear_level(matrix: bsr_array, points: Floats) -> Solve:
 
 
 def iterative(body: Body, tolerance: float) -> Solver:
-    """Solution of K u = f to a residual of `tolerance` times f, where no other is asked for.
+    """Iterative solver of K u = f to a relative residual of `tolerance` by default.
 
-    ValueError if it is not reached: nothing holds the body, or the elements are nearly flat.
+    Its calls raise ValueError without convergence: for a body that is not held, or nearly flat
+    elements.
     """
     inner, pressure = preconditioner(body), body.stiffness.pressure
     if pressure is None:
         matrix = body.stiffness.blocks
-        return _solver(cg, matrix, inner, tolerance, guide=symmetric(matrix))
+        return _solver(cg, matrix, inner, tolerance, single=symmetric(matrix))
     schur = factorised(pressure.schur)
     whole, size = csr_array(body.stiffness.system()), body.stiffness.size
 
@@ -119,19 +121,19 @@ def _solver(
     method: Any,
     matrix: Any,
     inner: Solve,
-    usual: float,
+    default: float,
     size: int | None = None,
-    guide: Any = None,
+    single: Any = None,
 ) -> Solver:
-    """Of the first `size` unknowns, the others being those of a pressure and without load."""
+    """Solver for the first `size` unknowns; the others are pressures, without load."""
 
     def padded(values: Floats) -> Floats:
         return np.concatenate([values, np.zeros(matrix.shape[0] - len(values))])
 
     def solve(load: Floats, tolerance: float | None = None, start: Floats | None = None) -> Floats:
-        wanted = usual if tolerance is None else tolerance
+        wanted = default if tolerance is None else tolerance
         first = None if start is None else padded(start)
-        return _refined(method, matrix, inner, padded(load), wanted, first, guide)[:size]
+        return _refined(method, matrix, inner, padded(load), wanted, first, single)[:size]
 
     return solve
 
@@ -143,29 +145,32 @@ def _refined(
     load: Floats,
     tolerance: float,
     start: Floats | None = None,
-    guide: Any = None,
+    single: Any = None,
 ) -> Floats:
-    """Iterate again on what is left, as minimal residuals stop by a norm of their own.
+    """Solution by iterative refinement.
 
-    With a `guide`, a matrix near to the other that takes less time, until it leads no further.
+    It also makes up for the stopping criterion of MINRES, which has a norm of its own. `single`:
+    an approximation of the matrix in single precision for the inner iterations, used as long as it
+    reduces the residual.
     """
-    found = np.zeros_like(load) if start is None else start
-    left, scale = load - matrix @ found, float(np.linalg.norm(load))
-    rough = matrix if guide is None else guide
+    u = np.zeros_like(load) if start is None else start
+    residual, scale = load - matrix @ u, float(np.linalg.norm(load))
+    cheapest = matrix if single is None else single
     for _ in range(REFINEMENTS):
-        size = float(np.linalg.norm(left))
-        if size <= tolerance * scale or size <= _rounding(rough, found, size, scale):
-            return found
-        least = ROUNDING if guide is None else GUIDED
-        wanted = max(STRICTER[method] * tolerance * scale / size, least)
-        with np.errstate(all="ignore"):  # a singular matrix may end in 0 / 0, as the residual tells
-            more = _iterated(method, matrix if guide is None else guide, inner, left, wanted)
-        better = load - matrix @ (found + more)
-        if guide is not None and not np.linalg.norm(better) < LED * size:
-            guide = None
+        norm = float(np.linalg.norm(residual))
+        if norm <= tolerance * scale or norm <= _rounding(cheapest, u, norm, scale):
+            return u
+        least = ROUNDING if single is None else SINGLE_TOLERANCE
+        inner_tolerance = max(TOLERANCE_FACTOR[method] * tolerance * scale / norm, least)
+        inner_matrix = matrix if single is None else single
+        with np.errstate(all="ignore"):  # a singular matrix may give 0 / 0, seen in the residual
+            correction = _iterated(method, inner_matrix, inner, residual, inner_tolerance)
+        corrected = load - matrix @ (u + correction)
+        if single is not None and not np.linalg.norm(corrected) < LEAST_REDUCTION * norm:
+            single = None
             continue
-        found, left = found + more, better
-        if not np.isfinite(left).all():
+        u, residual = u + correction, corrected
+        if not np.isfinite(residual).all():
             break
     raise ValueError(
         "the finite elements find no rest: the support does not hold the body, or a tetrahedron is "
@@ -174,22 +179,21 @@ def _refined(
 
 
 def _iterated(method: Any, matrix: Any, inner: Solve, right: Floats, tolerance: float) -> Floats:
-    product, better = (
+    product, preconditioning = (
         LinearOperator(matrix.shape, matvec=one, dtype=np.float64)
         for one in (matrix.__matmul__, inner)
     )
-    found, _ = method(product, right, M=better, rtol=tolerance, maxiter=MAX_ITERATIONS)
+    found, _ = method(product, right, M=preconditioning, rtol=tolerance, maxiter=MAX_ITERATIONS)
     return np.asarray(found)
 
 
-def _rounding(matrix: Any, found: Floats, size: float, scale: float) -> float:
-    """How much of a residual is rounding, which no iteration reduces.
+def _rounding(matrix: Any, u: Floats, norm: float, scale: float) -> float:
+    """Rounding error of a residual, which no iteration reduces.
 
-    That is no excuse for an imbalance that no answer has: in a nearly singular matrix it would
-    excuse anything.
+    Zero for a residual above IMBALANCE: a nearly singular matrix has arbitrarily large rounding.
     """
-    if size > IMBALANCE * scale:
+    if norm > IMBALANCE * scale:
         return 0.0
     by_blocks = isinstance(matrix, Blocks | SymmetricBlocks)
-    whole = matrix.magnitudes(found) if by_blocks else abs(matrix) @ np.abs(found)
-    return ROUNDING * float(np.linalg.norm(whole))
+    magnitudes = matrix.magnitudes(u) if by_blocks else abs(matrix) @ np.abs(u)
+    return ROUNDING * float(np.linalg.norm(magnitudes))

@@ -31,10 +31,10 @@ class Law(Protocol):
 class NeoHookean:
     """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2, with Lame's constants [Pa].
 
-    Bonet and Wood (2008), section 6.4.3. Of the compressible forms the one most codes share, so
-    that others can repeat the numbers; it is linear elasticity at small strain and resists a volume
-    squeezed to nothing without bound. (ln J)^2 stops being convex at J = e, which tissue with a
-    Poisson ratio near 1/2 does not come near.
+    Bonet and Wood (2008), section 6.4.3. Of the compressible forms it is the one that most codes
+    have, so that others can reproduce the results. It reduces to linear elasticity at small strain,
+    and its energy is unbounded as the volume vanishes. (ln J)^2 is not convex above J = e, which
+    tissue with a Poisson ratio near 1/2 does not approach.
     """
 
     lame: Any
@@ -58,7 +58,7 @@ class NeoHookean:
         )
 
     def tangent(self, F: Floats) -> Floats:
-        """d(F^-T)_iJ / dF_kL = -F^-T_iL F^-T_kJ does the rest."""
+        """A_iJkL with d(F^-T)_iJ / dF_kL = -F^-T_iL F^-T_kJ."""
         G = _inverse_transpose(F)
         pressure = self.lame * np.log(np.linalg.det(F)) - self.shear
         return np.asarray(
@@ -72,8 +72,8 @@ class NeoHookean:
 class StVenantKirchhoff:
     """W = lambda/2 (tr E)^2 + mu E : E of the Green-Lagrange strain E = (C - I)/2.
 
-    Hooke's law for large rotations. For small strains only: squeezed along one axis it softens and
-    gives way at a stretch of 1/sqrt(3), and a volume squeezed to nothing costs a finite energy.
+    Hooke's law for large rotations and small strains. Under uniaxial compression it softens and
+    loses stability at a stretch of 1/sqrt(3), and its energy is finite as the volume vanishes.
     """
 
     lame: Any
@@ -90,7 +90,7 @@ class StVenantKirchhoff:
         return np.asarray(F @ self._second_stress(F))
 
     def tangent(self, F: Floats) -> Floats:
-        """Of F at fixed S, and of S, which is linear in E."""
+        """Geometric part at constant S, and material part, as S is linear in E."""
         left = F @ np.swapaxes(F, -2, -1)
         return np.asarray(
             np.einsum("ik,...JL->...iJkL", IDENTITY, self._second_stress(F))
@@ -108,7 +108,7 @@ class StVenantKirchhoff:
 
 
 def _over(constant: Any, axes: int) -> Floats:
-    """A constant, or one of each cell (cells, 1), to go with so many axes more."""
+    """A constant, or one per cell (cells, 1), with so many axes appended."""
     return np.asarray(constant)[(..., *axes * (None,))]
 
 
@@ -128,4 +128,4 @@ LAWS: dict[str, Callable[[Any, Any], Law]] = {
 DEFAULT = "neo-hookean"
 NONE = "none"
 LARGE_STRAIN = (*LAWS, NONE)
-"""Laws that a linear reference may be compared with, or none."""
+"""Laws with which a linear reference may be compared, or none."""

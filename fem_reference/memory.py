@@ -1,4 +1,4 @@
-"""What a body takes of memory, before it is assembled."""
+"""Memory that a body needs, estimated before it is assembled."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from study.mesh.tetrahedra import edges
 from study.problem.tissue import Tissue
 
 FACTORS = 15.0
-"""Bytes of the factors are this times unknowns^(5/3), measured at 20 000 and 43 000."""
+"""Bytes of the factors over unknowns^(5/3), measured at 20 000 and 43 000 unknowns."""
 SHARE = 0.7
-"""Of the memory that is free."""
+"""Usable share of the free memory."""
 
 
 def unknowns(mesh: TetrahedralMesh, element: str) -> int:
-    """Unknowns of the body on a mesh, displacements and pressures."""
+    """Number of displacements and pressures of a body on a mesh."""
     kind, vertices = ELEMENTS[element], len(mesh.points)
-    middles = len(edges(mesh.tetrahedra)) if kind.quadratic else 0
-    return 3 * (vertices + middles) + (vertices if kind.mixed else 0)
+    edge_nodes = len(edges(mesh.tetrahedra)) if kind.quadratic else 0
+    return 3 * (vertices + edge_nodes) + (vertices if kind.mixed else 0)
 
 
 def needed(count: int, element: str, *, stepping: bool) -> float:
-    """Bytes for so many unknowns; stepping in time factors the matrix."""
+    """Bytes for `count` unknowns; direct time integration (`stepping`) factors the matrix."""
     assembled = ELEMENTS[element].bytes_per_unknown * count
     return assembled + (FACTORS * count ** (5.0 / 3.0) if stepping else 0)
 
 
 def factors_fit(count: int, element: str) -> bool:
-    """Whether the memory that is free holds the factors of so many unknowns beside the body."""
+    """Whether the free memory holds the body and the factors of `count` unknowns."""
     return needed(count, element, stepping=True) <= SHARE * available()
 
 
 def available() -> float:
-    """Bytes of memory that are free."""
+    """Bytes of free memory; infinite where the system does not report it."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not told on this system
+    except (AttributeError, ValueError, OSError):  # not available on this system
         return float("inf")
 
 
 def refuse_too_large(
     mesh: TetrahedralMesh, tissue: Tissue, element: str, *, stepping: bool
 ) -> None:
-    """ValueError with the size of elements that would fit."""
+    """ValueError, with the element size that would fit, if a body does not fit into memory."""
     name = chosen_element(element, tissue.highest_poisson_ratio)
     count = unknowns(mesh, name)
     limit, wanted = SHARE * available(), needed(count, name, stepping=stepping)

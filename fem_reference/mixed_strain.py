@@ -1,11 +1,11 @@
-"""A neo-Hookean body at finite strain with a pressure of its own, which does not lock.
+"""Mixed displacement-pressure formulation of a neo-Hookean body at finite strain, free of locking.
 
     L(u, p) = int mu/2 (tr C - 3) - mu ln J + p ln J - p^2 / (2 lambda) dX
 
-is stationary where forces balance and p is lambda ln J in the mean: the law of
-`fem_reference.laws.NeoHookean`, quadratic in displacement and linear in pressure (Taylor and Hood
-1973; Boffi, Brezzi and Fortin 2013, ch. 8, for small strain). Its linearisation at rest is the
-element `taylor-hood` of the linear reference.
+is stationary in equilibrium with p = lambda ln J in the weak sense. The law is
+`fem_reference.laws.NeoHookean`; the elements are quadratic in displacement and linear in pressure
+(Taylor and Hood 1973; Boffi, Brezzi and Fortin 2013, ch. 8, for small strain). The linearisation at
+rest is the element `taylor-hood` of the linear reference.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Ints = NDArray[np.int64]
 
 
 class Kinematics(NamedTuple):
-    """What a deformation does at the integration points: F (t, q, 3, 3), its determinant, F^-T."""
+    """F (t, q, 3, 3), J = det F and F^-T at the integration points."""
 
     gradient: Floats
     volume: Floats
@@ -40,7 +40,7 @@ class Kinematics(NamedTuple):
 
 
 class Sparsity(NamedTuple):
-    """Columns `indptr` and rows `indices` of a matrix, and where in it each pair of a cell goes."""
+    """Compressed columns `indptr`, `indices`; `place`: entry of each pair of unknowns of a cell."""
 
     indptr: Ints
     indices: Ints
@@ -53,10 +53,11 @@ class MixedSolid:
 
     `nodes`: scikit-fem's basis of one component; `slopes` (t, q, 3, a): derivatives [1/m] of the
     a shape functions of tetrahedron t at its integration points q, whose `weights` [m^3] are
-    (t, q); `unknowns` (t, a, 3) and `corners` (t, 4): places of displacements and pressures in w;
+    (t, q); `unknowns` (t, a, 3) and `corners` (t, 4): indices of displacements and pressures in w;
     `shares` (q, 4): shape functions of the pressure. `lame`, `shear` [Pa], or those of each cell
-    (t, 1); `support` [N/m] (n, n). `pointwise` [Pa]: of `lame`, what acts at each point on ln J
-    there; the pressure carries the rest. Only in the mean would a volume be kept from collapse.
+    (t, 1); `support` [N/m] (n, n). `pointwise` [Pa]: part of `lame` that acts on ln J at each
+    point, with the pressure for the rest. The pressure alone prevents a collapse of the volume in
+    the mean only.
     """
 
     nodes: Any
@@ -87,12 +88,12 @@ class MixedSolid:
 
     @cached_property
     def length(self) -> float:
-        """Cube root of the volume [m], which makes a force of a pressure's equation."""
+        """Cube root of the volume [m], a length scale for residual volumes."""
         return float(np.cbrt(self.weights.sum()))
 
     @cached_property
     def typical_shear(self) -> float:
-        """Shear modulus [Pa] in the mean, by which volumes that are missed count as forces."""
+        """Mean shear modulus [Pa], a scale for residual volumes as forces."""
         return float((self.shear * self.weights).sum() / self.weights.sum())
 
     def deformation(self, w: Floats) -> Floats:
@@ -105,7 +106,7 @@ class MixedSolid:
         return kinematics(self.deformation(w)).volume
 
     def energy(self, w: Floats) -> float:
-        """Energy [J] stored in the tissue and the support; p^2 / (2 lambda) is that of volume."""
+        """Strain energy [J] of tissue and support, with p^2 / (2 lambda) for the volume."""
         F, u = self.deformation(w), w[: self.size]
         density = 0.5 * self.shear * ((F**2).sum(axis=(-2, -1)) - 3.0)
         log_volume = np.log(np.linalg.det(F))
@@ -186,7 +187,7 @@ class MixedSolid:
 
     @cached_property
     def _pressure_mass(self) -> Floats:
-        """What each tetrahedron adds to the pressures' mass over lambda, (t, 4, 4)."""
+        """Pressure mass over lambda of each tetrahedron, (t, 4, 4)."""
         pairs = self.shares[:, :, None] * self.shares[:, None, :]
         return np.asarray(np.einsum("tq,qab->tab", self.weights / self.carried, pairs))
 
@@ -200,7 +201,7 @@ class MixedSolid:
         return Sparsity(np.concatenate([[0], np.cumsum(counts)]), known % total, place)
 
     def assembled(self, blocks: Floats) -> csc_array:
-        """The matrix in the order of w of a block for each cell: its displacements, pressures."""
+        """Global matrix, in the order of w, of cell blocks for displacements, then pressures."""
         indptr, indices, place = self._sparsity
         entries = np.bincount(place, blocks.ravel(), minlength=len(indices))
         total = self.size + self.pressures
@@ -208,7 +209,7 @@ class MixedSolid:
 
     @cached_property
     def padded_support(self) -> csc_array:
-        """The support [N/m] in the order of w, without any of the pressures."""
+        """The support [N/m] in the order of w, with zeros for the pressures."""
         total, own = self.size + self.pressures, coo_array(self.support)
         return csc_array(coo_array((own.data, (own.row, own.col)), shape=(total, total)))
 
@@ -218,7 +219,7 @@ class MixedSolid:
         return csc_array(products(self.nodes, pattern(self.nodes)))
 
     def weight(self, acceleration: Floats, density: float) -> Floats:
-        """Nodal forces [N] (n,) of an acceleration [m/s^2] (3,) of its mass, density [kg/m^3]."""
+        """Nodal forces [N] (n,) of an acceleration [m/s^2] (3,) at a density [kg/m^3]."""
         share = np.asarray(self.nodal_volume.sum(axis=1)).ravel()
         return np.outer(density * share, acceleration).ravel()
 
@@ -226,7 +227,7 @@ class MixedSolid:
 def mixed_solid(grid: Any, tissue: Tissue, support: csc_array | None = None) -> MixedSolid:
     """The body on a mesh of scikit-fem's, straight or curved (`fem_reference.grid`).
 
-    ValueError for a Poisson ratio at which no pressure carries the volume: 0 and below, or 1/2.
+    ValueError for a Poisson ratio without a mixed formulation: 0 and below, or 1/2.
     """
     nodes = skfem.Basis(grid, skfem.ElementTetP2(), mapping(grid), intorder=MASS_ORDER)
     return on_nodes(nodes, tissue, support)
@@ -238,10 +239,10 @@ def on_nodes(
     support: csc_array | None = None,
     made: Composition | None = None,
 ) -> MixedSolid:
-    """The same on a basis of one component, quadratic; with the moduli of each cell if given.
+    """The body on a quadratic scikit-fem basis of one component, with moduli per cell if given.
 
-    Where tissue changes, the pressure jumps and its continuous shape functions smear it over the
-    cells there.
+    At interfaces of tissues the pressure jumps, and its continuous shape functions smear the jump
+    over the adjacent cells.
     """
     regular = tissue.highest_poisson_ratio < 0.5
     lame, shear = cell_moduli(made, tissue) if regular else (0.0, 0.0)
@@ -262,10 +263,10 @@ def on_nodes(
 
 
 def relieved(body: MixedSolid, moved: Floats) -> MixedSolid:
-    """The body whose shape without stress is that of a body moved by the displacements of `moved`.
+    """The body whose stress-free shape is that of `body` displaced by `moved`.
 
-    `moved` in the order of w. Displacements count from the new shape; the nodes stay those of the
-    shape before.
+    `moved` is in the order of w. Displacements count from the new shape; the nodes keep their
+    previous positions.
     """
     change = kinematics(body.deformation(moved))
     return replace(
@@ -276,7 +277,7 @@ def relieved(body: MixedSolid, moved: Floats) -> MixedSolid:
 
 
 def kinematics(F: Floats) -> Kinematics:
-    """Of deformation gradients (t, q, 3, 3), by cofactors: a batch of inverses takes far longer."""
+    """Kinematics of F (t, q, 3, 3) by cofactors, far faster than batched inverses."""
     rows_of = [F[..., i, :] for i in range(3)]
     cofactors = np.stack(
         [np.cross(rows_of[(i + 1) % 3], rows_of[(i + 2) % 3]) for i in range(3)], axis=-2

@@ -17,7 +17,6 @@ from fem_reference.elements import AUTO
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
-from fem_reference.pace import Pace, own_pace
 from fem_reference.recording import Recorder
 from fem_reference.solvers import solve_static, solver
 from fem_reference.superposition import (
@@ -31,6 +30,7 @@ from fem_reference.superposition import (
     excitation_of,
     superposed,
 )
+from fem_reference.time_steps import TimeSteps, steps_for_load
 from study.mesh.kinds import TetrahedralMesh
 from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
@@ -47,10 +47,10 @@ DEFAULT = "ritz-vectors"
 
 @dataclass(frozen=True)
 class Method:
-    """How the motion is found: a name of `METHODS`, steps per sample, modes of `modal`.
+    """Solution method of the motion: a name of `METHODS`, steps per sample, modes of `modal`.
 
-    Without `steps_per_sample` a motion has its own steps, however often it is sampled. Of either
-    `times` as many are taken, a power of two.
+    Without `steps_per_sample`, the load history determines the steps (`fem_reference.time_steps`).
+    Either number is multiplied by `times`, a power of two.
     """
 
     name: str = DEFAULT
@@ -58,15 +58,15 @@ class Method:
     modes: int = 100
     times: int = 1
 
-    def pace(self, factor: Factor, sampled: Floats) -> Pace:
-        """Steps of a motion under a load history that is sampled at these times [s]."""
+    def time_steps(self, factor: Factor, sampled: Floats) -> TimeSteps:
+        """Time steps of a motion under a load history, sampled at these times [s]."""
         if self.steps_per_sample is not None:
-            return Pace(self.steps_per_sample * self.times)
-        return own_pace(factor, sampled, self._parts).times(self.times)
+            return TimeSteps(self.steps_per_sample * self.times)
+        return steps_for_load(factor, sampled, self._parts).refined(self.times)
 
-    def load_pace(self, factor: Factor, sampled: Floats) -> Pace:
+    def load_steps(self, factor: Factor, sampled: Floats) -> TimeSteps:
         """Steps over which the load of a superposition is linear."""
-        return self.pace(factor, sampled).times(LOAD_STEPS)
+        return self.time_steps(factor, sampled).refined(LOAD_STEPS)
 
     @property
     def _parts(self) -> int:
@@ -75,15 +75,15 @@ class Method:
 
 @dataclass(frozen=True)
 class Solution:
-    """Trajectory with what it took; `wall` [s] has the solution in it, not the assembly.
+    """Trajectory of a run with its cost; `wall` [s] of the solution, without assembly.
 
-    `time_step` [s] and `steps`: for a superposition those of the load. `superposed`: how a
-    superposition was made, and the motion of all nodes; none of steps in time. `largest_strain`:
-    largest absolute principal strain in the kept frames, of a superposition also where a control
-    point is farthest out, and `largest_rotation` [rad] likewise; linear elasticity is good for a
-    few per cent of either. `start` [m] (n,): where the motion starts under what acts at all times,
-    None where nothing does. `moving`: displacement [m] and velocity [m/s] (n,) of all unknowns at a
-    sample, counted from the given shape, None of steps in time. `contact`: with moved tools.
+    `time_step` [s] and `steps`: for a superposition those of the load. `superposed`: the subspace
+    and modal motion of a superposition, None for direct time integration. `largest_strain`: largest
+    absolute principal strain in the recorded frames, of a superposition also where a control point
+    is farthest out; `largest_rotation` [rad] likewise. Linear elasticity is valid up to a few per
+    cent of either. `start` [m] (n,): equilibrium under the dead load, None without one. `moving`:
+    displacement [m] from the given shape and velocity [m/s] (n,) of all unknowns at a sample, None
+    for direct time integration. `contact`: outcome with tools of prescribed motion.
     """
 
     trajectory: Trajectory
@@ -102,20 +102,20 @@ class Solution:
 
     @property
     def truncation(self) -> CurveChange | None:
-        """How far the last quarter of a subspace changes the curves, None of steps in time."""
+        """Change of the curves by the last quarter of a subspace; None for direct integration."""
         if self.contact is not None:
             return self.contact.truncation
         return None if self.superposed is None else self.superposed.truncation
 
     @property
     def vectors(self) -> int | None:
-        """Of the subspace, None of steps in time."""
+        """Dimension of the subspace; None for direct integration."""
         if self.contact is not None:
             return self.contact.vectors
         return None if self.superposed is None else self.superposed.subspace.load.size
 
     def rest(self, body: Body) -> Floats:
-        """Displacement [m] (n,) of the body at rest under all loads in full."""
+        """Static displacement [m] (n,) under all loads in full."""
         if self.contact is not None:
             return self.contact.at_rest
         if self.superposed is None:
@@ -138,31 +138,36 @@ def _stepped(
     near: Near,
     advance: Advance,
 ) -> Solution:
-    """By equal steps in time; samples within a step are those of its cubic."""
-    del near  # a step is solved by factors
+    """Direct time integration; samples within a step come from its cubic interpolant."""
+    del near  # a factored step needs no start vectors
     times = recorder.observation.times
-    pace = method.pace(factor, times)
-    step, count = pace.length(float(times[1] - times[0])), pace.steps(len(times) - 1)
+    steps = method.time_steps(factor, times)
+    step, count = steps.step(float(times[1] - times[0])), steps.count(len(times) - 1)
     system = Oscillator(body.mass, body.stiffness, body.loads, damping)
     started = time.perf_counter()
     before: State | None = None
     for n, after in enumerate(scheme(system, factor, step, count)):
-        if n % pace.per_sample == 0:
-            _record(recorder, n // pace.per_sample * pace.samples, before, after, step, pace)
+        if n % steps.per_sample == 0:
+            _record(recorder, n // steps.per_sample * steps.samples, before, after, step, steps)
             advance(n / count)
         before = after
     return _solution(body, recorder, step, count, time.perf_counter() - started)
 
 
 def _record(
-    recorder: Recorder, last: int, before: State | None, after: State, step: float, pace: Pace
+    recorder: Recorder,
+    last: int,
+    before: State | None,
+    after: State,
+    step: float,
+    steps: TimeSteps,
 ) -> None:
-    """Keep a sample at the end of a step, and those within the step."""
+    """Record the sample at the end of a step and those within it."""
     start = after if before is None else before
     ends = [_at_probes(recorder, state) for state in (start, after)]
-    first = last if before is None else last - pace.samples + 1
+    first = last if before is None else last - steps.samples + 1
     for sample in range(first, min(last + 1, len(recorder.observation.times))):
-        share = 1.0 - (last - sample) / pace.samples
+        share = 1.0 - (last - sample) / steps.samples
         recorder.motion(sample, *hermite(ends[0], ends[1], share, step))
         if sample in recorder.observation.frames:
             recorder.field(sample, hermite(start, after, share, step)[0])
@@ -183,10 +188,10 @@ def _superposed(
     near: Near,
     advance: Advance,
 ) -> Solution:
-    """In a subspace; its strain also where a control point is farthest out."""
+    """Superposition in a subspace; strain also where a control point is farthest out."""
     started = time.perf_counter()
-    pace = method.load_pace(factor, recorder.observation.times)
-    excitation = excitation_of(damping, factor, recorder, pace)
+    steps = method.load_steps(factor, recorder.observation.times)
+    excitation = excitation_of(damping, factor, recorder, steps)
     found = superposed(excitation, choose(body, excitation, method.modes, near, advance))
     wall = time.perf_counter() - started
     for sample in range(len(recorder.observation.times)):
@@ -217,9 +222,9 @@ def build(
     method: str = DEFAULT,
     loaded: Loaded | None = None,
 ) -> Body:
-    """Discretised body. ValueError, before anything is assembled, if memory does not hold it.
+    """The discretised body. ValueError, before any assembly, if it does not fit into memory.
 
-    `loaded`: what `refuse` gave of the same, if it was asked.
+    `loaded`: result of `refuse` for the same arguments, if known.
     """
     if loaded is None:
         refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
@@ -235,9 +240,9 @@ def refuse(
     project: Projection | None = None,
     method: str = DEFAULT,
 ) -> Loaded:
-    """ValueError for all that `build` refuses, without what takes most time in it.
+    """Raise the ValueError of `build`, if any, without its expensive assembly.
 
-    The surface that is held and loaded, of which a body is made sooner.
+    Returns the supported and loaded surface, which `build` reuses.
     """
     refuse_too_large(mesh, tissue, element, stepping=method in STEPPING)
     return loaded_surface(mesh, tissue, foundation, tool, element, project)
@@ -252,10 +257,10 @@ def run(
     on_progress: Advance = lambda _: None,
     near: Near = None,
 ) -> Solution:
-    """Motion from rest under `factor` of the body's load, or of each of its loads.
+    """Motion from rest under the body's loads times their `factor` of the time [s].
 
-    `near` (n, k): vectors near those of its superposition, as those on a coarser mesh, by which
-    they are found sooner. ValueError for an unknown method.
+    `near` (n, k): approximations of the vectors of the superposition, such as those of a coarser
+    mesh, which reduce the iterations. ValueError for an unknown method.
     """
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
@@ -277,12 +282,12 @@ def _moving(superposed: Superposed | None, start: Floats) -> Callable[[int], Sta
 
 
 def start_of(body: Body) -> Floats | None:
-    """Displacement [m] (n,) at rest under what acts at all times; None where nothing does."""
+    """Static displacement [m] (n,) under the dead load; None without one."""
     return None if body.dead is None else solver(body)(body.dead)
 
 
 def static_field(body: Body, points: Floats) -> Floats:
-    """Displacement [m] (q, 3) at points under the full load at rest."""
+    """Static displacement [m] (q, 3) at points [m] (q, 3) under the full load."""
     return at_points(evaluation(body, points), solve_static(body))
 
 

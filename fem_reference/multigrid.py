@@ -1,8 +1,9 @@
-"""A cycle of algebraic multigrid for linear elements.
+"""Algebraic multigrid V-cycle for linear elements, used as a preconditioner.
 
-pyamg builds the levels, by smoothed aggregation with the six rigid motions as near-null space; the
-cycle is one of our own: from rest, a sweep forward before and one backward after what is coarser.
-It is a symmetric, positive operator. Its matrices are in single precision, as it only guides.
+pyamg builds the levels by smoothed aggregation with the six rigid motions as near-null space. The
+cycle, from a zero start, has one forward Gauss-Seidel sweep before and one backward sweep after the
+coarse correction, which makes it symmetric and positive definite. Its matrices are in single
+precision.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from fem_reference.direct import Solve
 
 @dataclass(frozen=True)
 class Level:
-    """Sweeps through a matrix [N/m], what is above its diagonal, and the way to a coarser level.
+    """Gauss-Seidel sweeps of a matrix [N/m], its upper triangle, and transfers to a coarser level.
 
-    `forward` goes by what is below the diagonal alone, as what is above meets zeros.
+    `forward` uses the lower triangle only, since the upper one multiplies zeros.
     """
 
     forward: Sweep
@@ -32,16 +33,16 @@ class Level:
     restrict: Blocks
     prolong: Blocks
 
-    def from_rest(self, right: Floats) -> Floats:
-        """What a sweep forward makes of zero."""
+    def from_zero(self, right: Floats) -> Floats:
+        """Result of a forward sweep from zero."""
         return self._swept(self.forward, right, np.zeros_like(right))
 
-    def left_after(self, found: Floats) -> Floats:
-        """The residual of such a sweep: what is below and on the diagonal is met."""
+    def residual_after(self, found: Floats) -> Floats:
+        """Residual after `from_zero`: minus the upper triangle times the result."""
         return -(self.above @ found)
 
-    def back(self, right: Floats, found: Floats) -> Floats:
-        """After a sweep backward."""
+    def sweep_back(self, right: Floats, found: Floats) -> Floats:
+        """Result of a backward sweep."""
         return self._swept(self.backward, right, found)
 
     def _swept(self, part: Sweep, right: Floats, found: Floats) -> Floats:
@@ -50,10 +51,10 @@ class Level:
 
 
 def multigrid(matrix: bsr_array, points: Floats) -> Solve:
-    """A cycle for a matrix [N/m] by blocks of nodes at points [m] (n, 3)."""
+    """V-cycle for a matrix [N/m] in blocks of nodes at points [m] (n, 3)."""
     from pyamg import smoothed_aggregation_solver
 
-    with _drawing_alike():
+    with _seeded():
         built = smoothed_aggregation_solver(
             bsr_matrix(matrix),
             B=rigid_motions(points),
@@ -82,10 +83,10 @@ def _cycle(levels: Sequence[Level], coarsest: Floats, right: Floats) -> Floats:
     if not levels:
         return np.asarray(coarsest @ right)
     level = levels[0]
-    found = level.from_rest(right)
-    coarser = _cycle(levels[1:], coarsest, level.restrict @ level.left_after(found))
+    found = level.from_zero(right)
+    coarser = _cycle(levels[1:], coarsest, level.restrict @ level.residual_after(found))
     level.prolong.add_product(coarser, found)
-    return level.back(right, found)
+    return level.sweep_back(right, found)
 
 
 def rigid_motions(points: Floats) -> Floats:
@@ -99,10 +100,10 @@ def rigid_motions(points: Floats) -> Floats:
 
 
 @contextmanager
-def _drawing_alike() -> Iterator[None]:
-    """Let pyamg begin its estimates of eigenvalues alike, so that a solution is the same each time.
+def _seeded() -> Iterator[None]:
+    """Seed the random start of pyamg's eigenvalue estimates, for reproducible solutions.
 
-    It draws from numpy's global generator, which is left as it was.
+    pyamg uses numpy's global generator, whose state is restored.
     """
     before = np.random.get_state()  # noqa: NPY002 - the one that pyamg draws from
     np.random.seed(0)  # noqa: NPY002 - as above

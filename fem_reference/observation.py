@@ -1,4 +1,4 @@
-"""What is seen of a body: displacement at points, its strain."""
+"""Observed quantities of a body: displacement at points, largest strain and rotation."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from study.mesh.locate import locate
 Floats = NDArray[np.float64]
 
 LEAST_SHARE = 0.3
-"""Of the largest squared norm of a strain, below which no principal strain is the largest."""
+"""Share of the largest squared strain norm below which a strain cannot have the largest
+principal value."""
 
 CELLS = 4096
-"""Looked at at once, so that no field of strains stands beside that of gradients."""
+"""Cells per batch, which avoids a second field of the size of the gradients."""
 
 
 def evaluation(body: Body | Outline, points: Floats) -> csr_array:
-    """Matrix that takes values at nodes to values at points [m] (q, 3)."""
+    """Interpolation matrix (q, nodes) from nodal values to points [m] (q, 3)."""
     basis = body.nodes
     cells, barycentric = locate(body.mesh, points)
     local = np.ascontiguousarray(barycentric[:, 1:].T)[:, :, None]
     if isinstance(basis.mapping, CurvedMapping):
         bent = np.flatnonzero(basis.mapping.bent[cells])
         found, off = basis.mapping.located(points[bent].T[:, :, None], cells[bent])
-        # The few points beyond a strongly bent face keep their straight coordinates.
+        # The few points outside a strongly curved face keep the coordinates of the straight cell.
         local[:, bent] = np.where(off < NEWTON_TOLERANCE, found, local[:, bent])
     values = [np.asarray(basis.elem.lbasis(local, k)[0])[..., 0] for k in range(basis.Nbfun)]
     columns = basis.element_dofs[:, cells]
@@ -37,12 +38,12 @@ def evaluation(body: Body | Outline, points: Floats) -> csr_array:
 
 
 def at_points(matrix: csr_array, u: Floats) -> Floats:
-    """Displacement [m] (q, 3) at the points of an evaluation matrix."""
+    """Displacement [m] (q, 3) at the points of an interpolation matrix."""
     return np.asarray(matrix @ u.reshape(-1, 3))
 
 
 def carried(vectors: Floats, body: Body | Outline, other: Body) -> Floats:
-    """Nodal vectors (n, k) of a body as those of another, of the same organ on another mesh."""
+    """Nodal vectors (n, k) of a body, interpolated to another mesh of the same organ."""
     matrix = evaluation(body, other.points)
     by_node = vectors.reshape(matrix.shape[1], -1)
     return np.asarray(matrix @ by_node).reshape(-1, vectors.shape[1])
@@ -54,12 +55,12 @@ def largest_strain(body: Body, u: Floats) -> float:
 
 
 def largest_rotation(body: Body, u: Floats) -> float:
-    """Largest rotation [rad], as small ones go, at the integration points."""
+    """Largest infinitesimal rotation [rad] at the integration points."""
     return strain_and_rotation(body, u)[1]
 
 
 def strain_and_rotation(body: Body, u: Floats) -> tuple[float, float]:
-    """Both."""
+    """Largest absolute principal strain, and largest infinitesimal rotation [rad]."""
     gradient = _gradient(body, u)
     parts = [gradient[start : start + CELLS] for start in range(0, len(gradient), CELLS)]
     found = np.max([(_largest_strain(one), _largest_rotation(one)) for one in parts], axis=0)
@@ -69,7 +70,8 @@ def strain_and_rotation(body: Body, u: Floats) -> tuple[float, float]:
 def _largest_strain(gradient: Floats) -> float:
     strain = 0.5 * (gradient + np.swapaxes(gradient, -2, -1))
     size = np.einsum("...ij,...ij->...", strain, strain)
-    # No principal strain exceeds the norm, and the largest of three is a third of its square.
+    # A principal strain is at most the norm, and the square of the largest at least a third of
+    # the squared norm.
     large = ~(size < LEAST_SHARE * size.max())
     return float(np.abs(np.linalg.eigvalsh(strain[large])).max())
 

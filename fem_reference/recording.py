@@ -1,4 +1,4 @@
-"""What is kept of a body's motion."""
+"""Recording of a body's motion in a trajectory."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Floats = NDArray[np.float64]
 
 
 class Recorder:
-    """Writes what is observed into the arrays of a trajectory.
+    """Writes observed quantities into the arrays of a trajectory.
 
-    `start` [m] (n,): where the body is when its motion starts, which states do not count.
-    `strain` and `rotation` [rad]: the largest of the states looked at so far.
+    `start` [m] (n,): displacement at the start of the motion, which recorded states do not
+    include. `strain` and `rotation` [rad]: the largest of the recorded fields so far.
     """
 
     def __init__(
@@ -32,21 +32,21 @@ class Recorder:
         self.strain = self.rotation = 0.0
 
     def motion(self, sample: int, displacement: Floats, velocity: Floats) -> None:
-        """Keep displacement [m] and velocity [m/s] (probes, 3) at one sample."""
+        """Record displacement [m] and velocity [m/s] (probes, 3) at one sample."""
         self.trajectory.displacement[sample] = self._start_of_probes + displacement
         self.trajectory.velocity[sample] = velocity
 
     def field(self, sample: int, u: Floats) -> None:
-        """Keep the field if the sample is one of the frames, and look at the first and the last."""
+        """Record the field at the frames; update strain and rotation at the first and last."""
         for i, frame in enumerate(self.observation.frames):  # the peak may be the last sample too
             if frame == sample:
-                there = self.start + u
-                self.trajectory.volume_field[i] = at_points(self.in_volume, there)
-                self.trajectory.surface_field[i] = at_points(self.on_surface, there)
+                total = self.start + u
+                self.trajectory.volume_field[i] = at_points(self.in_volume, total)
+                self.trajectory.surface_field[i] = at_points(self.on_surface, total)
         if sample in self.observation.ends:
             self.look(u)
 
     def look(self, u: Floats) -> None:
-        """Take note of how far a state is from small displacements."""
+        """Update the largest strain and rotation with a state u [m] (n,)."""
         strain, rotation = strain_and_rotation(self.body, self.start + u)
         self.strain, self.rotation = max(self.strain, strain), max(self.rotation, rotation)

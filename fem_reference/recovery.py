@@ -1,10 +1,11 @@
-"""Where a solution is wrong: its strain beside a smoother one recovered from it.
+"""Local error estimates by recovery of a smooth strain, and estimates of the error of a goal.
 
-The strain of finite elements jumps between them; its projection on the continuous shape functions
-is nearer to the exact one, and the difference of the two stands for the error: Zienkiewicz and Zhu
+The strain of finite elements is discontinuous. Its projection on the continuous shape functions is
+closer to the exact one, and the difference of the two estimates the error: Zienkiewicz and Zhu
 (1987), Int. J. Numer. Methods Eng. 24:337. The error of a goal, a linear functional of the
-displacement, is the product in energy of the errors of the solution and of that under the
-functional as a load: Becker and Rannacher (2001), Acta Numerica 10:1. Estimates, no bounds.
+displacement, is the energy product of the errors of the solution and of the dual solution, whose
+load is the functional: Becker and Rannacher (2001), Acta Numerica 10:1. These are estimates, not
+bounds.
 """
 
 from __future__ import annotations
@@ -26,19 +27,19 @@ from study.problem.tissue import Tissue
 Floats = NDArray[np.float64]
 
 PROJECTED = 1e-4
-"""Residual of the projection, which stands for an error that is itself known to some per cent."""
+"""Relative residual of the projection; the estimate itself is accurate to some per cent."""
 GAP_ORDER = 4
 
 
 class Recovered(NamedTuple):
-    """Strain of a displacement (3, 3, cells, q), and what a smoother one has more than it."""
+    """Strain of a displacement (3, 3, cells, q), and recovered minus computed strain."""
 
     strain: Floats
     error: Floats
 
 
 def recovered(body: Body, u: Floats) -> Recovered:
-    """Strain of a displacement u [m] (n,) and its error, at the integration points."""
+    """Strain of a displacement u [m] (n,) and its estimated error, at the integration points."""
     basis = body.nodes
     gradient = np.stack([np.asarray(basis.interpolate(u[d::3]).grad) for d in range(3)])
     strain = 0.5 * (gradient + gradient.swapaxes(0, 1))
@@ -57,11 +58,12 @@ def goal_errors(
     goals: Sequence[Floats],
     project: Projection | None = None,
 ) -> Floats:
-    """Share of each cell (cells,) in the errors of all goal @ u, relative to each; its sum exceeds.
+    """Contribution of each cell (cells,) to the relative errors of all goals `goal @ u`.
 
-    `u` [m] (n,): at rest under the body's load; `goals` (n,), whose dual solutions `solve` gives.
-    With `project`, onto the surface, also by the gap that the cells leave to it: its volume times
-    the mean density of energy of solution and dual one, as where the surface of a body is moved.
+    Absolute values are summed, so the total overestimates the errors. `u` [m] (n,): static
+    displacement under the body's load; `goals` (n,) each, whose dual solutions `solve` computes.
+    With `project`, the projection onto the exact surface, the gap between cells and surface
+    contributes its volume times the mean energy density of primal and dual solution.
     """
     gaps, primal = _gaps(body, project), _energies(body, tissue, u)
     found = np.zeros(body.nodes.mesh.nelements)
@@ -74,7 +76,7 @@ def goal_errors(
 
 
 class _Energies(NamedTuple):
-    """Twice the energy [J] of the strain of each cell, and of its error."""
+    """Twice the energy [J] of the strain of each cell, and of its estimated error."""
 
     whole: Floats
     error: Floats
@@ -86,7 +88,7 @@ def _energies(body: Body, tissue: Tissue, u: Floats) -> _Energies:
 
 
 def _gaps(body: Body, project: Projection | None) -> Floats:
-    """Volume between each cell's facets and the surface, over that of the cell (cells,)."""
+    """Volume between the facets of each cell and the surface, over that of the cell (cells,)."""
     basis = body.nodes
     gaps = np.zeros(basis.mesh.nelements)
     if project is None:
@@ -99,10 +101,10 @@ def _gaps(body: Body, project: Projection | None) -> Floats:
 
 
 def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
-    """Integral of stress times strain [J] over each cell (cells,), of two strains (3, 3, cells, q).
+    """Energy product [J] of two strains (3, 3, cells, q) in each cell (cells,).
 
-    With a pressure of its own the volume's part is left out: it is found as well as the shear, and
-    would drown in rounding.
+    For mixed elements the volumetric part is omitted: it is as accurate as the deviatoric part and
+    would be dominated by rounding.
     """
     lame, mu = cell_moduli(body.composition, tissue)
     density = 2.0 * mu * np.einsum("ijcq,ijcq->cq", a, b)
@@ -112,7 +114,7 @@ def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
 
 
 def _projection(body: Body) -> Any:
-    """From values (cells, q) at the integration points to nodal values, least squares in volume."""
+    """L2 projection from values (cells, q) at the integration points to nodal values."""
     basis, mass = body.nodes, csr_array(body.mass[::3, ::3])
     weights = basis.dx * (mass.sum() / basis.dx.sum())
     shapes = [np.asarray(basis.basis[k][0]) for k in range(basis.Nbfun)]

@@ -1,4 +1,4 @@
-"""Solution of K u = f, the way that suits the size of the system and how often it is solved."""
+"""Choice of a direct or an iterative solver of K u = f."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from fem_reference.memory import factors_fit
 Floats = NDArray[np.float64]
 
 FACTORED_BELOW = 6_000
-"""Unknowns for which factors are cheaper than iterations, even for one solution."""
+"""Unknowns below which factors are cheaper than iterations, even for one solution."""
 TOLERANCE = 1e-10
 
 
 def solver(body: Body, tolerance: float = TOLERANCE) -> Solver:
-    """Solution of K u = f to a residual of `tolerance` times f, or of rounding.
+    """Solver of K u = f to a residual of `tolerance` times f, or to rounding.
 
-    Each solution may have a tolerance of its own, and a start near it; factors need neither.
+    Each call of an iterative solver may give its own tolerance and start vector.
     """
     if body.unknowns > FACTORED_BELOW:
-        return _factored_at_need(body, iterative(body, tolerance))
+        return _with_direct_fallback(body, iterative(body, tolerance))
     solve = by_factors(body)
     return lambda load, *_, **__: solve(load)
 
 
 def by_factors(body: Body) -> Solve:
-    """Solution of K u = f by factors; the pressures are left out."""
+    """Direct solver of K u = f; the pressures are not returned."""
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
     return lambda load: solve(np.concatenate([load, padding]))[:size]
 
 
-def _factored_at_need(body: Body, iterations: Solver) -> Solver:
-    """By iterations, or by factors from where these fail, if the memory holds them.
+def _with_direct_fallback(body: Body, iterations: Solver) -> Solver:
+    """Iterative solver, with a direct one after its first failure if memory allows.
 
-    A support that is far stiffer than the tissue, beside a pressure, leaves minimal residuals short
-    of a balance that factors reach. A body that nothing holds is in balance by neither.
+    With mixed elements and a support far stiffer than the tissue, MINRES stagnates where factors
+    reach equilibrium. Neither solves a body that is not held.
     """
     factors: list[Solve] = []
 
@@ -59,9 +59,9 @@ def _factored_at_need(body: Body, iterations: Solver) -> Solver:
 
 
 def solve_static(body: Body, tolerance: float = TOLERANCE, start: Floats | None = None) -> Floats:
-    """Displacement [m] (n,) at rest under all loads in full, sought from a `start` near it.
+    """Static displacement [m] (n,) under all loads in full, from an approximate `start`.
 
-    ValueError if it is not in balance.
+    ValueError if it is not in equilibrium.
     """
     load = body.whole_load
     found = solver(body, tolerance)(load, start=start)
@@ -70,7 +70,7 @@ def solve_static(body: Body, tolerance: float = TOLERANCE, start: Floats | None 
 
 
 def _check_balance(body: Body, found: Floats, load: Floats) -> None:
-    """ValueError if a body is not at rest under a load."""
+    """ValueError if a displacement is not in equilibrium with a load."""
     imbalance = np.linalg.norm(body.stiffness @ found - load) / np.linalg.norm(load)
     if not imbalance < IMBALANCE:
         raise ValueError(

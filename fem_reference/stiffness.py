@@ -1,4 +1,4 @@
-"""Stiffness of a body, with or without a pressure of its own."""
+"""Stiffness of a body, in displacements alone or with an independent pressure."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pressure:
-    """The pressure p = lambda div u of mixed elements, by its own shape functions.
+    """The pressure p = lambda div u of mixed elements in its shape functions.
 
-    `divergence` [m^2] (pressures, n) and `mass` [m^3] (pressures, pressures) integrate them with
-    div u and with each other; `lame` is lambda [Pa], `shear` the shear modulus [Pa]. Of tissue that
-    differs from place to place these are those of the tissue around; `mass` integrates with
-    `lame` over lambda, and `varied_schur`
-    [m^3/Pa] with 1 / lambda + 1 / mu.
+    `divergence` [m^2] (pressures, n): integrals of the shape functions with div u; `mass` [m^3]
+    (pressures, pressures): of their products; `lame`, `shear`: lambda and mu [Pa]. In heterogeneous
+    tissue, `lame` and `shear` are those of the surrounding tissue, the integrand of `mass` has the
+    factor `lame` / lambda, and that of `varied_schur` [m^3/Pa] 1 / lambda + 1 / mu.
     """
 
     divergence: csc_array
@@ -35,9 +34,9 @@ class Pressure:
 
     @property
     def schur(self) -> csc_array:
-        """Integrals of products of pressures over lambda and over the shear modulus, summed.
+        """Approximate Schur complement [m^3/Pa]: (1 / lambda + 1 / mu) times the pressure mass.
 
-        The complement of the displacements is equivalent to it at any Poisson ratio.
+        It is spectrally equivalent to the Schur complement at any Poisson ratio.
         """
         if self.varied_schur is not None:
             return self.varied_schur
@@ -54,10 +53,10 @@ class Pressure:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """K = matrix + lambda B^T M^-1 B, the second term by the divergence and mass of a pressure.
+    """K = matrix + lambda B^T M^-1 B, with divergence B and mass M of the pressure, if any.
 
-    `matrix` [N/m] (n, n), symmetric; where there is a pressure, only what the shear modulus and the
-    support do. It is kept by blocks of 3 x 3, with a quarter of the indices.
+    `matrix` [N/m] (n, n), symmetric, in blocks of 3 x 3; with a pressure, only the contributions of
+    the shear modulus and of the support.
     """
 
     matrix: Any
@@ -75,7 +74,7 @@ class Stiffness:
 
     @cached_property
     def blocks(self) -> Blocks:
-        """The matrix by blocks of nodes, whose products are the quickest."""
+        """The matrix in blocks of nodes, with the fastest products."""
         return blocks_of(self.matrix.tobsr(blocksize=(3, 3)))
 
     def __matmul__(self, u: Floats) -> Floats:

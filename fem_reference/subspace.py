@@ -1,9 +1,9 @@
-"""Subspaces for the motion under one load pattern, and superposition of their modes.
+"""Subspaces for the motion under given load patterns, and modal superposition in them.
 
-Load-dependent Ritz vectors, the static displacement u_0 = K^-1 f and then u_k+1 = K^-1 M u_k, hold
-the answer to slow loads exactly and need a few dozen solutions where stepping needs hundreds;
-eigenvectors of the body are the usual choice and converge more slowly under a local load. Wilson,
-Yuan and Dickens (1982), Earthquake Eng. Struct. Dyn. 10:813.
+Load-dependent Ritz vectors are the static displacement u_0 = K^-1 f and u_k+1 = K^-1 M u_k. They
+contain the response to slow loads exactly and need a few dozen solutions where time stepping needs
+hundreds. Eigenvectors, the usual choice, converge more slowly under a local load. Wilson, Yuan and
+Dickens (1982), Earthquake Eng. Struct. Dyn. 10:813.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from study.problem.damping import RayleighDamping
 Floats = NDArray[np.float64]
 
 LOOSE, LOOSEST, LOOSENED = 1e-3, 0.2, 1.25
-"""Residual of the second Ritz vector, of any, and the ratio of one's to that of the one before.
+"""Residual of the second Ritz vector, largest residual, and growth from one vector to the next.
 
-Any vector serves, as what is projected is exact; and the later a vector of a Krylov space, the less
-is lost by an inexact one: Simoncini and Szyld (2003), SIAM J. Sci. Comput. 25:454. Measured on a
-block, against exact vectors: where 17 suffice, a curve changes by a tenth of what it does by the
-last quarter of them, and where it takes 65 by as much.
+The projection is exact for any vectors, and an inexact vector costs the less the later it comes in
+a Krylov space: Simoncini and Szyld (2003), SIAM J. Sci. Comput. 25:454. Measured on a block against
+exact vectors, inexact ones change a curve by a tenth of the change by the last quarter of 17
+vectors, and by as much as the last quarter of 65.
 """
 DEPENDENT = 1e-10
-"""Relative to the largest, of the energies of nearly dependent vectors."""
+"""Singular values, relative to the largest, that count as linear dependence."""
 
 
 @dataclass(frozen=True)
 class Subspace:
-    """`vectors` (n, m), orthonormal in the mass; `stiffness` (m, m) and `load` (m,) among them.
+    """`vectors` (n, m), orthonormal in the mass, with projected `stiffness` (m, m) and `load` (m,).
 
-    `others` (m,) each: of the body's further loads.
+    `others`: projections (m,) of the further loads.
     """
 
     vectors: Floats
@@ -52,29 +52,29 @@ class Subspace:
 
     @property
     def loads(self) -> Floats:
-        """All loads (m, loads), in full."""
+        """Projections (m, loads) of all loads."""
         return np.column_stack([self.load, *self.others])
 
     def rest(self, full: Floats | None = None) -> Floats:
-        """Displacement [m] (n,) at rest under all loads, exact where it lies in the subspace.
+        """Static displacement [m] (n,) under all loads, in the subspace.
 
-        `full` (loads,): the share of each; all of each by default.
+        `full` (loads,): factor of each load, 1 by default.
         """
         loads = self.loads
         whole = loads.sum(axis=1) if full is None else loads @ full
         return np.asarray(self.vectors @ np.linalg.solve(self.stiffness, whole))
 
     def leading(self, size: int) -> Subspace:
-        """The subspace of the first vectors."""
+        """The subspace of the first `size` vectors."""
         others = tuple(one[:size] for one in self.others)
         among = self.stiffness[:size, :size]
         return Subspace(self.vectors[:, :size], among, self.load[:size], others)
 
 
 def eigenvectors(body: Body, solve: Solve, count: int) -> Floats:
-    """The static displacements and the `count` lowest modes of vibration, (n, loads + count).
+    """Static displacements and the `count` lowest modes of vibration, (n, loads + count).
 
-    With the first, a truncated superposition is exact at rest.
+    The static displacements make a truncated superposition exact in statics.
     """
     shape = (body.stiffness.size, body.stiffness.size)
     operator = LinearOperator(shape, matvec=lambda u: body.stiffness @ u, dtype=np.float64)
@@ -84,19 +84,19 @@ def eigenvectors(body: Body, solve: Solve, count: int) -> Floats:
 
 
 def empty(size: int) -> Subspace:
-    """No vectors yet, of so many unknowns."""
+    """A subspace without vectors, of `size` unknowns."""
     return Subspace(np.zeros((size, 0)), np.zeros((0, 0)), np.zeros(0))
 
 
 def extended(body: Body, found: Subspace, vector: Floats) -> Subspace:
-    """The subspace with one more vector, made orthogonal to the others in the mass."""
+    """The subspace with one more vector, orthonormalised in the mass."""
     V = found.vectors
-    for _ in range(2):  # once is not enough in floating point
+    for _ in range(2):  # one pass of Gram-Schmidt loses orthogonality to rounding
         vector = vector - V @ (V.T @ body.inertia(vector))
         vector = vector / np.sqrt(vector @ body.inertia(vector))
-    pushed = body.stiffness @ vector
-    column = V.T @ pushed
-    stiffness = np.block([[found.stiffness, column[:, None]], [column[None], vector @ pushed]])
+    force = body.stiffness @ vector
+    column = V.T @ force
+    stiffness = np.block([[found.stiffness, column[:, None]], [column[None], vector @ force]])
     known = found.others or tuple(np.zeros(found.load.size) for _ in body.others)
     others = tuple(np.append(a, vector @ b) for a, b in zip(known, body.others, strict=True))
     load = np.append(found.load, vector @ body.load)
@@ -104,9 +104,9 @@ def extended(body: Body, found: Subspace, vector: Floats) -> Subspace:
 
 
 class Guesses:
-    """Where solutions are sought from: the best in energy among Ritz vectors and given `vectors`.
+    """Start vectors of iterative solutions: best in energy among Ritz vectors and given `vectors`.
 
-    `vectors` (n, k), near those that are sought: on another mesh, or none.
+    `vectors` (n, k): approximations of the solutions, such as those on another mesh, or None.
     """
 
     def __init__(self, body: Body, vectors: Floats | None) -> None:
@@ -116,12 +116,15 @@ class Guesses:
         self._mixed = self._among(self.vectors[:, :0])
 
     def _among(self, vectors: Floats) -> Floats:
-        """Stiffness (k, m) between the given vectors and others (n, m), of which none is kept."""
+        """Stiffness (k, m) between the given vectors and others (n, m)."""
         found = [self.vectors.T @ (self.body.stiffness @ one) for one in vectors.T]
         return np.reshape(found, (vectors.shape[1], self.vectors.shape[1])).T
 
     def start(self, found: Subspace, load: Floats) -> Floats:
-        """Displacement (n,) that nears the one under a load most; `found` only grows."""
+        """Best approximation [m] (n,) in energy of the displacement under a load.
+
+        From call to call, `found` may only grow.
+        """
         W, V = self.vectors, found.vectors
         fresh = self._among(V[:, self._mixed.shape[1] :])
         self._mixed = mixed = np.hstack([self._mixed, fresh])
@@ -133,9 +136,9 @@ class Guesses:
 
 
 def ritz_subspaces(body: Body, near: Floats | None = None) -> Iterator[Subspace]:
-    """Of one load-dependent Ritz vector, of two, and so on without end, of all loads in turn.
+    """Subspaces of 1, 2, ... load-dependent Ritz vectors without end, of all loads in turn.
 
-    With vectors `near` them (n, k), which save half of the iterations.
+    `near` (n, k): approximations of the vectors, which save half of the iterations.
     """
     solve, guesses, found = solver(body), Guesses(body, near), empty(body.load.size)
     loads = body.loads.T
@@ -144,7 +147,7 @@ def ritz_subspaces(body: Body, near: Floats | None = None) -> Iterator[Subspace]
         yield found
     tolerance = LOOSE
     while True:
-        for _ in loads:  # each has its own sequence, a block of vectors to all of them
+        for _ in loads:  # a block of one vector per load
             load = body.inertia(found.vectors[:, -len(loads)])
             found = extended(body, found, solve(load, tolerance, guesses.start(found, load)))
             yield found
@@ -152,16 +155,16 @@ def ritz_subspaces(body: Body, near: Floats | None = None) -> Iterator[Subspace]
 
 
 def ritz_subspace(body: Body, count: int) -> Subspace:
-    """The first `count` load-dependent Ritz vectors. ValueError if the body finds no rest."""
+    """The first `count` load-dependent Ritz vectors. ValueError if the body has no equilibrium."""
     if count < 1:
         raise ValueError(f"{count} Ritz vectors span nothing; give 1 or more")
     return next(islice(ritz_subspaces(body), count - 1, None))
 
 
 def modal_subspace(body: Body, count: int) -> Subspace:
-    """The static displacement and the `count` lowest modes, or as many as the body has.
+    """The static displacements and the `count` lowest modes, or as many as the body has.
 
-    ValueError if the body finds no rest.
+    ValueError if the body has no equilibrium.
     """
     size = body.stiffness.size
     vectors = eigenvectors(body, solver(body), min(count, size - 2))
@@ -169,12 +172,12 @@ def modal_subspace(body: Body, count: int) -> Subspace:
 
 
 class SubspaceMotion:
-    """Motion from rest in a subspace, exact under a load that is linear over a `step` [s].
+    """Motion from rest in a subspace, exact for a load that is linear over a `step` [s].
 
     `factor`: share of the body's load at times [s] (t,), or of each of its loads (t, loads).
     `displacement` [m] (n,) of all unknowns after the steps taken. `state` (m, 4): displacement,
-    velocity, load and its slope of each mode of the subspace, whose coordinates there are the
-    columns of `modes` (m, m) and whose squared angular frequencies [1/s^2] are `squares` (m,).
+    velocity, load and rate of load of each mode. The columns of `modes` (m, m) are the modes in
+    coordinates of the subspace, `squares` [1/s^2] (m,) their squared angular frequencies.
     """
 
     def __init__(
@@ -196,29 +199,29 @@ class SubspaceMotion:
         return np.asarray(self.subspace.vectors @ self.modes)
 
     def take_step(self) -> None:
-        """Go one step on, to the displacement there."""
+        """Advance by one step and evaluate the displacement."""
         self.go_on()
         self.deliver()
 
     def go_on(self, steps: int = 1) -> None:
-        """Go so many steps on, and leave the displacement where it was."""
+        """Advance by `steps` steps without evaluating the displacement."""
         times = np.asarray(self.time + self.step * np.arange(steps + 1), dtype=np.float64)
         for before, after in pairwise(self.factor(times)):
             self.advance(before, after)
         self.time += self.step * steps
 
     def deliver(self) -> Floats:
-        """Bring the displacement [m] (n,) to where the motion is."""
+        """Evaluate and return the displacement [m] (n,) at the current time."""
         self.displacement = self._shapes @ self.state[:, 0]
         return self.displacement
 
     def restart(self) -> None:
-        """Put it at rest again, at the time zero."""
+        """Return to rest at time zero."""
         self.time, self.displacement = 0.0, np.zeros_like(self.displacement)
         self.state[:] = 0.0
 
     def advance(self, before: Floats, after: Floats) -> None:
-        """Take the state over a step with so much of the loads at its start and its end."""
+        """Advance the state by a step from the factors of the loads at its start and end."""
         state = self.state
         start, end = (self._load @ np.atleast_1d(share) for share in (before, after))
         state[:, 2], state[:, 3] = start, (end - start) / self.step
@@ -232,16 +235,15 @@ def superposition(
     times: Floats,
     inside: int = 1,
 ) -> tuple[Floats, Floats]:
-    """Coordinates and their rates in the subspace, from rest, at equally spaced times.
+    """Coordinates and their rates in the subspace, from rest, at equally spaced times [s].
 
-    Each mode is integrated exactly under a load that is linear between the times. With `inside`,
-    each of these steps is also looked at so many times, equally spaced and its end the last of
-    them, as exactly; shape ((times - 1) * inside + 1, m).
+    Each mode is integrated exactly for a load that is linear between the times. `inside`: number of
+    equally spaced samples in each step, the last at its end; shape ((times - 1) * inside + 1, m).
     """
     step = float(times[1] - times[0])
     squares, modes = eigh(subspace.stiffness)
-    held = np.reshape(factor(times), (len(times), -1)) @ (modes.T @ subspace.loads).T
-    forced = np.stack([held[:-1], np.diff(held, axis=0) / step], axis=-1)
+    loads = np.reshape(factor(times), (len(times), -1)) @ (modes.T @ subspace.loads).T
+    forced = np.stack([loads[:-1], np.diff(loads, axis=0) / step], axis=-1)
     count, size = forced.shape[:2]
     starts, y = np.zeros((count + 1, size, 2)), np.zeros((count, inside, size, 2))
     _take_steps(transitions(squares, damping, step), forced, starts)
@@ -268,10 +270,10 @@ def _take_steps(moved: Floats, forced: Floats, states: Floats) -> None:
 
 
 def transitions(squares: Floats, damping: RayleighDamping, step: float) -> Floats:
-    """Of displacement, velocity, load and its slope over a step [s], (m, 4, 4), by mode.
+    """Transition matrices (m, 4, 4) of displacement, velocity, load and load rate over a step [s].
 
-    `squares` [1/s^2] (m,): squared angular frequencies; exact for a load that is linear over the
-    step.
+    `squares` [1/s^2] (m,): squared angular frequencies of the modes. Exact for a load that is
+    linear over the step.
     """
     rate = np.zeros((len(squares), 4, 4))
     rate[:, [0, 1, 2], [1, 2, 3]] = 1.0

@@ -1,4 +1,4 @@
-"""Motion as a superposition of few vectors, and how many of them it takes."""
+"""Modal superposition of the motion in a subspace, and the choice of its dimension."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 
 from fem_reference.elasticity import Body
 from fem_reference.observation import at_points
-from fem_reference.pace import Pace
 from fem_reference.recording import Recorder
 from fem_reference.subspace import Subspace, modal_subspace, ritz_subspaces, superposition
+from fem_reference.time_steps import TimeSteps
 from study.problem.damping import RayleighDamping
 from study.problem.trajectory import Observation
 
@@ -23,14 +23,14 @@ Factor = Callable[[Floats], Floats]
 Advance = Callable[[float], None]
 
 LOAD_STEPS = 16
-"""Per step of a motion: the load is linear between them."""
+"""Steps of the load, linear in each, per time step of a motion."""
 GROWTH = 4
 MAX_VECTORS, MOST_VECTORS = 80, 160
-"""Per load: as a rule, and where the displacement still changes by more than `GOOD`."""
+"""Vectors per load, usually, and where the displacement still changes by more than `GOOD`."""
 GOOD = 5e-3
 TINY = 1e-300
 TRUNCATION = 1e-3
-"""Relative L2 change of a control point's motion by the last vectors, at which there are enough."""
+"""Relative L2 change of a control point's motion by the last vectors, at convergence."""
 
 
 class ProbeCurves(NamedTuple):
@@ -51,8 +51,8 @@ class CurveChange(NamedTuple):
 class Superposed:
     """Motion in a subspace: `coordinates` and their `rates` (samples, m).
 
-    `curves`: at the control points; `truncation`: their largest relative L2 changes by the last
-    quarter of the vectors; `time_step` [s] and `steps` of the load.
+    `curves`: motion of the control points; `truncation`: its largest relative L2 change by the last
+    quarter of the vectors; `time_step` [s] and number of `steps` of the load.
     """
 
     subspace: Subspace
@@ -65,7 +65,7 @@ class Superposed:
 
     @property
     def truncation_error(self) -> float:
-        """The larger of the two."""
+        """The larger of the relative changes of displacement and velocity."""
         return max(self.truncation)
 
     def state(self, sample: int) -> tuple[Floats, Floats]:
@@ -76,28 +76,28 @@ class Superposed:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What the motion follows from beside the body; the load is linear between `times` [s].
+    """Damping, load history and sampling of a motion; the load is linear between `times` [s].
 
-    There are `samples` at the `pace` of these steps; `at_probes` takes nodal values to control
-    points.
+    `steps`: ratio of these steps to the `samples`; `at_probes` interpolates nodal values at the
+    control points.
     """
 
     damping: RayleighDamping
     factor: Factor
     times: Floats
-    pace: Pace
+    steps: TimeSteps
     samples: int
     at_probes: csr_array
 
     def coordinates(self, subspace: Subspace) -> tuple[Floats, Floats]:
-        """Coordinates and rates (samples, m)."""
-        given = (self.damping, self.factor, self.times, self.pace.samples)
+        """Coordinates and their rates at the samples, each (samples, m)."""
+        given = (self.damping, self.factor, self.times, self.steps.samples)
         y, rate = superposition(subspace, *given)
-        every = self.pace.per_sample
+        every = self.steps.per_sample
         return y[::every][: self.samples], rate[::every][: self.samples]
 
     def curves(self, subspace: Subspace, coordinates: tuple[Floats, Floats]) -> ProbeCurves:
-        """The motion of the control points by its coordinates and rates."""
+        """Motion of the control points from coordinates and rates."""
         nodes, m = self.at_probes.shape[1], subspace.load.size
         shapes = (self.at_probes @ subspace.vectors.reshape(nodes, 3 * m)).reshape(-1, 3, m)
         return ProbeCurves(*(np.einsum("pdm,tm->tpd", shapes, y) for y in coordinates))
@@ -109,12 +109,12 @@ class Excitation:
 
 
 def fewer(vectors: int) -> int:
-    """So many vectors without their last quarter."""
+    """Three quarters of a number of vectors, rounded down, at least 1."""
     return max(1, (3 * vectors) // 4)
 
 
 def curve_change(whole: ProbeCurves, other: ProbeCurves) -> CurveChange:
-    """Of curves by other ones, relative to the whole."""
+    """Largest L2 difference of two sets of curves, relative to the first."""
     return CurveChange(
         *(
             max(
@@ -127,16 +127,16 @@ def curve_change(whole: ProbeCurves, other: ProbeCurves) -> CurveChange:
 
 
 def excitation_of(
-    damping: RayleighDamping, factor: Factor, recorder: Recorder, pace: Pace
+    damping: RayleighDamping, factor: Factor, recorder: Recorder, steps: TimeSteps
 ) -> Excitation:
-    """That of a recorder's samples, with steps of the load at a pace."""
+    """The excitation of a motion sampled by a recorder, with given steps of the load."""
     samples = recorder.observation.times
-    count = pace.steps(len(samples) - 1)
+    count = steps.count(len(samples) - 1)
     end = samples[0] + (samples[-1] - samples[0]) * (
-        count * pace.samples / (pace.per_sample * (len(samples) - 1))
+        count * steps.samples / (steps.per_sample * (len(samples) - 1))
     )
     times = np.linspace(samples[0], end, count + 1)
-    return Excitation(damping, factor, times, pace, len(samples), recorder.at_probes)
+    return Excitation(damping, factor, times, steps, len(samples), recorder.at_probes)
 
 
 def superposed(excitation: Excitation, subspace: Subspace) -> Superposed:
@@ -156,28 +156,28 @@ def subspace_motion(
     observation: Observation,
     steps_per_sample: int,
 ) -> Recorder:
-    """What is recorded of a body's motion in a given subspace, by so many steps of the load."""
+    """Recorded motion of a body in a given subspace, with so many steps of the load per sample."""
     recorder = Recorder(body, observation)
-    seen, V = recorder.at_probes, subspace.vectors
-    pace = Pace(steps_per_sample)
-    coordinates = excitation_of(damping, factor, recorder, pace).coordinates(subspace)
+    at_probes, V = recorder.at_probes, subspace.vectors
+    steps = TimeSteps(steps_per_sample)
+    coordinates = excitation_of(damping, factor, recorder, steps).coordinates(subspace)
     for sample, (y, rate) in enumerate(zip(*coordinates, strict=True)):
         u, v = V @ y, V @ rate
-        recorder.motion(sample, at_points(seen, u), at_points(seen, v))
+        recorder.motion(sample, at_points(at_probes, u), at_points(at_probes, v))
         recorder.field(sample, u)
     return recorder
 
 
 Near = Floats | None
-"""Vectors (n, k) near those of a subspace, as of the same body on another mesh, if there are."""
+"""Approximations (n, k) of the vectors of a subspace, such as those on another mesh, or None."""
 Choose = Callable[[Body, Excitation, int, Near, Advance], Subspace]
-"""A subspace for a body's motion, of so many modes where they are asked for, from vectors near."""
+"""Makes the subspace of a motion from the number of modes and approximate vectors."""
 
 
 def enough_modes(
     body: Body, excitation: Excitation, modes: int, near: Near, advance: Advance
 ) -> Subspace:
-    """So many modes of vibration."""
+    """A given number of modes of vibration."""
     del excitation, near, advance
     return modal_subspace(body, modes)
 
@@ -185,7 +185,7 @@ def enough_modes(
 def enough_ritz_vectors(
     body: Body, excitation: Excitation, modes: int, near: Near, advance: Advance
 ) -> Subspace:
-    """Load-dependent Ritz vectors, until the last ones change little."""
+    """Load-dependent Ritz vectors, until the last quarter changes the curves little."""
     del modes
     growing = ritz_subspaces(body, near)
     loads = body.loads.shape[1]
@@ -203,5 +203,5 @@ def enough_ritz_vectors(
         if max(change) <= TRUNCATION or size >= limit:
             break
         if size >= usual and change.displacement < GOOD:
-            break  # what is left are waves in the velocity, of which each mesh has its own
+            break  # the rest are waves in the velocity that the mesh does not resolve
     return found

@@ -1,4 +1,4 @@
-"""A lattice over an organ with its support and load, and what it is made of."""
+"""Assembly of a lattice over an organ: springs, masses, support, loads and material."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from msm import lattice as cells
 from msm import volume as volumes
 from msm.calibration import SPRING_POISSON_RATIO, lame
 from msm.damping import UNDAMPED, NodalDamping
+from msm.external_loads import ExternalLoads
 from msm.graded import GradedLattice
 from msm.lattice import CellLattice, LatticeMesh
 from msm.laws import Law
 from msm.network import Network, network
 from msm.octree import Grading
-from msm.outer import Burden
 from msm.springs import Springs, connect
 from msm.volume import VolumeTerm
 from study.mesh.quadrature import SurfaceRule
@@ -37,14 +37,14 @@ Booleans = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Assembly:
-    """A lattice over an organ with its springs, support and load, whatever cells and springs' law.
+    """A lattice with springs, support and load, for any type of cell and any spring law.
 
-    `mass` [kg] (n,), of weights too; `foundation` [N/m] (n, n), acting alike along each axis;
-    `load` [N] (n, 3). `composition`: what each cell is made of, None where all are of one tissue;
-    `connect`: the springs for a stiffness (c,) of each cell relative to that of the law; `fixed`
-    (n, 3): which components of nodes do not move, None where all may. They are without load.
-    `masters` (n, n): how hanging nodes, which have none of these, move with the others, if any.
-    `burden`: what acts beside the load.
+    `mass` [kg] (n,), attached weights included; `foundation` [N/m] (n, n), the same along each
+    axis; `load` [N] (n, 3). `composition`: tissue of each cell, None for a homogeneous body;
+    `connect`: makes the springs for a stiffness (c,) of each cell relative to that of the law;
+    `fixed` (n, 3): constrained components of nodes, which carry no load, None without any.
+    `masters` (n, n): interpolation of all nodes from those that do not hang, None without hanging
+    nodes, which have no mass, foundation or load. `external_loads`: loads beside the first one.
     """
 
     lattice: LatticeMesh
@@ -56,12 +56,12 @@ class Assembly:
     connect: Callable[[Floats], Springs] | None = None
     fixed: Booleans | None = None
     masters: csr_array | None = None
-    burden: Burden | None = None
+    external_loads: ExternalLoads | None = None
 
 
 @dataclass(frozen=True)
 class Material:
-    """What a lattice is made of: spring law, volume term if any, damping."""
+    """Spring law, volume term if any, and damping of a lattice."""
 
     law: Law
     volume: VolumeTerm | None = None
@@ -69,7 +69,7 @@ class Material:
 
     @property
     def poisson_ratio(self) -> float:
-        """Of a cubic lattice of it; springs on tetrahedra have that of the mesh."""
+        """Poisson ratio of a cubic lattice; that of springs on tetrahedra depends on the mesh."""
         return SPRING_POISSON_RATIO if self.volume is None else self.volume.poisson_ratio
 
 
@@ -86,7 +86,7 @@ def assemble(
 ) -> Assembly:
     """Cubic lattice over the body. ValueError if empty, not held, or not touched by the tool.
 
-    `tissue`: what differs from place to place, if anything; `density` is that around.
+    `density` [kg/m^3] of the homogeneous tissue; `tissue` has its inclusions, if any.
     """
     lattice = cells.build(body, *_box(surface), spacing)
     weights, _ = lattice.interpolation(surface.points)
@@ -105,9 +105,10 @@ def assemble(
 def held(
     assembly: Assembly, weights: csr_array, surface: SurfaceRule, support: Support
 ) -> Assembly:
-    """With the nodes fixed that are nearest to a fixed point of the surface.
+    """The assembly with the node nearest to each fixed point of the surface constrained.
 
-    By weights (q, n) at the points of the surface; a node may lie half a cell from it.
+    `weights` (q, n): interpolation at the surface points. A node may lie half a cell from its
+    point.
     """
     fixed = support.fixed(surface.points, surface.normals)
     if not fixed.any():
@@ -120,18 +121,18 @@ def held(
 
 
 def _mass(lattice: CellLattice, density: float, made: Composition | None) -> Floats:
-    """Of the nodes [kg] (n,)."""
+    """Lumped mass [kg] (n,)."""
     if made is None:
         return np.asarray(density * cells.node_volumes(lattice))
     return cells.at_nodes(lattice, lattice.fill * made.density(density))
 
 
 def of_tissue(assembly: Assembly, material: Material, modulus: float) -> tuple[Assembly, Material]:
-    """The lattice with what its cells are made of, round which the material has a modulus [Pa].
+    """Lattice and material with inclusions in a tissue of Young's modulus `modulus` [Pa].
 
-    Springs are as stiff as the mean shear modulus of each cell, whatever their law, which all parts
-    share. With a volume term regions have their own Poisson ratio, without it 1/4 as all springs.
-    The same lattice and material of one tissue. ValueError for a region with a ratio below 1/4.
+    The springs of a cell scale with its mean shear modulus; all cells share one spring law. With a
+    volume term each inclusion has its own Poisson ratio, without it 1/4. A homogeneous lattice is
+    returned unchanged. ValueError for an inclusion with a Poisson ratio below 1/4.
     """
     made, nu = assembly.composition, material.poisson_ratio
     term = material.volume
@@ -175,7 +176,7 @@ def assemble_graded(
 
 
 def _box(surface: SurfaceRule) -> tuple[Floats, Floats]:
-    """Lower and upper corner [m] of the box of a body, a little larger."""
+    """Lower and upper corner [m] of the bounding box of a body, slightly enlarged."""
     margin = 1e-9 * np.ptp(surface.points, axis=0).max()
     return surface.points.min(axis=0) - margin, surface.points.max(axis=0) + margin
 
@@ -183,26 +184,24 @@ def _box(surface: SurfaceRule) -> tuple[Floats, Floats]:
 def contact(
     weights: csr_array, surface: SurfaceRule, foundation: Support, tool: ToolPatch
 ) -> tuple[csr_array, Floats]:
-    """Foundation [N/m] (n, n) and load [N] (n, 3) that nodes take by weights (q, n).
+    """Foundation [N/m] (n, n) and load [N] (n, 3) of the nodes by interpolation weights (q, n).
 
-    ValueError if nothing is held, or touched by the tool.
+    ValueError if the support holds no surface, or the tool touches none.
     """
     resting = foundation.density(surface.points, surface.normals) * surface.weights
     pushed = tool.profile(surface.points, surface.normals) * surface.weights
     if not (resting.any() or foundation.fixed(surface.points, surface.normals).any()):
         raise ValueError("the support holds no surface; enlarge support.depth")
-    if tool.force == 0.0:  # moved, and not a load
-        return csr_array(weights.T @ diags_array(resting) @ weights), np.zeros(
-            (weights.shape[1], 3)
-        )
+    support = csr_array(weights.T @ diags_array(resting) @ weights)
+    if tool.force == 0.0:  # a tool of prescribed motion, which is not a load
+        return support, np.zeros((weights.shape[1], 3))
     if not pushed.any():
         raise ValueError("the tool touches no surface; move tool.place or enlarge tool.radius")
-    support = csr_array(weights.T @ diags_array(resting) @ weights)
     nodal = weights.T @ (pushed * tool.force / pushed.sum())
     return support, np.outer(nodal, tool.direction)
 
 
-def burdened(
+def with_external_loads(
     assembly: Assembly,
     surface: SurfaceRule,
     gravity: Floats,
@@ -213,41 +212,42 @@ def burdened(
     touched: SurfaceRule | None = None,
     given_loaded: bool = False,
 ) -> Assembly:
-    """The assembly with what acts on it beside its first load, gravity [m/s^2] (3,) among it.
+    """The assembly with further loads, weights, rigid tools and gravity [m/s^2] (3,).
 
-    Loads and weights act by the rule `surface`, tools meet the points of `touched`, or its own.
-    ValueError if a load or weight touches no surface.
+    Loads and weights are integrated by the rule `surface`; tools may touch the points of `touched`,
+    by default those of `surface`. ValueError if a load or weight touches no surface.
     """
     at_points, _ = assembly.lattice.interpolation(surface.points)
 
     def nodal(patch: ToolPatch) -> Floats:
-        """The patch's force, shared out among the nodes (n,)."""
+        """Nodal forces [N] (n,) of a patch."""
         pushed = patch.profile(surface.points, surface.normals) * surface.weights
         if not pushed.any():
             raise ValueError(f"{patch.name}: touches no surface that faces it; move or enlarge it")
         return np.asarray(at_points.T @ (pushed * patch.force / pushed.sum()))
 
-    attached = np.zeros_like(assembly.mass)
-    for one in weights:
-        attached += one.mass * nodal(one.patch)
-    mass = assembly.mass + attached
-    pushes = [np.outer(nodal(one.tool), one.tool.direction) for one in loads]
-    moves = 1.0 if assembly.fixed is None else ~assembly.fixed
-    burden = Burden(
-        np.outer(mass, gravity) * moves,
-        attached,
-        np.array(pushes).reshape(-1, len(mass), 3) * moves,
-        tuple(one.factor for one in loads),
+    attached_mass = np.zeros_like(assembly.mass)
+    for weight in weights:
+        attached_mass += weight.mass * nodal(weight.patch)
+    mass = assembly.mass + attached_mass
+    nodal_loads = [np.outer(nodal(load.tool), load.tool.direction) for load in loads]
+    free = 1.0 if assembly.fixed is None else ~assembly.fixed
+    external_loads = ExternalLoads(
+        np.outer(mass, gravity) * free,
+        attached_mass,
+        np.array(nodal_loads).reshape(-1, len(mass), 3) * free,
+        tuple(load.factor for load in loads),
         tuple(tools),
         touched or surface,
         given_loaded,
     )
-    return replace(assembly, mass=mass, burden=burden)
+    return replace(assembly, mass=mass, external_loads=external_loads)
 
 
 def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> Network:
-    """The lattice and its material as the kernels read them."""
+    """The arrays of a lattice and its material for the kernels."""
     volume = material.volume or volumes.none(assembly.lattice.spacing)
+    loads = assembly.external_loads
     return network(
         assembly.springs,
         assembly.mass,
@@ -258,5 +258,5 @@ def arrays(assembly: Assembly, material: Material, *, linear: bool = False) -> N
         linear=linear,
         fixed=assembly.fixed,
         masters=assembly.masters,
-        undamped=None if assembly.burden is None else assembly.burden.attached,
+        undamped=None if loads is None else loads.attached_mass,
     )

@@ -1,8 +1,8 @@
-"""The state of a run on disk, from which it continues to the same bits.
+"""Checkpoints of a run on disk, from which it resumes bit for bit.
 
-A state is written at a sample up to which the steps were found short enough, so nothing in it can
-be undone. It holds whatever changes in a run: the motion, how the step is chosen, what the limit is
-followed from, and what was recorded.
+A checkpoint is written at a sample up to which all steps have been accepted, so nothing in it can
+be rejected later. It holds everything that changes in a run: the motion, the step control, the
+tracking of the critical step, and the recorded samples.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from numpy.typing import NDArray
 Arrays = dict[str, NDArray[Any]]
 
 SECONDS = 60.0
-"""Of wall time between two states."""
+"""Wall time between two checkpoints."""
 IDENTITY, DIGEST = "identity", "digest"
 DAMAGED = (
     *(OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
 )
-"""What numpy and zipfile raise for a file that is cut or altered."""
+"""Exceptions of numpy and zipfile for a truncated or altered file."""
 CHANGING = {
-    "motion": ("sample", "repeated", "wall"),
-    "stepper": ("u", "v", "t", "unseen"),
-    "pace": ("fraction", "substeps", "now", "at_rest", "margin", "halvings"),
-    "standing": ("push", "before", "due", "sums", "force"),
-    "follower": ("found", "omega", "mode", "bound", "bound_then", "then"),
+    "progress": ("sample", "repeated", "wall"),
+    "stepper": ("u", "v", "t", "unchecked"),
+    "steps": ("fraction", "substeps", "current", "at_rest", "margin", "halvings"),
+    "contact_state": ("body_force", "previous_gap", "wake_travel", "totals", "tool_force"),
+    "tracker": ("updates", "omega", "mode", "bound", "last_bound", "last_displacement"),
     "recorder": ("strain", "inverted", "overlap"),
     "trajectory": ("displacement", "velocity", "volume_field", "surface_field", "tool_force"),
 }
-"""Attributes of the parts of a run that change as it goes."""
+"""Attributes that change in a run, by the name of the object that has them."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file that a run keeps its state in, every so many seconds of wall time.
+    """A file for the state of a run, written every `seconds` of wall time.
 
-    With `resume` it goes on from the state in the file, if there is one.
+    With `resume`, the run continues from the state in the file, if there is one.
     """
 
     path: Path
@@ -59,9 +59,9 @@ class Checkpoint:
 
 
 class Keeper:
-    """Writes the state of one run from time to time.
+    """Writes the state of one run at intervals of wall time.
 
-    `parts`: the objects named in CHANGING; `identity`: of the run, see `identity`.
+    `parts`: the objects named in CHANGING; `identity`: hash of the run from `identity`.
     """
 
     def __init__(self, checkpoint: Checkpoint, identity: str, parts: Mapping[str, object]) -> None:
@@ -69,19 +69,19 @@ class Keeper:
         self.written = time.perf_counter()
 
     def resume(self) -> None:
-        """Take the parts to the state in the file, if that is wanted and there is one."""
+        """Restore the state in the file, if the checkpoint is to be resumed and the file exists."""
         if self.checkpoint.resume and self.checkpoint.path.exists():
             put_back(self.parts, read(self.checkpoint.path, self.identity))
 
     def keep(self, *, last: bool = False) -> None:
-        """Write the state if it is time to, and after the `last` sample in any case."""
+        """Write the state if it is due, and always after the `last` sample."""
         if last or time.perf_counter() - self.written >= self.checkpoint.seconds:
             write(self.checkpoint.path, self.identity, gather(self.parts))
             self.written = time.perf_counter()
 
 
 def gather(parts: Mapping[str, object]) -> Arrays:
-    """All that changes in the parts of a run, as part.attribute."""
+    """All attributes of CHANGING, by keys `part.attribute`."""
     return {
         f"{part}.{name}": np.asarray(getattr(parts[part], name))
         for part, names in CHANGING.items()
@@ -90,7 +90,7 @@ def gather(parts: Mapping[str, object]) -> Arrays:
 
 
 def put_back(parts: Mapping[str, object], arrays: Arrays) -> None:
-    """Set what `gather` took: arrays in place, for they are shared between the parts."""
+    """Restore what `gather` returned; arrays in place, since the parts share them."""
     for part, names in CHANGING.items():
         for name in names:
             value = arrays[f"{part}.{name}"]
@@ -109,16 +109,16 @@ def identity(*things: object) -> str:
 
 
 def program(*used: Callable[..., object]) -> str:
-    """SHA-256 of this package's sources and the versions of what runs them.
+    """SHA-256 of the sources of this package, of numpy's and of numba's version.
 
-    And of the files of functions that are `used`, for laws and integrators may come from elsewhere.
+    The source files of the functions `used` enter too: laws and integrators may be of the user.
     """
     files = {Path(inspect.unwrap(function).__code__.co_filename) for function in used}
     files |= set(Path(__file__).parent.rglob("*.py"))
     texts = tuple(
         (source.name, source.read_text(encoding="utf-8"))
         for source in sorted(files)
-        if source.is_file()  # and not typed into a prompt
+        if source.is_file()  # a function typed into a prompt has none
     )
     return identity(texts, np.__version__, numba.__version__)
 
@@ -138,10 +138,10 @@ def _pieces(thing: object) -> Iterable[bytes]:
         raise TypeError(f"cannot identify a run by a {type(thing).__name__}")
 
 
-def write(path: Path, found: str, arrays: Arrays) -> None:
-    """Write a state aside and move it into place, so that a crash leaves the one before."""
+def write(path: Path, run_identity: str, arrays: Arrays) -> None:
+    """Write a state atomically: a crash leaves the previous one."""
     aside = path.with_name(f".{path.name}")
-    marks = {IDENTITY: np.array(found), DIGEST: np.array(digest(arrays))}
+    marks = {IDENTITY: np.array(run_identity), DIGEST: np.array(digest(arrays))}
     try:
         with aside.open("wb") as file:
             np.savez(file, allow_pickle=False, **marks, **arrays)
@@ -165,8 +165,10 @@ def read(path: Path, wanted: str) -> Arrays:
         arrays = _load(path)
         content = str(arrays.pop(DIGEST, ""))
     except DAMAGED as error:
-        told = str(error) or type(error).__name__
-        raise ValueError(f"{path}: damaged state of a run ({told}); run without --resume") from None
+        reason = str(error) or type(error).__name__
+        raise ValueError(
+            f"{path}: damaged state of a run ({reason}); run without --resume"
+        ) from None
     if str(arrays.pop(IDENTITY, "")) != wanted:
         raise ValueError(
             f"{path}: the state of another run: the organ, a material, the load, the step, what is "

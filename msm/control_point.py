@@ -1,6 +1,6 @@
 """A single control mass point on one spring: eqs. (1), (2) against eqs. (5)-(9).
 
-Both are integrated to a tight tolerance by a standard solver, so what is compared is the models.
+A standard solver integrates both to a tight tolerance, so that only the models differ.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def run(
 ) -> Trajectory:
     """Motion along the spring from rest; the one probe moves along x.
 
-    `damping` is per mass, as for the lattice; `force` [N] over time [s]. A solver that gives up
-    ends as a diverged trajectory.
+    `damping` is relative to the mass, as for the lattice; `force` [N] over time [s]. A failure of
+    the solver gives a diverged trajectory.
     """
 
     def motion(t: float, state: Floats) -> list[float]:
@@ -66,12 +66,12 @@ def _as_trajectory(state: Floats, times: Floats, finished: bool) -> Trajectory:
     none = np.zeros((0, 0, 3))
     if finished and np.isfinite(state).all():
         return Trajectory(displacement, velocity, none, none)
-    lost = int(np.flatnonzero(~np.isfinite(state).all(axis=0))[0])
+    first_nan = int(np.flatnonzero(~np.isfinite(state).all(axis=0))[0])
     return Trajectory(
         displacement,
         velocity,
         none,
         none,
         status="diverged",
-        ended_at=float(times[lost]),
+        ended_at=float(times[first_nan]),
     )

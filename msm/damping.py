@@ -1,7 +1,8 @@
-"""Damping: to ground, eq. (2) of the fuzzy-tuned model and eq. (9) of the benchmark, or Rayleigh's.
+"""Nodal damping, eq. (2) of the fuzzy-tuned model and eq. (9) of the benchmark; Rayleigh damping.
 
-Damping to ground resists rigid motion too. Rayleigh's, C = alpha M + beta K, splits into a part of
-that kind, alpha M, and dashpots along the springs, beta K (`msm.rayleigh`), which do not.
+Nodal damping acts against the ground and resists rigid motion. Rayleigh damping alpha M + beta K
+consists of nodal damping alpha M and of dashpots along the springs, beta K (`msm.rayleigh`), which
+do not resist rigid motion.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class NodalDamping:
-    """Damping c = gamma_0 + gamma_1 |u| of a node, per mass: [1/s] and [1/(m s)].
+    """Damping coefficient c = gamma_0 + gamma_1 |u| of a node over its mass: [1/s] and [1/(m s)].
 
-    Per mass it is the same material at every lattice spacing. `beta` [s]: damping of springs, cells
-    and foundation, per stiffness.
+    Relative to the mass it does not depend on the lattice spacing. `beta` [s]: damping of springs,
+    cells and foundation over their stiffness.
     """
 
     gamma_0: float
@@ -25,20 +26,20 @@ class NodalDamping:
 
 
 def eq_2(zeta: float, k: float, mass: float) -> NodalDamping:
-    """Damping gamma = 2 zeta k / w with w = sqrt(k / m), k [N/m], m [kg]; per mass 2 zeta w."""
+    """Damping gamma = 2 zeta k / w with w = sqrt(k / m), k [N/m], m [kg]; over m: 2 zeta w."""
     return NodalDamping(2.0 * zeta * float(np.sqrt(k / mass)))
 
 
 def eq_9(gamma_0: float, gamma_1: float, mass: float) -> NodalDamping:
-    """gamma_0 [N s/m] and gamma_1 [N s/m^2] of a node of the given mass [kg]."""
+    """Damping gamma_0 [N s/m] and gamma_1 [N s/m^2] of a node of the given mass [kg]."""
     return NodalDamping(gamma_0 / mass, gamma_1 / mass)
 
 
 def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> NodalDamping:
-    """Damping alpha M + beta K that has the ratios at two frequencies.
+    """Rayleigh damping alpha M + beta K with given damping ratios at two frequencies.
 
-    From zeta = (alpha / omega + beta omega) / 2, omega [rad/s]. ValueError if that takes a negative
-    part, which would feed some mode.
+    From zeta = (alpha / omega + beta omega) / 2, omega [rad/s]. ValueError if alpha or beta would
+    be negative, which would supply energy to some mode.
     """
     (z1, z2), (w1, w2) = zetas, omegas
     if not (w1 > 0.0 and w2 > 0.0 and w1 != w2):

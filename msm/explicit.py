@@ -1,10 +1,10 @@
 """Explicit integrators, compiled: symplectic Euler, velocity Verlet, Runge-Kutta of order 4.
 
-Each takes one step per row of `factors`, whose columns are the load factors at the fractions of
-the step that the integrator names. Nodal damping is diagonal and treated implicitly where that
-keeps the order: at the end of the step by symplectic Euler, half before and half after by velocity
-Verlet. Runge-Kutta takes it as it takes every force, and its step is bounded by it. The stiffness
-part of Rayleigh damping is not diagonal: symplectic Euler takes it at the start of the step.
+Each takes one step per row of `factors`, whose columns are the load factors at the stages of the
+integrator. Nodal damping is diagonal and treated implicitly where that keeps the order: at the end
+of the step in symplectic Euler, in the first half of the step in velocity Verlet. Runge-Kutta
+treats it explicitly, which limits its step. The stiffness part of Rayleigh damping is not diagonal;
+symplectic Euler evaluates it at the start of the step.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import add_external_forces, apply_tool_contact
 from msm.forces import damping, hold, internal_forces
 from msm.hanging import interpolate, interpolate_both
 from msm.kernel import kernel
 from msm.network import Network
-from msm.outer import add_outer_forces, stop_at_tools
 from msm.rayleigh import add_stiffness_damping
 
 Floats = NDArray[np.float64]
@@ -28,11 +28,11 @@ Floats = NDArray[np.float64]
 def symplectic_euler(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
-    """V += dt a(u), damped at the end; then u += dt v. Load at the end of the step."""
+    """Step v += dt a(u) with implicit damping, then u += dt v; load at the end of the step."""
     force = np.empty_like(u)
     for n in range(factors.shape[0]):
         internal_forces(law, net, u, force)
-        add_outer_forces(net.outer, factors[n], 0, force.T)
+        add_external_forces(net.external, factors[n], 0, force.T)
         if net.beta > 0.0:
             add_stiffness_damping(law, net, u, net.beta * v, force)
         for i in range(u.shape[0]):
@@ -42,7 +42,7 @@ def symplectic_euler(
                 pushed = force[i, d] + factors[n, 0] * net.load[i, d]
                 v[i, d] = kept * v[i, d] + share * pushed
                 u[i, d] += dt * v[i, d]
-        stop_at_tools(net.outer, factors[n], dt, u.T, v.T)
+        apply_tool_contact(net.external, factors[n], dt, u.T, v.T)
         hold(net.fixed, u)
         hold(net.fixed, v)
         interpolate_both(net, u, v)
@@ -52,12 +52,12 @@ def symplectic_euler(
 def velocity_verlet(
     law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats
 ) -> None:
-    """Half a kick, a drift, half a kick; damping implicit in the first half, explicit after."""
+    """Half-step of v, step of u, half-step of v; damping implicit first, then explicit."""
     force = np.empty_like(u)
     internal_forces(law, net, u, force)
     for n in range(factors.shape[0]):
         if n == 0:
-            add_outer_forces(net.outer, factors[n], 0, force.T)
+            add_external_forces(net.external, factors[n], 0, force.T)
         for i in range(u.shape[0]):
             inertia = net.mass[i] + 0.5 * dt * damping(net, u, i)
             kept, share = net.mass[i] / inertia, 0.5 * dt / inertia
@@ -67,7 +67,7 @@ def velocity_verlet(
                 u[i, d] += dt * v[i, d]
         interpolate_both(net, u, v)
         internal_forces(law, net, u, force)
-        add_outer_forces(net.outer, factors[n], 1, force.T)
+        add_external_forces(net.external, factors[n], 1, force.T)
         for i in range(u.shape[0]):
             share = 0.5 * dt / net.mass[i]
             c = damping(net, u, i)
@@ -91,7 +91,7 @@ def runge_kutta_4(law: Any, net: Network, factors: Floats, dt: float, u: Floats,
             ahead = 0.5 * dt if stage < 2 else dt
             factor = factors[n, (stage + 1) // 2]
             internal_forces(law, net, at, force)
-            add_outer_forces(net.outer, factors[n], (stage + 1) // 2, force.T)
+            add_external_forces(net.external, factors[n], (stage + 1) // 2, force.T)
             for i in range(u.shape[0]):
                 c = damping(net, at, i)
                 for d in range(3):

@@ -1,7 +1,7 @@
-"""Forces of the network, compiled: springs, volume term, foundation.
+"""Internal forces of a lattice, compiled: springs, volume term and foundation.
 
-Division by zero follows IEEE (`error_model`): a spring pressed to a point gives NaN, which the
-caller reports as divergence, and not an exception.
+Division by zero follows IEEE 754: a spring of zero length gives NaN, which the caller reports as
+divergence.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 @kernel()
 def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
-    """Set the force [N] (n, 3) of springs, cells and foundation on the nodes displaced by u."""
+    """Set the force [N] (n, 3) of springs, cells and foundation at the displacement u."""
     force[:] = 0.0
     if net.linear:
         add_linear_spring_forces(law, net, u, force)
@@ -37,14 +37,14 @@ def internal_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
 
 @inner_kernel()
 def hold(fixed: Any, force: Floats) -> None:
-    """Set to zero what acts on fixed components (f, 2) of nodes."""
+    """Set a nodal vector to zero at the constrained components (f, 2)."""
     for f in range(fixed.shape[0]):
         force[fixed[f, 0], fixed[f, 1]] = 0.0
 
 
 @kernel()
 def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
-    """Add the force [N] of each spring to its two ends."""
+    """Add the force [N] of each spring at its two ends."""
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
         dx = net.rest[s, 0] + u[j, 0] - u[i, 0]
@@ -62,7 +62,7 @@ def add_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
 
 @inner_kernel()
 def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -> None:
-    """Add the spring forces [N] of small displacements, along the springs at rest."""
+    """Add the spring forces [N] of small displacements, along the undeformed springs."""
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
         rx, ry, rz = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]
@@ -79,7 +79,7 @@ def add_linear_spring_forces(law: Any, net: Network, u: Floats, force: Floats) -
 
 @inner_kernel()
 def corner_shares(x: Any, y: Any, z: Any) -> Any:
-    """What corners 0 to 3 of a cell lose to a stress with row (x, y, z); 7 to 4 gain as much."""
+    """Contributions of a stress row (x, y, z) to corners 0 to 3; those of 7 to 4 are opposite."""
     plus, minus = x + y, x - y
     return plus + z, plus - z, minus + z, minus - z
 

@@ -1,11 +1,13 @@
-"""A lattice of cells of several sizes: fine round places of interest, coarse elsewhere.
+"""Graded lattice: cells of several sizes, fine near places of interest and coarse elsewhere.
 
-Each cell has springs and volume term as in a uniform lattice of its size, weighted so that one
-spring law serves all: the stiffness of a spring grows with the edge of its cell. Where sizes meet,
-nodes hang (`msm.hanging`), so that the displacement is continuous. In a uniform strain, however
-large, edges and face diagonals of a cell push on its corners as the trilinear shape functions would
-have a uniform stress do, whence the lattice is at rest in it, across the sizes too. Body diagonals
-do not: where a region of small cells has corners, what they leave under shear is not in balance.
+Each cell has springs and volume term as in a uniform lattice of its size. Weights let all springs
+share one law: the stiffness of a spring is proportional to the edge of its cell. Hanging nodes
+(`msm.hanging`) make the displacement continuous where sizes meet.
+
+The lattice passes the patch test at any uniform strain. The forces of edges and face diagonals on
+the corners of a cell are those of a uniform stress with trilinear shape functions, so they are in
+equilibrium across cell sizes too. Those of body diagonals are not: under shear they leave a
+residual at the corners of a fine region.
 """
 
 from __future__ import annotations
@@ -32,11 +34,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class GradedLattice:
-    """Nodes [m] (n, 3) of all cells, those that hang included.
+    """Cells of several sizes over one set of nodes, hanging ones included.
 
-    `levels`: the cells of each size, the finest first, all of them over the same nodes. `masters`
-    (n, n): how all nodes move with those that do not hang. `dropped`: share of the body's volume in
-    cells left out.
+    `levels`: the cells of each size, the finest first. `masters` (n, n): interpolation of all nodes
+    from those that do not hang. `dropped`: fraction of the body's volume in dropped cells.
     """
 
     levels: tuple[CellLattice, ...]
@@ -65,7 +66,7 @@ class GradedLattice:
 
     @property
     def index(self) -> Ints:
-        """Where each cell lies (c, 3), in edges of its own, from the origin."""
+        """Position of each cell (c, 3) from the origin, in units of its own edge."""
         return np.concatenate([one.index for one in self.levels])
 
     @property
@@ -75,19 +76,19 @@ class GradedLattice:
 
     @property
     def fill(self) -> Floats:
-        """Share of each cell (c,) inside the body."""
+        """Fraction of each cell (c,) inside the body."""
         return np.concatenate([one.fill for one in self.levels])
 
     @property
     def hanging(self) -> int:
-        """How many nodes hang."""
+        """Number of hanging nodes."""
         return int(hanging_nodes(self.masters).sum())
 
     def interpolation(self, points: Floats) -> tuple[csr_array, int]:
-        """Trilinear weights (q, n) at points [m] (q, 3), and how many lie outside all cells.
+        """Trilinear weights (q, n) at points [m] (q, 3), and the number outside all cells.
 
-        Those are extrapolated from the nearest cell. Hanging nodes have no weight: their masters
-        have it.
+        At those the nearest cell is extrapolated. The weights of hanging nodes are moved to their
+        masters.
         """
         apart = np.array([_outside(one, points) for one in self.levels])
         nearest, outside = apart.argmin(axis=0), 0
@@ -102,12 +103,12 @@ class GradedLattice:
         return csr_array(whole @ self.masters), outside
 
     def inverted_cells(self, displacement: Floats) -> int:
-        """How many cells a displacement [m] (n, 3) turns inside out: J <= 0 of the mean F."""
+        """Number of cells that a displacement [m] (n, 3) inverts: J <= 0 of the mean F."""
         return int(inverted_cells(self.cells, self.edges, displacement))
 
 
 def _outside(level: CellLattice, points: Floats) -> Floats:
-    """How far [m] points (q, 3) lie outside the nearest cell of a level; 0 inside."""
+    """Distance [m] of points (q, 3) from the nearest cell of a level; 0 inside."""
     if len(level.index) == 0:
         return np.full(len(points), np.inf)
     centres = level.origin + level.spacing * (level.index + 0.5)
@@ -145,14 +146,14 @@ def build(body: SolidShape, lower: Floats, upper: Floats, grading: Grading) -> G
 
 
 def _masters(found: list[Leaves], used: Ints, strides: Ints) -> csr_array:
-    """How all nodes move with those that do not hang, from the places `used` (n,) of all."""
+    """Interpolation (n, n) of all nodes from those that do not hang; `used` (n,): their places."""
     count = len(used)
     pairs = [
         tie for level, one in enumerate(found) if level for tie in _ties(level, one, used, strides)
     ]
     rows, columns = (np.concatenate([np.zeros(0, int), *(tie[k] for tie in pairs)]) for k in (0, 1))
     tied = csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    # Each cell that shares an edge ties its middle alike; the shares of a node add up to one.
+    # Each cell at an edge contributes the same tie; the weights of a node are normalised to 1.
     free = np.ones(count, dtype=bool)
     free[rows] = False
     sums = np.asarray(tied.sum(axis=1)).ravel() + free
@@ -164,7 +165,7 @@ def _masters(found: list[Leaves], used: Ints, strides: Ints) -> csr_array:
 
 
 def _ties(level: int, of: Leaves, used: Ints, strides: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Nodes in the middle of edges and faces of a level's cells, each with all of its masters."""
+    """Nodes in the middle of edges and faces of a level's cells, each with one of its masters."""
     lowest, half = of.index * 2**level, 2 ** (level - 1)
     for at in product((0, 1, 2), repeat=3):
         middle = [d for d in range(3) if at[d] == 1]
@@ -182,7 +183,7 @@ def _ties(level: int, of: Leaves, used: Ints, strides: Ints) -> Iterator[tuple[I
 def springs(
     lattice: GradedLattice, flexion: float = 0.0, stiffness: Floats | None = None
 ) -> Springs:
-    """Springs of all cells, relative to k_ref at the finest edge.
+    """Springs of all cells, with stiffness relative to k_ref of the finest edge.
 
     `flexion` and `stiffness` (c,) as in `msm.springs`; flexion springs span cells of one size.
     """
@@ -206,14 +207,14 @@ def springs(
 
 
 def _by_level(lattice: GradedLattice, values: Floats) -> list[Floats]:
-    """Values (c,) of all cells, by their size."""
+    """Values (c,) of all cells, split by cell size."""
     return np.split(values, np.cumsum([len(one.cells) for one in lattice.levels])[:-1])
 
 
 def node_masses(lattice: GradedLattice, density: Floats) -> Floats:
-    """Mass [kg] (n,) of the nodes, that of hanging ones with their masters.
+    """Lumped mass [kg] (n,), that of hanging nodes at their masters.
 
-    `density` [kg/m^3] (c,): of what each cell is made of.
+    `density` [kg/m^3] (c,): density of the tissue of each cell.
     """
     filled = _by_level(lattice, lattice.fill * density)
     masses = sum(at_nodes(one, share) for one, share in zip(lattice.levels, filled, strict=True))

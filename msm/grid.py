@@ -1,15 +1,15 @@
-"""A lattice as regular grids: neighbours at constant offsets, read in blocks of lanes.
+"""A lattice as regular grids, with neighbours at constant offsets, processed in vector blocks.
 
-A cubic lattice is one grid, one of cells of several sizes a grid for each. The nodes of a grid's
-box are numbered along its longest axis first. A block is as many nodes in a row of that numbering
-as a vector has lanes; only blocks that hold a node are kept, so rows are trimmed to the organ.
-Springs are sorted by direction, each with the node of its lower number: of all springs of one
-direction the other end lies equally far ahead. What a block needs, weights of springs included,
-stands together; a spring or node that the lattice does not have has no weight.
+A cubic lattice is one grid, a graded lattice one grid per cell size. The nodes of a grid's bounding
+box are numbered along its longest axis first. A block has as many consecutive nodes as a vector has
+lanes; only blocks with a node of the lattice are stored. Springs are sorted by direction and stored
+with their node of lower number, so that the other end of all springs of a direction has the same
+offset. The data of a block are contiguous; springs and nodes that the lattice does not have get
+weight zero.
 
-A node at which sizes meet stands in a grid of each. One of these places has its mass; the others,
-as all of a node that hangs, follow the places of the nodes that move them, and give them their
-forces (`msm.grid_joints`).
+A node where cell sizes meet has a place in the grid of each size. One place has its mass. The
+others, and all places of a hanging node, follow their masters and pass their forces to them
+(`msm.grid_joints`).
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import ExternalArrays, renumbered
 from msm.graded import GradedLattice
 from msm.grid_joints import Joints
 from msm.grid_parts import Part, by_size, joined, whole
 from msm.lattice import CORNERS, CellLattice, LatticeMesh
 from msm.network import Network
-from msm.outer import Outer, placed
 from msm.simd import Lanes, lanes_of, widest
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_COUPLINGS = 125
-"""Directions in which a foundation may couple nodes: two cells each way; an organ's takes one."""
+"""Largest number of offsets between nodes that a foundation couples: two cells each way."""
 
 
 class Grid(NamedTuple):
-    """What the kernels of a grid read, and the motion that they work on.
+    """Input of the grid kernels, and the motion that they work on.
 
-    With m places, b blocks of l lanes and s directions: `lanes`, see `msm.simd`; their precision is
-    that of all arrays of reals. `u` [m], `v` [m/s], `force` [N], each (3, m), of all grids of a
-    lattice.
+    There are m places, b blocks of l lanes and s directions. `lanes` (`msm.simd`) have the
+    precision of all real arrays. `u` [m], `v` [m/s] and `force` [N], each (3, m), are those of all
+    grids of a lattice.
 
     Springs: first place `start` (b,) of each block; `offset` (s,), `rest` [m] (s, 3), `length` [m]
     and `per_length` [1/m], each (s,), of each direction; `weight` (b s, l), relative to k_ref.
@@ -80,27 +80,26 @@ class Grid(NamedTuple):
 
 
 class Grids(NamedTuple):
-    """A lattice as `grids`, one for each size of its cells, whose motion is in the same arrays.
+    """A lattice as `grids`, one per cell size, with their motion in shared arrays.
 
-    `place` (n,): of each node. `joints`: how the grids move each other, None for a single one.
-    `fixed` (f, 2): component and place of what does not move. `outer` as in `Network`.
+    `place` (n,): primary place of each node. `joints`: coupling of the grids, None for one grid.
+    `fixed` (f, 2): component and place of constrained displacements. `external` as in `Network`.
     """
 
     grids: tuple[Grid, ...]
     place: Ints
     joints: Joints | None
     fixed: Ints
-    outer: Outer | None
+    external: ExternalArrays | None
 
 
 def grids_of(
     lattice: LatticeMesh, net: Network, width: int | None = None, *, single: bool = False
 ) -> Grids | None:
-    """The grids of a network on a lattice, with lanes as the processor has; None if it has none.
+    """The grids of a network on a lattice, with the vector width of the processor, or None.
 
-    That is one on tetrahedra, with springs or cells of their own rest, or, of one size of cells,
-    with a foundation that couples nodes far apart. `single`: in single precision, of which the
-    processor takes twice as many at once.
+    There is none for a lattice on tetrahedra, one with initial stress, or a foundation that couples
+    distant nodes. `single`: in single precision, with twice as many lanes.
     """
     if not isinstance(lattice, CellLattice | GradedLattice) or net.is_strained:
         return None
@@ -125,7 +124,7 @@ def grids_of(
         primary,
         None if len(parts) == 1 else joined(parts, place, primary, net),
         np.stack([net.fixed[:, 1], primary[net.fixed[:, 0]]], axis=1).astype(np.int64),
-        None if net.outer is None else placed(net.outer, primary),
+        None if net.external is None else renumbered(net.external, primary),
     )
     return _in_single(grids) if single else grids
 
@@ -185,7 +184,7 @@ def _single(x: NDArray[Any]) -> NDArray[Any]:
 
 
 class _Blocks:
-    """The fewest blocks of a width that cover places, in their order."""
+    """The fewest blocks of a given width that cover the places, in ascending order."""
 
     def __init__(self, place: Ints, width: int) -> None:
         self.place, self.width = place, width
@@ -200,7 +199,7 @@ class _Blocks:
     def rows(
         self, place: Ints, which: Any, value: Any, kinds: int = 1, *, without: float = 0.0
     ) -> Floats:
-        """Values by block, kind and lane, (b kinds, l), summed; `without` where there is none."""
+        """Sum of values by block, kind and lane, (b kinds, l); `without` where there is none."""
         block = np.searchsorted(self.start, place, side="right") - 1
         lane = place - self.start[block] if len(place) else place
         found = np.zeros((len(self.start) * kinds, self.width))

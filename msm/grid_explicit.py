@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import add_external_forces, apply_tool_contact
 from msm.forces import hold
 from msm.grid import Grid, Grids
 from msm.grid_forces import add_internal_forces, add_stiffness_damping, damping
 from msm.grid_joints import add_joint_foundation, follow, share_out
 from msm.kernel import inner_kernel, kernel
-from msm.outer import add_outer_forces, stop_at_tools
 from msm.simd import every, load, store
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ def symplectic_euler(law: Any, of: Grids, factors: Floats, dt: float, u: Floats,
             if grid.uneven:
                 set_shares(grid, dt)
             kick_and_drift(grid, factors[n, 0], dt)
-        stop_at_tools(of.outer, factors[n], dt, moving.u, moving.v)
+        apply_tool_contact(of.external, factors[n], dt, moving.u, moving.v)
         hold(of.fixed, moving.u)
         hold(of.fixed, moving.v)
         follow_all(of)
@@ -95,7 +95,7 @@ def add_forces(law: Any, of: Grids, row: Floats, stage: int, u: Floats) -> None:
     for grid in of.grids:
         add_internal_forces(law, grid, u, force)
     add_joint_foundation(of.joints, u, 1.0, force)
-    add_outer_forces(of.outer, row, stage, force)
+    add_external_forces(of.external, row, stage, force)
     share_out(of.joints, force)
     hold(of.fixed, force)
 

@@ -1,8 +1,8 @@
-"""What joins the grids of a lattice whose cells have several sizes, compiled.
+"""Coupling of the grids of a graded lattice, compiled.
 
-A node stands in the grid of each size that it is a corner of. One of these places moves; the others
-are copies, which move as it does and give it their forces. A copy of a node that hangs moves as the
-nodes do that it hangs on (`msm.hanging`).
+A node has a place in the grid of each cell size of which it is a corner. One of them, the primary
+place, carries the motion. The others are copies, which follow it and pass their forces to it. A
+copy of a hanging node follows the masters of the node (`msm.hanging`).
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ Ints = NDArray[np.int64]
 
 
 class Joints(NamedTuple):
-    """Places of copies, what moves them, and the support, which knows no sizes.
+    """Copies with their masters, and the foundation, which couples grids.
 
-    The place `copy[k]` moves as the places `master[p]` by the shares `part[p]`, p from `first[k]`
-    to `first[k + 1]`. Foundation in compressed rows: of the place `held[r]` to the places
-    `column[p]` by `value[p]` [N/m], p from `row[r]` to `row[r + 1]`.
+    The displacement at the place `copy[k]` is the sum of those at `master[p]` times `part[p]`, p
+    from `first[k]` to `first[k + 1]`. Foundation in compressed rows: `value[p]` [N/m] couples the
+    place `held[r]` to the place `column[p]`, p from `row[r]` to `row[r + 1]`.
     """
 
     copy: Ints
@@ -38,7 +38,7 @@ class Joints(NamedTuple):
 
 @inner_kernel()
 def follow(joints: Joints | None, x: Floats) -> None:
-    """Set what copies have of x (3, m) to that of what moves them."""
+    """Interpolate x (3, m) at the copies from their masters."""
     if joints is None:
         return
     for k in range(joints.copy.shape[0]):
@@ -52,7 +52,7 @@ def follow(joints: Joints | None, x: Floats) -> None:
 
 @inner_kernel()
 def share_out(joints: Joints | None, force: Floats) -> None:
-    """Give the forces (3, m) on copies to what moves them."""
+    """Move the forces (3, m) on copies to their masters."""
     if joints is None:
         return
     for k in range(joints.copy.shape[0]):
@@ -68,7 +68,7 @@ def share_out(joints: Joints | None, force: Floats) -> None:
 
 @inner_kernel()
 def add_joint_foundation(joints: Joints | None, x: Floats, times: float, force: Floats) -> None:
-    """Subtract S x, so many times."""
+    """Subtract `times` S x, with S the foundation."""
     if joints is None:
         return
     for r in range(joints.held.shape[0]):

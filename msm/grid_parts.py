@@ -1,4 +1,4 @@
-"""What grids are made of: the nodes, springs and support of the cells of one size, in their box."""
+"""Parts of a lattice from which grids are made: nodes, springs and support of one cell size."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WHOLE = 1e-6
-"""How far from a whole number of edges a rest vector may be, of an edge."""
+"""Deviation of a rest vector from whole numbers of edges, relative to an edge, for rounding."""
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes by direction: the first node, which direction, a value; offsets of those."""
+    """Pairs of nodes: first node, number of the direction, value; offset of each direction."""
 
     node: Ints
     which: Ints
@@ -36,13 +36,13 @@ NO_PAIRS = Pairs(NOTHING, NOTHING, np.zeros(0), NOTHING)
 
 @dataclass(frozen=True)
 class Part:
-    """Cells of one size: their nodes, springs and support.
+    """Cells of one size with their nodes, springs and support.
 
-    `node` (k,): number of each in the network; `numbers` (k,): in the box, which has `count`;
-    `strides` (3,): how far the next one is along each axis. `springs` and `held` from the nodes of
-    lower number, and those of the foundation, in numbers of the part; `rest` [m] (s, 3) of each
-    direction. `cells` (c,), of the network, and their lowest corner (c,). `owned` (k,): whether
-    mass and load of a node are here.
+    `node` (k,): numbers of the nodes in the network; `numbers` (k,): in their bounding box, which
+    has `count` nodes and `strides` (3,) along its axes. `springs`: pairs from the node of lower
+    number, `held`: those of the foundation, both in node numbers of the part; `rest` [m] (s, 3) of
+    each direction. `cells` (c,): numbers in the network; `lowest` (c,): their lowest corners.
+    `owned` (k,): whether the part has mass and load of a node.
     """
 
     spacing: float
@@ -59,13 +59,13 @@ class Part:
 
     @property
     def reach(self) -> int:
-        """How far from a node of its own anything that it is told to read may stand."""
+        """Largest offset between a node and any other that the kernels read for it."""
         offsets = (self.springs.offset, self.held.offset)
         return int(max(*(np.abs(found).max(initial=0) for found in offsets), self.strides.sum()))
 
 
 def whole(lattice: CellLattice, net: Network) -> Part:
-    """A lattice of one size of cells."""
+    """The single part of a lattice with cells of one size."""
     every = np.arange(len(net.mass))
     index = _index(lattice, every)
     strides, count = _numbering(index)
@@ -86,10 +86,10 @@ def whole(lattice: CellLattice, net: Network) -> Part:
 
 
 def by_size(lattice: GradedLattice, net: Network) -> list[Part]:
-    """Cells of each size, the finest first; the support of several is left to the joints.
+    """Parts of each cell size, the finest first; the joints have the support of several parts.
 
-    A spring is one of the largest cells between whose nodes it runs: so rows have the directions of
-    their cells alone. A node is owned by the smallest cells that have it.
+    A spring belongs to the largest cells that have both its nodes, so that each part has the spring
+    directions of its own cells only. A node is owned by the smallest cells that have it.
     """
     levels = [one for one in lattice.levels if len(one.cells)]
     if len(levels) == 1:
@@ -112,7 +112,7 @@ def by_size(lattice: GradedLattice, net: Network) -> list[Part]:
 
 
 def _size(level: CellLattice, net: Network, chosen: Ints, owned: NDArray[np.bool_]) -> Part:
-    """Cells of one size with the chosen springs; they own what is not owned yet."""
+    """The part of one cell size with the chosen springs; it owns nodes that are not owned yet."""
     node = np.unique(level.cells)
     index = _index(level, node)
     strides, count = _numbering(index)
@@ -138,13 +138,13 @@ def _size(level: CellLattice, net: Network, chosen: Ints, owned: NDArray[np.bool
 
 
 def _index(lattice: CellLattice, node: Ints) -> Ints:
-    """Where nodes of a lattice stand in their own box (k, 3), in edges of a cell."""
+    """Positions (k, 3) of nodes in their bounding box, in cell edges."""
     index = np.rint((lattice.nodes[node] - lattice.origin) / lattice.spacing).astype(np.int64)
     return np.asarray(index - index.min(axis=0))
 
 
 def _numbering(index: Ints) -> tuple[Ints, int]:
-    """How far the next place of a box is along each axis, and how many there are."""
+    """Strides (3,) and number of nodes of a bounding box, numbered along its longest axis first."""
     counts = index.max(axis=0) + 1
     strides = np.ones(3, dtype=np.int64)
     first, second, third = np.argsort(-counts, kind="stable")
@@ -156,7 +156,7 @@ def _numbering(index: Ints) -> tuple[Ints, int]:
 def _springs(
     net: Network, chosen: Ints, index: Ints, strides: Ints, spacing: float
 ) -> tuple[Pairs, Floats]:
-    """The chosen springs from their ends of lower number, and the rest vector [m] by direction."""
+    """The chosen springs from their end of lower number, and the rest vector [m] by direction."""
     ends = net.ends[chosen].astype(np.int64)
     apart = index[ends[:, 1]] - index[ends[:, 0]]
     ahead = apart @ strides > 0
@@ -167,7 +167,7 @@ def _springs(
 
 
 def _couplings(net: Network, number: Ints) -> Pairs:
-    """The entries of the foundation, by how far ahead of the row's node the column's stands."""
+    """Entries of the foundation by the offset of the column's node from the row's."""
     counts = net.row[1:].astype(np.int64) - net.row[:-1].astype(np.int64)
     node = np.repeat(np.arange(len(number)), counts)
     ahead = number[net.column.astype(np.int64)] - number[node]
@@ -176,7 +176,7 @@ def _couplings(net: Network, number: Ints) -> Pairs:
 
 
 def joined(parts: list[Part], place: list[Ints], primary: Ints, net: Network) -> Joints:
-    """Places that follow others, with the places and shares of what moves them, and the support."""
+    """Copies with their masters and weights, and the foundation."""
     count = len(net.mass)
     hangs = np.zeros(count, dtype=np.bool_)
     hangs[net.hanging] = True

@@ -1,9 +1,9 @@
-"""Hanging nodes: where a small cell meets a large one, nodes that move as the large one's corners.
+"""Hanging nodes: nodes of small cells on edges and faces of larger ones, tied to their corners.
 
-On an edge of the large cell such a node moves as the mean of its two ends, on a face as that of its
-four corners, so that the displacement is continuous. Motion goes from the masters to it, force back
-by the same shares, which conserves linear and angular momentum and does no work. A master may hang
-itself; the shares are those of nodes that do not.
+The displacement of a hanging node on an edge of the larger cell is the mean of that of the two
+ends, on a face that of the four corners, so that displacement is continuous. The nodal forces are
+distributed to these masters with the same weights, which conserves linear and angular momentum and
+does no work. Where a master hangs itself, it is replaced by its own masters.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Bools = NDArray[np.bool_]
 
 
 class Ties(NamedTuple):
-    """Hanging nodes (h,), and the masters of each with their shares, in compressed rows."""
+    """Hanging nodes (h,), and the masters of each with their weights in compressed rows."""
 
     hanging: NDArray[np.uint32]
     first: NDArray[np.uint32]
@@ -33,12 +33,12 @@ class Ties(NamedTuple):
 
 
 def hanging_nodes(masters: csr_array) -> Bools:
-    """Which nodes (n,) hang, by how all nodes move with those that do not (n, n)."""
+    """Which nodes (n,) hang, from the interpolation (n, n) of all nodes by those that do not."""
     return np.asarray(masters.diagonal() == 0.0)
 
 
 def tied(masters: csr_array | None) -> Ties:
-    """The hanging nodes as the kernels read them."""
+    """Arrays of the hanging nodes for the kernels."""
     if masters is None:
         rows = csr_array((0, 0))
         nodes = np.zeros(0, dtype=np.int64)
@@ -55,7 +55,7 @@ def tied(masters: csr_array | None) -> Ties:
 
 @kernel()
 def interpolate(net: Network, x: Floats) -> None:
-    """Set what hanging nodes have of x (n, 3) to that of their masters."""
+    """Interpolate x (n, 3) at the hanging nodes from their masters."""
     for k in range(net.hanging.shape[0]):
         i = net.hanging[k]
         for d in range(3):
@@ -67,14 +67,14 @@ def interpolate(net: Network, x: Floats) -> None:
 
 @inner_kernel()
 def interpolate_both(net: Network, u: Floats, v: Floats) -> None:
-    """Set the motion of hanging nodes, displacements and velocities (n, 3)."""
+    """Interpolate displacement and velocity (n, 3) at the hanging nodes."""
     interpolate(net, u)
     interpolate(net, v)
 
 
 @kernel()
 def share_out(net: Network, force: Floats) -> None:
-    """Give the forces (n, 3) on hanging nodes to their masters."""
+    """Move the forces (n, 3) on hanging nodes to their masters."""
     for k in range(net.hanging.shape[0]):
         i = net.hanging[k]
         for p in range(net.first_master[k], net.first_master[k + 1]):
@@ -86,7 +86,7 @@ def share_out(net: Network, force: Floats) -> None:
 
 @kernel()
 def share_out_values(net: Network, values: Floats) -> None:
-    """Give values (n,) of hanging nodes to their masters; they keep a mean of the masters'."""
+    """Add values (n,) of hanging nodes to their masters, and set them to a mean of the masters'."""
     for k in range(net.hanging.shape[0]):
         for p in range(net.first_master[k], net.first_master[k + 1]):
             values[net.master[p]] += net.part[p] * values[net.hanging[k]]

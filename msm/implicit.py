@@ -1,13 +1,13 @@
-"""Implicit integrators, compiled: Euler and midpoint, by Newton and conjugate gradients.
+"""Implicit Euler and midpoint integrators, compiled, by Newton's method with conjugate gradients.
 
-Both take the same step: find the velocity w with
+Both solve for the velocity w with
 
     m (w - v) = h [f(u + h w) + load - c w]
 
-and h = dt for Euler, h = dt/2 for midpoint, which then goes on from u + h w to u + dt w and from w
-to 2 w - v. The damping c of a node is taken where its velocity would carry it, u + h v: this keeps
-the order, and the equations stay symmetric and solvable however large c is. A step that is not
-solved to TOLERANCE sets the velocity to NaN, so that it ends as divergence and not as a number.
+where h = dt for Euler and dt/2 for midpoint, which then extrapolates to u + dt w and 2 w - v. The
+nodal damping c is evaluated at u + h v, which keeps the order and leaves the equations symmetric
+and solvable for any c. A step that does not converge to TOLERANCE sets the velocity to NaN, which
+is reported as divergence.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import add_external_forces
 from msm.forces import damping, internal_forces
 from msm.kernel import kernel
 from msm.network import Network
-from msm.outer import add_outer_forces
 from msm.tangent import (
     Tangent,
     add_diagonal,
@@ -33,16 +33,16 @@ from msm.tangent import (
 Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-9
-"""Of the momentum missing in a step, relative to the momenta and impulses in it."""
+"""Residual momentum of a step relative to the momenta and impulses in it."""
 FORCING = 1e-2
-"""How far conjugate gradients reduce the residual before Newton linearises again."""
+"""Reduction of the residual by conjugate gradients per Newton iteration."""
 NEWTON_STEPS = 100
 HALVINGS = 8
 SOLVER_STEPS = 3000
 
 
 class Workspace(NamedTuple):
-    """The velocity sought and what it takes to find it, (n, 3) each but `inertia` [kg] (n,)."""
+    """The unknown velocity `w` and work arrays, each (n, 3) but `inertia` [kg] (n,)."""
 
     w: Floats
     at: Floats
@@ -99,7 +99,7 @@ def solve_step(
     work: Workspace,
     tangent: Tangent,
 ) -> bool:
-    """Set work.w to the velocity of the step; False if it was not found."""
+    """Set work.w to the velocity of the step; False without convergence."""
     work.w[:] = v
     set_sum(u, h, v, work.at)
     for i in range(u.shape[0]):
@@ -121,19 +121,19 @@ def solve_step(
 def set_residual(
     law: Any, net: Network, h: float, row: Floats, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
-    """Momentum [N s] that w leaves unexplained; its size and that of all the terms in it."""
+    """Set the residual momentum [N s] of w; return its norm and that of all its terms."""
     residual = work.residual
     set_sum(u, h, work.w, work.at)
     internal_forces(law, net, work.at, residual)
-    add_outer_forces(net.outer, row, 0, residual.T)
+    add_external_forces(net.external, row, 0, residual.T)
     size, scale = 0.0, 0.0
     for i in range(u.shape[0]):
         for d in range(3):
             after, before = work.inertia[i] * work.w[i, d], net.mass[i] * v[i, d]
-            inner, outer = h * residual[i, d], h * row[0] * net.load[i, d]
-            residual[i, d] = after - before - inner - outer
+            internal, external = h * residual[i, d], h * row[0] * net.load[i, d]
+            residual[i, d] = after - before - internal - external
             size += residual[i, d] ** 2
-            scale += after**2 + before**2 + inner**2 + outer**2
+            scale += after**2 + before**2 + internal**2 + external**2
     return np.sqrt(size), np.sqrt(scale)
 
 
@@ -141,10 +141,10 @@ def set_residual(
 def search(
     law: Any, net: Network, h: float, row: Floats, u: Floats, v: Floats, work: Workspace
 ) -> tuple[float, float]:
-    """Go along the correction, halved while it overshoots; size and scale of the residual there.
+    """Line search along the correction by halving; norm and scale of the residual at its end.
 
-    The residual is the slope of the energy of the step: along a correction it does negative work,
-    and positive work beyond the minimum (after Matthies and Strang 1979).
+    The residual is the gradient of the incremental energy: its work along the correction is
+    negative, and positive beyond the minimum (after Matthies and Strang 1979).
     """
     limit = -0.5 * dot(work.residual, work.correction)
     share = 1.0
@@ -161,16 +161,16 @@ def search(
 
 @kernel()
 def correct(net: Network, h: float, work: Workspace, tangent: Tangent, enough: float) -> bool:
-    """Newton's correction by conjugate gradients, until the remainder is small `enough`.
+    """Newton correction by conjugate gradients, to a residual norm of `enough`.
 
-    False if a direction of no or negative curvature was met. A remainder that is still too large
-    after SOLVER_STEPS is for Newton to judge.
+    False for a direction of zero or negative curvature. A residual that is too large after
+    SOLVER_STEPS is left to the Newton iteration.
     """
     x, r, p, ap = work.correction, work.remainder, work.direction, work.product
     set_diagonal(net, h, work, tangent)
     x[:], p[:] = 0.0, 0.0
     r[:] = -work.residual
-    along = turn(r, work.diagonal, np.inf, p)
+    along = next_direction(r, work.diagonal, np.inf, p)
     for _ in range(SOLVER_STEPS):
         if dot(r, r) <= enough * enough:
             break
@@ -181,13 +181,13 @@ def correct(net: Network, h: float, work: Workspace, tangent: Tangent, enough: f
         step = along / curvature
         set_sum(x, step, p, x)
         set_sum(r, -step, ap, r)
-        along = turn(r, work.diagonal, along, p)
+        along = next_direction(r, work.diagonal, along, p)
     return True
 
 
 @kernel()
 def set_diagonal(net: Network, h: float, work: Workspace, tangent: Tangent) -> None:
-    """The diagonal of what `multiply` multiplies with, made positive."""
+    """Set the diagonal of the matrix of `multiply`, with indefinite parts left out."""
     for i in range(work.diagonal.shape[0]):
         work.diagonal[i] = work.inertia[i]
     add_diagonal(net, tangent, h * h, work.diagonal)
@@ -220,8 +220,8 @@ def set_sum(x: Floats, share: float, y: Floats, out: Floats) -> None:
 
 
 @kernel()
-def turn(r: Floats, diagonal: Floats, before: float, p: Floats) -> float:
-    """Set p to the next direction of conjugate gradients; the product of r with its first part."""
+def next_direction(r: Floats, diagonal: Floats, before: float, p: Floats) -> float:
+    """Set p to the next conjugate direction; return r^T D^-1 r."""
     along = 0.0
     for i in range(r.shape[0]):
         for d in range(3):

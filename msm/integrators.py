@@ -1,4 +1,4 @@
-"""The integrators by name, each with its order and how far its step may go."""
+"""The integrators by name, with their order and stability limits."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ UNBOUNDED = float("inf")
 class Integrator(NamedTuple):
     """One integrator.
 
-    `order` of its error in the step; `at`: fractions of the step at which it wants the load factor,
-    one column each; `advance(law, network, factors, dt, u, v)` takes a step per row of factors, in
-    place. It is stable up to omega dt = `oscillation` without damping, and up to
-    c dt / m = `damping` for damping alone. With `implicit_volume`, omega is that of the network
-    without its volume term. With `linear_only` it takes linear springs only; only with
-    `stiffness_damping` it takes the stiffness part of Rayleigh damping. `on_grid`: the same with a
-    `msm.grid.Grids` for the network, if there is one; on cubic cells it is taken for `advance`.
+    `order`: order of convergence in the step; `at`: stages, as fractions of the step, at which the
+    load factor is evaluated, one column each; `advance(law, network, factors, dt, u, v)` takes one
+    step per row of factors, in place. Stability limits: omega dt = `oscillation` without damping,
+    and c dt / m = `damping` for damping alone. `implicit_volume`: omega is that of the lattice
+    without its volume term. `linear_only`: only for linear springs. `stiffness_damping`: whether it
+    supports the stiffness part of Rayleigh damping. `on_grid`: the same for `msm.grid.Grids`, which
+    replaces `advance` on cubic cells, None without one.
     """
 
     order: int
@@ -53,7 +53,8 @@ INTEGRATORS = {
         UNBOUNDED,
         on_grid=grid_explicit.velocity_verlet,
     ),
-    # On the imaginary axis 2 sqrt(2); on the real one where |1 + z + z^2/2 + z^3/6 + z^4/24| = 1.
+    # Stability limits: 2 sqrt(2) on the imaginary axis; |1 + z + z^2/2 + z^3/6 + z^4/24| = 1 on
+    # the real one.
     "runge-kutta-4": Integrator(
         4,
         (0.0, 0.5, 1.0),

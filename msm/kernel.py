@@ -1,10 +1,10 @@
-"""The decorators of the compiled kernels of the package.
+"""Decorators of the compiled kernels of the package, with their cache on disk.
 
-Numba keeps the type of a kernel's arguments in an index on disk, a named tuple as the name of its
-class. A spring law from outside the package would make that index unreadable for a process that
-cannot import it, and an edit of it would go unseen: its kernels are compiled in each process anew.
-So is an integrator from outside, for it would outlive changes of the kernels that it calls, which
-`study.compiled` drops in this package's folders only.
+The index of numba's cache refers to the argument types of a kernel, a named tuple by its class. A
+spring law from outside the package would make the index unreadable for a process that cannot import
+the law, and edits of the law would not be noticed. Kernels with such arguments are therefore
+compiled anew in each process. So are integrators from outside the package, since `study.compiled`
+invalidates the cache in the folders of this package only.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ OURS = __name__.partition(".")[0]
 
 
 class _OwnTypes(FunctionCache):  # type: ignore[misc] # numba publishes no types
-    """Keeps on disk the kernels whose arguments are of types of this package alone."""
+    """Cache on disk for kernels all of whose argument types belong to this package."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The kept kernel of a signature, None if there is none."""
+        """The cached kernel of a signature, None if there is none."""
         return super().load_overload(sig, target_context) if _is_ours(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a kernel, or leave it to this process."""
+        """Cache a kernel on disk if its argument types allow it."""
         if _is_ours(sig):
             super().save_overload(sig, data)
 
 
 def _is_ours(sig: Any) -> bool:
     tuples = [kind.instance_class for kind in sig if hasattr(kind, "instance_class")]
-    return all(map(_stands_here, tuples))
+    return all(map(_belongs_here, tuples))
 
 
-def _stands_here(thing: Any) -> bool:
+def _belongs_here(thing: Any) -> bool:
     return bool(thing.__module__.partition(".")[0] == OURS)
 
 
 def kernel(
     *, nogil: bool = False, inline: Literal["never", "always"] = "never"
 ) -> Callable[[F], F]:
-    """Decorate a function as a compiled kernel, kept on disk if it is this package's.
+    """Compile a function as a kernel, cached on disk if it belongs to this package.
 
     The options are numba's. Division by zero follows IEEE.
     """
@@ -53,10 +53,9 @@ def kernel(
 
 
 def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F], F]:
-    """Decorate a kernel that other kernels call, and nothing else, and that makes no array.
+    """Compile a kernel that only other kernels call and that allocates no array.
 
-    It takes half as long to compile: Python needs no way into it, and nobody counts who holds the
-    arrays that it is given.
+    Without a Python wrapper and reference counting it compiles in half the time.
     """
     return _compiled(inline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
 
@@ -64,7 +63,7 @@ def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F
 def _compiled(**options: Any) -> Callable[[F], F]:
     def compiled(function: F) -> F:
         made = numba.njit(error_model="numpy", **options)(function)
-        if _stands_here(function):
+        if _belongs_here(function):
             made._cache = _OwnTypes(function)  # what cache=True sets
         return made  # type: ignore[no-any-return] # numba publishes no types
 

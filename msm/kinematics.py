@@ -1,4 +1,4 @@
-"""The mean deformation of cubic cells, compiled: gradients, and whether they are inside out."""
+"""Mean deformation of cubic cells, compiled: gradients and inversion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def gradient_of(cell: Any, u: Floats, d: int, to_gradient: float) -> tuple[float
 def slopes(
     u0: Any, u1: Any, u2: Any, u3: Any, u4: Any, u5: Any, u6: Any, u7: Any, to_gradient: float
 ) -> Any:
-    """Mean gradient over a cell of what has these values at its corners."""
+    """Mean gradient over a cell of a field with these values at its corners."""
     u01, u23, u45, u67 = u0 + u1, u2 + u3, u4 + u5, u6 + u7
     x = u45 + u67 - u01 - u23
     y = u23 + u67 - u01 - u45
@@ -56,9 +56,9 @@ def dot(a: Any, b: Any) -> Any:
 
 @kernel()
 def inverted_cells(cells: NDArray[np.int64], edges: Floats, u: Floats) -> int:
-    """How many cells (c, 8) are turned inside out by u [m] (n, 3): J <= 0 of the mean F.
+    """Number of cells (c, 8) that u [m] (n, 3) inverts: J <= 0 of the mean F.
 
-    `edges` [m] (c,): of the cells.
+    `edges` [m] (c,): edge lengths of the cells.
     """
     count = 0
     for c in range(cells.shape[0]):

@@ -1,4 +1,4 @@
-"""Lattices, and the cubic one over a body: cells with fill fractions, nodes, trilinear weights."""
+"""Cubic lattice over a body: cells with fill fractions, nodes, trilinear interpolation."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ Ints = NDArray[np.int64]
 SAMPLES_PER_EDGE = 6
 MAX_CELLS = 2_000_000
 SMALLEST_FILL = 0.05
-"""Emptier cells are left out: their corners would hang on almost nothing."""
+"""Cells with a smaller fill fraction are dropped: their corners would have almost no stiffness."""
 
-# Corner c of a cell lies at the bits of c: x is the highest bit, z the lowest.
+# The bits of a corner's number are its local coordinates: x is the highest bit, z the lowest.
 CORNERS = np.array([[(c >> 2) & 1, (c >> 1) & 1, c & 1] for c in range(8)])
 EXTRAPOLATION = 0.75
-"""How far outside its cell, in spacings, a point may lie before its weights are clamped."""
+"""Distance of a point from its cell, in spacings, above which the extrapolation is clamped."""
 
 
 class LatticeMesh(Protocol):
-    """What a model needs to know of its lattice, whatever the cells."""
+    """Interface of a lattice of any type of cell."""
 
     @property
     def nodes(self) -> Floats:
@@ -49,18 +49,18 @@ class LatticeMesh(Protocol):
         """Length [m] at which springs of relative stiffness 1 have k_ref."""
 
     def interpolation(self, points: Floats) -> tuple[csr_array, int]:
-        """Weights (q, n) of the nodes at points [m] (q, 3), and how many lie outside all cells."""
+        """Interpolation weights (q, n) at points [m] (q, 3), and the number outside all cells."""
 
     def inverted_cells(self, displacement: Floats) -> int:
-        """How many cells are turned inside out by a displacement [m] (n, 3)."""
+        """Number of cells that a displacement [m] (n, 3) inverts."""
 
 
 @dataclass(frozen=True)
 class CellLattice:
-    """Nodes [m] (n, 3); cells (c, 8) of node numbers, corners in the order of CORNERS.
+    """Cubic cells of one size: nodes [m] (n, 3), and cells (c, 8) of nodes in the order of CORNERS.
 
-    `fill` (c,): share of each cell inside the body; `origin` [m] (3,) and `index` (c, 3): where the
-    cells lie; `dropped`: share of the body's volume in cells left out.
+    `fill` (c,): fraction of each cell inside the body; cells start at `origin` [m] (3,) plus
+    `index` (c, 3) times `spacing` [m]; `dropped`: fraction of the body's volume in dropped cells.
     """
 
     spacing: float
@@ -73,7 +73,7 @@ class CellLattice:
 
     @property
     def edges(self) -> Floats:
-        """Edge [m] of each cell (c,), alike."""
+        """Edge [m] of each cell (c,), all equal."""
         return np.full(len(self.cells), self.spacing)
 
     def interpolation(self, points: Floats) -> tuple[csr_array, int]:
@@ -81,15 +81,15 @@ class CellLattice:
         return interpolation(self, points)
 
     def inverted_cells(self, displacement: Floats) -> int:
-        """How many cells a displacement [m] (n, 3) turns inside out: J <= 0 of the mean F."""
+        """Number of cells that a displacement [m] (n, 3) inverts: J <= 0 of the mean F."""
         return int(inverted_cells(self.cells, self.edges, displacement))
 
 
 def build(body: SolidShape, lower: Floats, upper: Floats, spacing: float) -> CellLattice:
     """Lattice of a body within the box `lower`, `upper` [m].
 
-    The cells start at the lower corner. Only the largest set of cells joined by faces is kept, for
-    a piece that hangs on an edge would hinge freely. ValueError if no cell is left.
+    The cells start at the lower corner. Only the largest set of cells connected by faces is kept: a
+    piece connected by an edge would be a mechanism. ValueError if no cell is left.
     """
     shape = np.maximum(1, np.ceil((upper - lower) / spacing - 1e-6).astype(int))
     if np.prod(shape.astype(float)) > MAX_CELLS:
@@ -118,7 +118,7 @@ def _strides(shape: Ints) -> Ints:
 
 
 def fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: float) -> Floats:
-    """Share of each cell inside the body, from a regular grid of points in it."""
+    """Fraction of each cell inside the body, from a regular grid of sample points."""
     s = SAMPLES_PER_EDGE
     axes = [origin[i] + spacing * (np.arange(shape[i] * s) + 0.5) / s for i in range(3)]
     inside = body.occupancy(*axes)
@@ -127,21 +127,21 @@ def fill_fractions(body: SolidShape, origin: Floats, shape: Ints, spacing: float
 
 
 def node_volumes(lattice: CellLattice) -> Floats:
-    """Volume [m^3] of the body that each node stands for, shape (n,)."""
+    """Volume [m^3] (n,) of the body lumped at each node."""
     return at_nodes(lattice, lattice.fill)
 
 
 def at_nodes(lattice: CellLattice, density: Floats) -> Floats:
-    """An eighth of a density (c,) times a cell's volume, of all cells at a node, shape (n,)."""
+    """Density (c,) times cell volume, lumped at the nodes, (n,)."""
     share = np.repeat(density * lattice.spacing**3 / 8.0, 8)
     volumes = np.bincount(lattice.cells.ravel(), weights=share, minlength=len(lattice.nodes))
     return volumes.astype(np.float64)
 
 
 def composed(lattice: CellLattice | GradedLattice, tissue: Tissue | None) -> Composition | None:
-    """What each cell is made of, were it whole; None for tissue that is the same everywhere.
+    """Tissue of each cell; None for a homogeneous body.
 
-    From as many points of each cell as tell how full it is.
+    It is sampled at the same points as the fill fraction, including those outside the body.
     """
     s = SAMPLES_PER_EDGE
     inside = np.stack(np.meshgrid(*[(np.arange(s) + 0.5) / s] * 3, indexing="ij"), axis=-1)
@@ -154,9 +154,9 @@ def composed(lattice: CellLattice | GradedLattice, tissue: Tissue | None) -> Com
 
 
 def interpolation(lattice: CellLattice, points: Floats) -> tuple[csr_array, int]:
-    """Trilinear weights (q, n) at points [m] (q, 3), and how many points lie outside all cells.
+    """Trilinear weights (q, n) at points [m] (q, 3), and the number of points outside all cells.
 
-    Those are extrapolated from the nearest cell, which keeps force and moment of a load.
+    At those the nearest cell is extrapolated, which preserves force and moment of a load.
     """
     centres = lattice.origin + lattice.spacing * (lattice.index + 0.5)
     # The cell that holds a point has the nearest centre in the largest-coordinate distance.

@@ -1,8 +1,9 @@
-"""Springs and cells one by one at a displaced state: stiffness and bounds on it.
+"""Tangent stiffness of single springs and cells at a displacement, and bounds of frequencies.
 
-A spring of tangent k_t under tension T at length l resists k_t along itself and T / l across it,
-which is negative under compression. A cell resists kappa V [(cof F : G) cof F + (J - 1) dcof F[G]]
-for a gradient G of the motion. `msm.tangent` puts them together.
+A spring of length l under tension T has its tangent stiffness along its axis and the geometric
+stiffness T / l across it, which is negative under compression. The force of a cell changes by
+kappa V [(cof F : G) cof F + (J - 1) dcof F[G]] for a displacement gradient G. `msm.tangent` stores
+them for a whole lattice.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @inner_kernel()
 def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
-    """Direction, stiffness along and stiffness across [N/m] of a spring at the state u."""
+    """Direction, axial and transverse stiffness [N/m] of a spring at the displacement u."""
     i, j = net.ends[s, 0], net.ends[s, 1]
     rx, ry, rz = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]
     dx, dy, dz = u[j, 0] - u[i, 0], u[j, 1] - u[i, 1], u[j, 2] - u[i, 2]
@@ -42,12 +43,12 @@ def spring_state(law: Any, net: Network, u: Floats, s: int) -> Any:
 
 @kernel()
 def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
-    """Set (n,) values [1/s^2], the largest of which is no less than omega_max squared at u.
+    """Set nodal values [1/s^2] (n,) whose maximum is an upper bound of omega_max^2 at u.
 
-    Each part of the energy is bounded by squares of the motions of its nodes: a spring by
+    Each term of the energy is bounded by squares of the nodal displacements: a spring by
     sigma |x_i - x_j|^2 <= 2 sigma (|x_i|^2 + |x_j|^2), sigma its larger stiffness; a cell by
     kappa V (|cof F|^2 + sqrt(3) |J - 1| |F|) |G|^2 with |G|^2 <= sum |x_a|^2 / (2 h^2); the
-    foundation by its row sums; the square of a hanging node's motion by the mean of its masters'.
+    foundation by its row sums; the square at a hanging node by the mean of its masters'.
     """
     bound[:] = 0.0
     for s in range(net.ends.shape[0]):
@@ -69,7 +70,7 @@ def nodal_bounds(law: Any, net: Network, u: Floats, bound: Floats) -> None:
 
 @inner_kernel()
 def cell_growth(net: Network, c: int, u: Floats) -> Any:
-    """Largest slope of a cell's stress in F over kappa: 3 at rest."""
+    """Bound of the derivative of a cell's stress by F, over kappa: 3 at rest."""
     if net.linear:
         return 3.0
     f, g, h = deformation(net.cells[c], net.edges[c], u)
@@ -81,7 +82,7 @@ def cell_growth(net: Network, c: int, u: Floats) -> Any:
 
 @kernel()
 def farthest(u: Floats) -> tuple[float, int]:
-    """Largest component [m] of u (n, 3) and its node; NaN and infinity count as infinite."""
+    """Largest absolute component [m] of u (n, 3) and its node; NaN counts as infinite."""
     size, node = 0.0, 0
     for i in range(u.shape[0]):
         for d in range(3):
@@ -93,8 +94,8 @@ def farthest(u: Floats) -> tuple[float, int]:
 
 
 @kernel()
-def largest_turn(net: Network, u: Floats, before: Floats) -> float:
-    """Largest change of a spring's vector over its rest length, between two displacements [m]."""
+def largest_vector_change(net: Network, u: Floats, before: Floats) -> float:
+    """Largest change of a spring vector between two displacements [m], over its rest length."""
     largest = 0.0
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]

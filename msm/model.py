@@ -1,4 +1,4 @@
-"""The mass-spring lattice as a model of the study: a body under the tool, from rest."""
+"""The mass-spring lattice as a model of the study: motion of a body under the tool, from rest."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
 from msm.linearised import largest_strain
 from msm.network import Network
-from msm.stability import DEFAULT, Follower, critical_time_step
+from msm.stability import DEFAULT, CriticalStepTracker, critical_time_step
 from msm.statics import static_displacement
 from msm.stepper import LatticeStepper, grids_for, refuse_unfit
-from msm.timestep import LOOK, Automatic, Counts, Fixed, Pace, Rate, Step
+from msm.timestep import LOOK, Automatic, Counts, Fixed, Rate, Step, StepControl
 from study.problem.trajectory import Observation, Trajectory, empty_trajectory
 
 __all__ = [
@@ -50,22 +50,22 @@ Ints = NDArray[np.int64]
 OnSample = Callable[[int, Floats, Floats], None]
 
 MAX_STEPS = 300_000
-FOLLOWED = Automatic()
-FAR = 1.0
-"""A displacement of more than this many organ sizes is divergence, however finite."""
+AUTOMATIC = Automatic()
+DIVERGED_SIZE = 1.0
+"""Displacement, relative to the size of the organ, above which a run counts as diverged."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Trajectory with what it took.
+    """Trajectory of a run, with its steps and cost.
 
     `substeps` (samples - 1,): steps in each sampling interval, zero after the one in which a run
     diverged. `smallest_step`, `largest_step` [s]; `critical_time_step` [s] at rest; `margin`:
-    smallest ratio of the critical step to the step taken, wherever it was looked at;
-    `repeated_steps`: steps undone because the limit had fallen below them; `wall` [s]: steps and
-    following of the limit, without compilation. `largest_strain`: largest absolute strain of a
-    spring, `inverted_cells`: largest number of cells turned inside out, both over the samples;
-    `overlap` [m]: deepest one of body and rigid tools.
+    smallest ratio of the critical step to an accepted step, over all checks; `repeated_steps`:
+    steps repeated because the critical step had fallen below them; `wall` [s]: time of the steps
+    and checks, without compilation. `largest_strain`: largest absolute strain of a spring;
+    `inverted_cells`: largest number of inverted cells, both over the samples; `overlap` [m]:
+    deepest overlap of body and rigid tools.
     """
 
     trajectory: Trajectory
@@ -91,7 +91,7 @@ def run(
     material: Material,
     factor: Callable[[Floats], Floats],
     observation: Observation,
-    step: Step = FOLLOWED,
+    step: Step = AUTOMATIC,
     on_progress: Callable[[float], None] = lambda _: None,
     *,
     integrator: str = DEFAULT,
@@ -102,26 +102,28 @@ def run(
 ) -> Run:
     """Motion from rest under the load times `factor` of the time [s].
 
-    An integrator without a limit takes, with an automatic step, one step per sample; `linear` takes
-    the forces of small displacements, `single` steps in single precision. `on_sample(sample, u,
-    v)`, u [m] and v [m/s] (n, 3) to be copied, is told each sample in turn, and where samples are
-    undone again the one from which the run goes on: the last one told is where it stands. A run
-    with a `checkpoint` can be continued from it, and then tells first the sample it continues from.
-    ValueError if there would be too many steps, if the step does not suit the samples, the
-    integrator the springs or single precision, or the checkpoint the run.
+    With an automatic step, an unconditionally stable integrator takes one step per sample. `linear`
+    uses the forces of small displacements, `single` single precision. `on_sample(sample, u, v)` is
+    called at each sample with u [m] and v [m/s] (n, 3), which it must copy. When samples are
+    repeated, it is called again with the sample from which the run continues, so the last call
+    always has the current state. A run with a `checkpoint` can be resumed, and calls it first with
+    the sample from which it resumes.
+
+    ValueError for too many steps, a step that does not divide the sampling interval, an integrator
+    that does not support the springs or single precision, or a checkpoint of another run.
     """
     stepper = LatticeStepper(assembly, material, factor, integrator, linear=linear, single=single)
-    pace = _pace(step, observation, stepper.limit_at_rest)
+    steps = _step_control(step, observation, stepper.limit_at_rest)
     recorded = (assembly.lattice, stepper.net, observation, len(stepper.tool_force))
-    recorder, motion = _Recorder(*recorded), _Motion()
+    recorder, progress = _Recorder(*recorded), _Progress()
     recorder.record(0, stepper)
     keeper = None
     if checkpoint is not None:
-        found = _identity(assembly, stepper, integrator, step, observation)
-        keeper = Keeper(checkpoint, found, _parts(motion, stepper, pace, recorder))
+        key = _identity(assembly, stepper, integrator, step, observation)
+        keeper = Keeper(checkpoint, key, _mutable_parts(progress, stepper, steps, recorder))
         keeper.resume()
-    lost = _march(stepper, pace, recorder, motion, on_progress, on_sample, keeper)
-    return _result(motion, lost, pace, recorder)
+    divergence = _march(stepper, steps, recorder, progress, on_progress, on_sample, keeper)
+    return _result(progress, divergence, steps, recorder)
 
 
 def _identity(
@@ -131,38 +133,47 @@ def _identity(
     step: Step,
     observation: Observation,
 ) -> str:
-    """Of all that the trajectory follows from; the load's history at samples and between them."""
+    """Hash of everything that determines the trajectory.
+
+    The load history enters by its values at the samples and half-way between them.
+    """
     times = observation.times
     history = stepper.factor(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
-    seen = tuple(getattr(observation, field.name) for field in fields(observation))
-    body = assembly.lattice.nodes, stepper.law, stepper.net, stepper.start, _driven(stepper, times)
-    runs = program(force_law_of(stepper.law).tension, stepper.method.advance)
-    # Which round differently.
+    observed = tuple(getattr(observation, field.name) for field in fields(observation))
+    body = (
+        assembly.lattice.nodes,
+        stepper.law,
+        stepper.net,
+        stepper.start,
+        _external_factors(stepper, times),
+    )
+    code = program(force_law_of(stepper.law).tension, stepper.method.advance)
+    # Precision and number of lanes change the rounding.
     lanes = () if stepper.grids is None else _lanes(stepper.grids.grids[0])
-    return identity(runs, lanes, body, integrator, step, seen, history)
+    return identity(code, lanes, body, integrator, step, observed, history)
 
 
 def _lanes(grid: Grid) -> tuple[str, int]:
     return grid.u.dtype.name, len(grid.lanes)
 
 
-def _driven(stepper: LatticeStepper, times: Floats) -> Floats:
-    """What drives further loads and tools at the samples, and between them."""
-    if stepper.burden is None:
+def _external_factors(stepper: LatticeStepper, times: Floats) -> Floats:
+    """Factors of further loads and displacements of tools at the samples and half-way between."""
+    if stepper.external_loads is None:
         return np.zeros(0)
-    return stepper.burden.drive(times, float(times[1] - times[0]), (0.5, 1.0))
+    return stepper.external_loads.factor_rows(times, float(times[1] - times[0]), (0.5, 1.0))
 
 
-def _parts(
-    motion: _Motion, stepper: LatticeStepper, pace: Pace, recorder: _Recorder
+def _mutable_parts(
+    progress: _Progress, stepper: LatticeStepper, steps: StepControl, recorder: _Recorder
 ) -> dict[str, object]:
-    """What changes in a run, by the names of `msm.checkpoint`."""
+    """The objects that change in a run, by their names in `msm.checkpoint`."""
     return {
-        "motion": motion,
+        "progress": progress,
         "stepper": stepper,
-        "standing": stepper.standing,
-        "pace": pace,
-        "follower": stepper.follower,
+        "contact_state": stepper.contact_state,
+        "steps": steps,
+        "tracker": stepper.tracker,
         "recorder": recorder,
         "trajectory": recorder.trajectory,
     }
@@ -172,42 +183,43 @@ def refuse(
     assembly: Assembly,
     material: Material,
     observation: Observation,
-    step: Step = FOLLOWED,
+    step: Step = AUTOMATIC,
     *,
     integrator: str = DEFAULT,
     linear: bool = False,
     single: bool = False,
 ) -> None:
-    """ValueError for all that `run` refuses but checkpoints, without a step taken."""
-    refuse_unfit(integrator, material, assembly.burden)
+    """ValueError for all that `run` refuses, except a checkpoint, without taking a step."""
+    refuse_unfit(integrator, material, assembly.external_loads)
     net = arrays(assembly, material, linear=linear)
-    if single:  # else there is nothing to refuse, and a grid takes a while
+    if single:  # only then a grid is required, which takes time to build
         grids_for(assembly.lattice, net, integrator, single=True)
-    follower = Follower(material.law, net, INTEGRATORS[integrator])
-    _pace(step, observation, follower.limit(np.zeros_like(net.load)))
+    tracker = CriticalStepTracker(material.law, net, INTEGRATORS[integrator])
+    _step_control(step, observation, tracker.limit(np.zeros_like(net.load)))
 
 
-def _pace(step: Step, observation: Observation, at_rest: float) -> Pace:
-    """The steps of a run whose limit at rest [s] is known; ValueError if there are too many."""
+def _step_control(step: Step, observation: Observation, at_rest: float) -> StepControl:
+    """Step control for a critical step at rest [s]; ValueError for too many steps."""
     interval = float(observation.times[1] - observation.times[0])
-    pace = Pace(step, interval, len(observation.times) - 1, at_rest)
-    if not isinstance(step, Counts):  # which follow from a run that was not refused
-        _refuse_too_many_steps(pace, step)
-    return pace
+    steps = StepControl(step, interval, len(observation.times) - 1, at_rest)
+    if not isinstance(step, Counts):  # those come from a run that was accepted
+        _refuse_too_many_steps(steps, step)
+    return steps
 
 
-def _refuse_too_many_steps(pace: Pace, step: Step) -> None:
-    intervals = len(pace.substeps)
-    steps = pace.choose(0) * intervals if pace.plan is None else int(pace.plan.sum())
-    if steps > MAX_STEPS:
+def _refuse_too_many_steps(steps: StepControl, step: Step) -> None:
+    intervals, prescribed = len(steps.substeps), steps.prescribed
+    count = steps.choose(0) * intervals if prescribed is None else int(prescribed.sum())
+    duration = steps.interval * intervals
+    if count > MAX_STEPS:
         raise ValueError(
-            f"the lattice needs {steps:.2g} steps of about {pace.interval * intervals / steps:.2g} "
-            f"s, the limit is {MAX_STEPS:.0e}: reduce time.duration, or {_shortens(step)}"
+            f"the lattice needs {count:.2g} steps of about {duration / count:.2g} "
+            f"s, the limit is {MAX_STEPS:.0e}: reduce time.duration, or {_remedy(step)}"
         )
 
 
-def _shortens(step: Step) -> str:
-    """What else leaves fewer steps to take."""
+def _remedy(step: Step) -> str:
+    """How to need fewer steps."""
     if isinstance(step, Fixed):
         return "enlarge lattice.time_step"
     if isinstance(step, Rate):
@@ -215,17 +227,17 @@ def _shortens(step: Step) -> str:
     return "support.stiffness, or enlarge lattice.spacing or lattice.step_fraction"
 
 
-class _Lost(NamedTuple):
-    """Last sample before the lattice was lost, time [s] and node."""
+class _Divergence(NamedTuple):
+    """Last sample before a divergence, its time [s] and node."""
 
     sample: int
-    at: float
-    near: int
+    time: float
+    node: int
 
 
 @dataclass
-class _Motion:
-    """Where a run stands: at which sample, steps undone, time taken [s]."""
+class _Progress:
+    """Progress of a run: last sample, number of repeated steps, wall time [s]."""
 
     sample: int = 0
     repeated: int = 0
@@ -234,85 +246,90 @@ class _Motion:
 
 def _march(
     stepper: LatticeStepper,
-    pace: Pace,
+    steps: StepControl,
     recorder: _Recorder,
-    motion: _Motion,
+    progress: _Progress,
     on_progress: Callable[[float], None],
     on_sample: OnSample,
     keeper: Keeper | None,
-) -> _Lost | None:
-    """Go from sample to sample, and back to the last one kept where the steps were too long."""
-    u, v, intervals = stepper.u, stepper.v, len(pace.substeps)
-    kept = (motion.sample, stepper.state())
-    on_sample(motion.sample, u, v)
-    while motion.sample < intervals:
+) -> _Divergence | None:
+    """Advance from sample to sample; return to the last checked one where steps were too long."""
+    u, v, intervals = stepper.u, stepper.v, len(steps.substeps)
+    checked = (progress.sample, stepper.state())
+    on_sample(progress.sample, u, v)
+    while progress.sample < intervals:
         started = time.perf_counter()
-        taken, failed = _pass_interval(stepper, pace, recorder, motion.sample)
-        motion.wall += time.perf_counter() - started
+        taken, failed = _advance_interval(stepper, steps, recorder, progress.sample)
+        progress.wall += time.perf_counter() - started
         if failed is None:
-            motion.sample += 1
-            recorder.record(motion.sample, stepper)
-            on_progress(motion.sample / intervals)
-            on_sample(motion.sample, u, v)
-            if stepper.unseen == 0:
-                kept = (motion.sample, stepper.state())
+            progress.sample += 1
+            recorder.record(progress.sample, stepper)
+            on_progress(progress.sample / intervals)
+            on_sample(progress.sample, u, v)
+            if stepper.unchecked == 0:
+                checked = (progress.sample, stepper.state())
                 if keeper is not None:
-                    keeper.keep(last=motion.sample == intervals)
-        elif pace.gives_up():
-            return _lost(pace, recorder, motion.sample, taken, failed)
+                    keeper.keep(last=progress.sample == intervals)
+        elif steps.gives_up():
+            return _divergence(steps, recorder, progress.sample, taken, failed)
         else:
-            motion.repeated += taken + int(pace.substeps[kept[0] : motion.sample].sum())
-            motion.sample = kept[0]
-            stepper.put_back(kept[1])
-            stepper.unseen = 0
-            on_sample(motion.sample, u, v)
+            progress.repeated += taken + int(steps.substeps[checked[0] : progress.sample].sum())
+            progress.sample = checked[0]
+            stepper.put_back(checked[1])
+            stepper.unchecked = 0
+            on_sample(progress.sample, u, v)
     return None
 
 
-def _lost(pace: Pace, recorder: _Recorder, sample: int, taken: int, node: int) -> _Lost:
-    at = recorder.times[sample] + pace.interval * taken / pace.substeps[sample]
-    pace.substeps[sample + 1 :] = 0
-    return _Lost(sample, float(at), node)
+def _divergence(
+    steps: StepControl, recorder: _Recorder, sample: int, taken: int, node: int
+) -> _Divergence:
+    at = recorder.times[sample] + steps.interval * taken / steps.substeps[sample]
+    steps.substeps[sample + 1 :] = 0
+    return _Divergence(sample, float(at), node)
 
 
-def _pass_interval(
-    stepper: LatticeStepper, pace: Pace, recorder: _Recorder, sample: int
+def _advance_interval(
+    stepper: LatticeStepper, steps: StepControl, recorder: _Recorder, sample: int
 ) -> tuple[int, int | None]:
-    """Steps taken from a sample to the next; a node where they failed, and then not all of them."""
-    count = pace.choose(sample)
-    dt = pace.interval / count
+    """Advance to the next sample; the number of steps taken, and a node if they failed."""
+    count = steps.choose(sample)
+    dt = steps.interval / count
     taken = 0
     for stretch in _stretches(count):
         stepper.t = recorder.times[sample] + taken * dt
         stepper.advance(stretch, dt)
         taken += stretch
         size, node = stepper.farthest()
-        if not size < recorder.far:
-            pace.halve()
+        if not size < recorder.diverged_size:
+            steps.halve()
             return taken, node
-        if pace.is_due(sample, stepper.unseen) and not pace.keeps_up(dt, stepper.limit()):
-            return taken, stepper.follower.stiffest()
+        due = steps.is_check_due(sample, stepper.unchecked)
+        if due and not steps.accepts(dt, stepper.limit()):
+            return taken, stepper.tracker.stiffest_node()
     return taken, None
 
 
 def _stretches(count: int) -> Iterator[int]:
-    """Parts of at most LOOK steps, nearly equal, of a number of steps."""
+    """Nearly equal parts, of at most LOOK steps, of a number of steps."""
     parts = -(-count // LOOK)
     for part in range(parts):
         yield (part + 1) * count // parts - part * count // parts
 
 
-def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder) -> Run:
-    steps = pace.interval / pace.substeps[pace.substeps > 0]
+def _result(
+    progress: _Progress, divergence: _Divergence | None, steps: StepControl, recorder: _Recorder
+) -> Run:
+    dt = steps.interval / steps.substeps[steps.substeps > 0]
     return Run(
-        recorder.trajectory if lost is None else recorder.diverged(lost),
-        pace.substeps,
-        float(steps.min(initial=np.inf)),
-        float(steps.max(initial=0.0)),
-        pace.at_rest,
-        pace.margin,
-        motion.repeated,
-        motion.wall,
+        recorder.trajectory if divergence is None else recorder.diverged(divergence),
+        steps.substeps,
+        float(dt.min(initial=np.inf)),
+        float(dt.max(initial=0.0)),
+        steps.at_rest,
+        steps.margin,
+        progress.repeated,
+        progress.wall,
         float(recorder.strain.max()),
         int(recorder.inverted.max()),
         float(recorder.overlap.max()),
@@ -320,13 +337,13 @@ def _result(motion: _Motion, lost: _Lost | None, pace: Pace, recorder: _Recorder
 
 
 class _Recorder:
-    """Writes what is observed into arrays, over what was written there before."""
+    """Writes the observed quantities of each sample into arrays; repeated samples overwrite."""
 
     def __init__(
         self, lattice: LatticeMesh, net: Network, observation: Observation, tools: int
     ) -> None:
         self.net, self.lattice = net, lattice
-        self.far = FAR * float(np.ptp(lattice.nodes, axis=0).max())
+        self.diverged_size = DIVERGED_SIZE * float(np.ptp(lattice.nodes, axis=0).max())
         self.times, self.frames = observation.times, observation.frames
         self.trajectory = empty_trajectory(observation, tools)
         self.overlap = np.zeros(len(observation.times))
@@ -337,7 +354,7 @@ class _Recorder:
         self.on_surface, _ = lattice.interpolation(observation.surface_points)
 
     def record(self, sample: int, stepper: LatticeStepper) -> None:
-        """Keep the motion at one sample."""
+        """Record the motion at one sample."""
         u, v = stepper.u, stepper.v
         self.trajectory.tool_force[sample] = stepper.tool_force
         self.overlap[sample] = stepper.overlap
@@ -350,9 +367,9 @@ class _Recorder:
                 self.trajectory.volume_field[i] = self.in_volume @ u
                 self.trajectory.surface_field[i] = self.on_surface @ u
 
-    def diverged(self, lost: _Lost) -> Trajectory:
-        """The trajectory up to where it was lost; later samples that were undone are cleared."""
-        after = np.arange(len(self.times)) > lost.sample
+    def diverged(self, divergence: _Divergence) -> Trajectory:
+        """The trajectory up to the divergence, with all later samples cleared."""
+        after = np.arange(len(self.times)) > divergence.sample
         late = after[np.asarray(self.frames, dtype=int)]
         self.strain[after], self.inverted[after] = 0.0, 0
         self.overlap[after] = 0.0
@@ -364,6 +381,6 @@ class _Recorder:
         return replace(
             self.trajectory,
             status="diverged",
-            ended_at=lost.at,
-            ended_near=self.lattice.nodes[lost.near],
+            ended_at=divergence.time,
+            ended_near=self.lattice.nodes[divergence.node],
         )

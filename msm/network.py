@@ -1,4 +1,4 @@
-"""The arrays that the compiled loops read: springs, cells, nodes, foundation, load."""
+"""Arrays of a lattice for the compiled kernels: springs, cells, nodes, foundation, load."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from msm.hanging import tied
 
 if TYPE_CHECKING:
     from msm.damping import NodalDamping
-    from msm.outer import Outer
+    from msm.external_loads import ExternalArrays
     from msm.springs import Springs
     from msm.volume import VolumeTerm
 
@@ -20,19 +20,21 @@ Floats = NDArray[np.float64]
 
 
 class Network(NamedTuple):
-    """What the force and integrator kernels are given.
+    """Input of the force and integrator kernels.
 
-    Springs: `ends` (s, 2) uint32; `rest` [m] (s, 3); `length` [m] (s,); `scale` [m] (s,), weight
-    times rest length. Cells: `cells` (c, 8) uint32, `bulk` [J] and `edges` [m], each (c,);
-    `spacing` [m]: that of the lattice. Nodes: `mass`
-    [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2], each (n,). `beta` [s]: damping over stiffness of
-    springs, cells and foundation. Foundation: `row`, `column`, `value` [N/m], compressed rows.
-    `load` [N] (n, 3). `linear`: forces of small displacements. Hanging nodes, see `msm.hanging`:
-    the node `hanging[k]` moves as its masters `master[p]` by the shares `part[p]`, p from
-    `first_master[k]` to `first_master[k + 1]`; its mass is theirs, and a scale only. `swollen`
-    (c,): J - 1 at which a cell is unstressed. `outer`: what acts beside the load, None for nothing.
-    `fixed` (f, 2) uint32: node and component of each displacement that does not change, on which no
-    force acts.
+    Springs: `ends` (s, 2) uint32; rest vector `rest` [m] (s, 3); rest length `length` [m] (s,);
+    `scale` [m] (s,), weight times rest length. Cells: `cells` (c, 8) uint32; `bulk` [J] (c,), kappa
+    times volume; `edges` [m] (c,); `swollen` (c,), J - 1 of the stress-free cell. `spacing` [m] of
+    the lattice. Nodes (n,): `mass` [kg], `gamma_0` [N s/m], `gamma_1` [N s/m^2]. `beta` [s]:
+    damping over stiffness of springs, cells and foundation. Foundation in compressed rows: `row`,
+    `column`, `value` [N/m]. `load` [N] (n, 3). `linear`: forces of small displacements.
+
+    Hanging nodes (`msm.hanging`): the displacement of node `hanging[k]` is the sum of those of
+    `master[p]` times `part[p]`, p from `first_master[k]` to `first_master[k + 1]`. The masters
+    carry its mass; its entry of `mass` only scales bounds of frequencies.
+
+    `external`: loads beside the first one, None without any. `fixed` (f, 2) uint32: node and
+    component of each constrained displacement, on which no force acts.
     """
 
     ends: NDArray[np.uint32]
@@ -57,12 +59,12 @@ class Network(NamedTuple):
     master: NDArray[np.uint32]
     part: Floats
     swollen: Floats
-    outer: Outer | None
+    external: ExternalArrays | None
     fixed: NDArray[np.uint32] = np.zeros((0, 2), dtype=np.uint32)
 
     @property
     def is_strained(self) -> bool:
-        """Whether the given shape is not the unstressed one."""
+        """Whether the given shape is under stress."""
         return bool(self.swollen.any() or (np.linalg.norm(self.rest, axis=1) != self.length).any())
 
 
@@ -79,17 +81,17 @@ def network(
     fixed: NDArray[np.bool_] | None = None,
     undamped: Floats | None = None,
 ) -> Network:
-    """Arrays of a body of the given nodal mass [kg] (n,), foundation (n, n), load [N] (n, 3).
+    """Arrays of a body with nodal mass [kg] (n,), foundation [N/m] (n, n) and load [N] (n, 3).
 
-    `masters` (n, n): how all nodes move with those that are free, None if all are; `fixed` (n, 3):
-    components of the nodes that do not move; `undamped` [kg] (n,): of the mass, what nodal damping
-    does not act on.
+    `masters` (n, n): interpolation of all nodes from those that do not hang, None without hanging
+    nodes; `fixed` (n, 3): constrained components; `undamped` [kg] (n,): part of the mass on which
+    nodal damping does not act.
     """
     ties = tied(masters)
     mass = mass if masters is None else mass + (mass == 0.0) * (masters @ mass)
     damped = mass if undamped is None else mass - undamped
     length = springs.rest_length
-    held = np.zeros_like(load, dtype=np.bool_) if fixed is None else fixed
+    constrained = np.zeros_like(load, dtype=np.bool_) if fixed is None else fixed
     return Network(
         ends=np.ascontiguousarray(springs.ends, dtype=np.uint32),
         rest=np.ascontiguousarray(springs.rest),
@@ -105,14 +107,14 @@ def network(
         row=foundation.indptr.astype(np.uint32),
         column=foundation.indices.astype(np.uint32),
         value=foundation.data.astype(np.float64),
-        load=np.where(held, 0.0, load),
+        load=np.where(constrained, 0.0, load),
         linear=linear,
-        fixed=np.ascontiguousarray(np.argwhere(held), dtype=np.uint32),
+        fixed=np.ascontiguousarray(np.argwhere(constrained), dtype=np.uint32),
         edges=np.ascontiguousarray(volume.edges),
         hanging=ties.hanging,
         first_master=ties.first,
         master=ties.master,
         part=ties.part,
         swollen=np.zeros(len(volume.bulk)),
-        outer=None,
+        external=None,
     )

@@ -1,7 +1,7 @@
-"""Cells of several sizes over a body: small ones round places, each level twice the one below.
+"""Balanced octree cells over a body, small near given places.
 
-The cells are those of an octree, balanced: two that touch, at a corner too, differ by one level at
-most. Level 0 is the finest.
+Two cells that touch, even at a corner, differ by one level at most. Level 0 is the finest; each
+level has twice the edge of the one below.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ AROUND = np.ones((3, 3, 3), dtype=bool)
 
 @dataclass(frozen=True)
 class Grading:
-    """How fine cells are: of edge `spacing` [m] round `places` [m] (k, 3), coarser away from them.
+    """Grading of the cell size: edge `spacing` [m] near `places` [m] (k, 3), coarser elsewhere.
 
-    `reach` [m] (levels - 1,): how far from a place cells are finer than those of the next level;
-    with none there is one level.
+    `reach` [m] (levels - 1,): distance from a place within which cells are finer than those of the
+    next level; if empty, there is one level.
     """
 
     spacing: float
@@ -37,7 +37,7 @@ class Grading:
 
     @property
     def levels(self) -> int:
-        """How many sizes of cells there are at most."""
+        """Largest number of cell sizes."""
         return len(self.reach) + 1
 
     def edge(self, level: int) -> float:
@@ -47,22 +47,22 @@ class Grading:
 
 @dataclass(frozen=True)
 class Leaves:
-    """The cells of one level: where they lie (c, 3), in edges, and the share inside the body."""
+    """The cells of one level: positions (c, 3) in units of their edge, and fill fractions (c,)."""
 
     index: Ints
     fill: Floats
 
     def where(self, chosen: Bools) -> Leaves:
-        """Some of them."""
+        """The chosen cells."""
         return Leaves(self.index[chosen], self.fill[chosen])
 
 
 def leaves(
     body: SolidShape, lower: Floats, upper: Floats, grading: Grading
 ) -> tuple[list[Leaves], Ints, float]:
-    """Cells by level, the counts of the finest in the box, and the share of volume left out.
+    """Cells by level, number of finest cells along each axis, and fraction of volume dropped.
 
-    The largest piece joined by faces is kept. ValueError for too many cells, or none.
+    The largest set connected by faces is kept. ValueError for too many cells, or none.
     """
     levels = grading.levels
     top = np.maximum(1, np.ceil((upper - lower) / grading.edge(levels - 1) - 1e-6).astype(int))
@@ -92,7 +92,7 @@ def _volume(of: Sequence[Leaves], grading: Grading) -> float:
 
 
 def _largest_piece(of: Sequence[Leaves], finest: Ints) -> list[Leaves]:
-    """The largest set of cells joined by faces, found among cells of the finest size."""
+    """The largest set of cells connected by faces, found on the grid of the finest cells."""
     there = np.zeros(finest, dtype=bool)
     for level, one in enumerate(of):
         there |= _in_finest(one, level, finest)
@@ -107,7 +107,7 @@ def _largest_piece(of: Sequence[Leaves], finest: Ints) -> list[Leaves]:
 
 
 def _in_finest(of: Leaves, level: int, finest: Ints) -> Bools:
-    """The finest cells that the cells of a level are made of."""
+    """Mask of the finest cells inside the cells of a level."""
     mask = np.zeros(finest // 2**level, dtype=bool)
     mask[tuple(of.index.T)] = True
     for _ in range(level):
@@ -116,7 +116,7 @@ def _in_finest(of: Leaves, level: int, finest: Ints) -> Bools:
 
 
 def _split(top: Ints, lower: Floats, grading: Grading, level: int) -> Bools:
-    """Which cells of a level are wanted smaller: those within its reach of a place."""
+    """Which cells of a level must be split: those within its reach of a place."""
     edge = grading.edge(level)
     shape = top * 2 ** (grading.levels - 1 - level)
     near = np.zeros(shape, dtype=bool)
@@ -132,9 +132,9 @@ def _split(top: Ints, lower: Floats, grading: Grading, level: int) -> Bools:
 
 
 def _balanced(split: list[Bools]) -> list[Bools]:
-    """Masks of cells to split, from level 1 up, with those that must be split beside them.
+    """Masks of cells to split, from level 1 up, extended to keep the octree balanced.
 
-    What is smaller than a cell's neighbours stands in cells that exist, and so do those round it.
+    The parent of each split cell and of each of its neighbours is split too.
     """
     found = split[:1]
     for above in split[1:]:
@@ -143,20 +143,20 @@ def _balanced(split: list[Bools]) -> list[Bools]:
 
 
 def _coarsened(mask: Bools) -> Bools:
-    """Whether any of the eight parts of a cell is set."""
+    """Mask of the next level: cells any of whose eight children is set."""
     x, y, z = np.array(mask.shape) // 2
     return np.asarray(mask.reshape(x, 2, y, 2, z, 2).any(axis=(1, 3, 5)))
 
 
 def _refined(mask: Bools) -> Bools:
-    """What is set of a cell, for its eight parts."""
+    """Mask of the level below: each cell's value for its eight children."""
     for axis in range(3):
         mask = np.repeat(mask, 2, axis=axis)
     return mask
 
 
 def _within(body: SolidShape, lower: Floats, mask: Bools, edge: float) -> Leaves:
-    """Cells of a mask that are not empty; only their own box is looked at."""
+    """Cells of a mask that are not empty, sampled within the box of the mask only."""
     index = np.argwhere(mask)
     if len(index) == 0:
         return Leaves(index, np.zeros(0))

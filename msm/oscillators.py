@@ -1,8 +1,8 @@
-"""Many control mass points on one spring each, eqs. (1) and (5)-(9), for samples of unknowns.
+"""Control mass points on one spring, eqs. (1) and (5)-(9), compiled for large samples.
 
-The same motion as `msm.control_point`, whose standard solver takes milliseconds for one, by a
-compiled Rosenbrock method: linearly implicit, for the benchmark may be damped 25 times beyond
-critical, and adaptive, for a draw of unknowns may be anything.
+The motion is that of `msm.control_point`, whose standard solver takes milliseconds per point. A
+compiled Rosenbrock method solves it here: linearly implicit, since the benchmark may have 25 times
+critical damping, and with an adaptive step for any sample of the parameters.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 STEP, RAMP, SINUSOID = 0, 1, 2
 """Load histories: constant; up, held and down again; a sine from zero."""
 TOLERANCE = 1e-8
-"""Of a step, relative to the largest displacement and velocity so far."""
+"""Error of a step relative to the largest displacement and velocity so far."""
 LARGEST_COUNT = 200_000
-"""Of steps; a motion that needs more counts as diverged."""
+"""Number of steps above which a motion counts as diverged."""
 
 # ROS4 with an L-stable choice of gamma: Hairer and Wanner, Solving Ordinary Differential Equations
 # II, table IV.7.2 (order 4, embedded order 3), in the form that needs no product with a Jacobian.
@@ -44,7 +44,7 @@ class Oscillator(NamedTuple):
     """A mass point [kg] on a spring of a rest length [m].
 
     `k1`, `k2` [N/m], `x_c`: eqs. (6), (7) per rest length, k2 = 0 for a linear spring; `c0` [N s/m]
-    and `c1` [N s/m^2]: eq. (9); `start` [m]: displacement from which it is let go.
+    and `c1` [N s/m^2]: eq. (9); `start` [m]: initial displacement.
     """
 
     mass: float
@@ -71,7 +71,7 @@ class Load(NamedTuple):
 
 @njit(cache=True)
 def force_at(load: Load, t: float) -> tuple[float, float]:
-    """Force [N] and its rate [N/s] at a time [s], from the right at a corner."""
+    """Force [N] and its rate [N/s] at a time [s]; at a corner, the limit from the right."""
     if load.kind == STEP:
         return load.force, 0.0
     if load.kind == SINUSOID:
@@ -109,9 +109,9 @@ def _acceleration(p: Oscillator, load: Load, t: float, x: float, v: float) -> fl
 def _step(
     p: Oscillator, load: Load, t: float, x: float, v: float, h: float
 ) -> tuple[float, float, float, float]:
-    """Displacement and velocity a step h later, and the estimated error of each.
+    """Displacement and velocity after a step h, and the estimated error of each.
 
-    The rates are x' = v, v' = a; I / (h gamma) - J is solved by hand.
+    The 2 x 2 systems with I / (h gamma) - J of x' = v, v' = a are solved in closed form.
     """
     d = 1.0 / (h * _GAMMA)
     sign = 1.0 if x > 0.0 else -1.0
@@ -148,10 +148,9 @@ def _step(
 
 @njit(cache=True)
 def move(p: Oscillator, load: Load, duration: float, samples: int) -> Floats:
-    """Displacement [m] and velocity [m/s] (2, samples) at equal times of the duration [s].
+    """Displacement [m] and velocity [m/s] (2, samples) at equally spaced times of the duration [s].
 
-    NaN from where it diverged. No step goes over a sample, on which the corners of a load must
-    lie.
+    NaN after a divergence. Steps end at samples, so the corners of the load must be samples.
     """
     out = np.full((2, samples), np.nan)
     x, v, interval = p.start, 0.0, duration / (samples - 1)

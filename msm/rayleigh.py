@@ -1,9 +1,9 @@
-"""The stiffness part of Rayleigh damping, beta K: a dashpot on each spring, cell and foundation.
+"""Stiffness part beta K of Rayleigh damping: a dashpot on each spring, cell and foundation.
 
-Each resists the rate of what it stores energy in: the length of a spring, the volume ratio J of a
-cell. At rest that is beta K v exactly. Away from rest it is beta times the tangent without the part
-that turns forces: that part would resist rotation, which must stay free. The mass part alpha M is
-nodal: gamma_0 of `msm.damping`.
+Each dashpot resists the rate of the deformation that stores energy: the length of a spring, the
+volume ratio J of a cell. At rest the damping is beta K v exactly. In a deformed state it is beta
+times the material part of the tangent; the geometric part would resist rigid rotation. The mass
+part alpha M is nodal: gamma_0 of `msm.damping`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def add_stiffness_damping(law: Any, net: Network, u: Floats, ahead: Floats, forc
 
 @kernel()
 def add_spring_damping(law: Any, net: Network, u: Floats, ahead: Floats, force: Floats) -> None:
-    """Add a dashpot along each spring, of beta times its stiffness at the present strain."""
+    """Add a dashpot along each spring, of beta times its stiffness at the current strain."""
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
         x, y, z = net.rest[s, 0], net.rest[s, 1], net.rest[s, 2]

@@ -1,8 +1,9 @@
-"""The displaced lattice at rest, by dynamic relaxation with kinetic damping, compiled.
+"""Static equilibrium of a lattice by dynamic relaxation with kinetic damping, compiled.
 
-The nodes get masses that make a step of one stable at their present stiffness, and move without
-damping; whenever their kinetic energy has passed a peak, they are stopped and set off again (after
-Cundall 1976). It needs forces alone, linear or not, and finds a rest that the load leads to.
+The nodes have fictitious masses for which a unit time step is stable at the current stiffness, and
+move without damping. Whenever the kinetic energy passes a peak, all velocities are set to zero
+(after Cundall 1976). The method needs internal forces only, linear or nonlinear, and follows the
+load to a stable equilibrium.
 """
 
 from __future__ import annotations
@@ -21,14 +22,15 @@ from msm.network import Network
 
 Floats = NDArray[np.float64]
 
-MARGIN = 1.2
-"""Fictitious masses over the least stable ones; the stiffness may grow until the next peak."""
+MASS_FACTOR = 1.2
+"""Fictitious masses over the smallest stable ones: the stiffness may grow before the next peak."""
 
 
 class Relaxation(NamedTuple):
-    """How a relaxation ended.
+    """Outcome of a relaxation.
 
-    `residual`: size of the forces left, relative to the load (to the first forces, without load).
+    `residual`: norm of the unbalanced force relative to that of the load, or to that of the first
+    residual without a load.
     """
 
     status: Literal["at rest", "not at rest", "diverged"]
@@ -44,11 +46,11 @@ def relax(
     tolerance: float = 1e-8,
     most_steps: int = 100_000,
 ) -> tuple[Floats, Relaxation]:
-    """Displacement [m] (n, 3) at rest under `factor` times the load, and how it was reached.
+    """Displacement [m] (n, 3) at rest under `factor` times the load, and the outcome.
 
-    It starts from the displacement `start`, or from none. Without enough steps the last
-    displacement is returned as "not at rest"; on divergence it holds NaN. ValueError if nothing
-    can be reached with the tolerance or the number of steps.
+    The relaxation starts from the displacement `start`, by default zero. When `most_steps` are not
+    enough, the last displacement is returned as "not at rest"; on divergence it holds NaN.
+    ValueError for a tolerance outside (0, 1), no steps, or a start that does not fit the nodes.
     """
     if not 0.0 < tolerance < 1.0:
         raise ValueError(f"tolerance: {tolerance:g} is not between 0 and 1; 1e-8 is a good one")
@@ -60,29 +62,29 @@ def relax(
     steps, residual = move_to_rest(law, net, factor, u, tolerance, most_steps)
     if not np.isfinite(residual):
         return np.full_like(u, np.nan), Relaxation("diverged", steps, residual)
-    reached = residual <= tolerance
-    return u, Relaxation("at rest" if reached else "not at rest", steps, residual)
+    converged = residual <= tolerance
+    return u, Relaxation("at rest" if converged else "not at rest", steps, residual)
 
 
 @kernel(nogil=True)
 def move_to_rest(
     law: Any, net: Network, factor: float, u: Floats, tolerance: float, most_steps: int
 ) -> tuple[int, float]:
-    """Move u to rest in place; the steps taken and the relative residual left."""
+    """Relax u in place; return the number of steps and the final relative residual."""
     force, v = np.empty_like(u), np.zeros_like(u)
     inertia = np.empty(u.shape[0])
-    scale, energy = size_of(factor * net.load), 0.0
+    scale, energy = norm(factor * net.load), 0.0
     residual, step = 1.0, 0
     set_inertia(law, net, u, inertia)
     for step in range(most_steps + 1):
         internal_forces(law, net, u, force)
         force += factor * net.load
-        size = size_of(force)
+        size = norm(force)
         scale = max(scale, size) if step == 0 else scale
         residual = size / scale if size > 0.0 else 0.0
         if residual <= tolerance or not np.isfinite(residual) or step == most_steps:
             break
-        # From a stop, half a kick: a whole one would throw a fast motion beyond where it came from.
+        # Leapfrog starts with half a velocity step; a whole one would overshoot.
         share = 0.5 if energy == 0.0 else 1.0
         before, energy = energy, kick(force, inertia, share, v)
         if energy < before:
@@ -96,14 +98,14 @@ def move_to_rest(
 
 @kernel()
 def set_inertia(law: Any, net: Network, u: Floats, inertia: Floats) -> None:
-    """Masses (n,) with which no frequency exceeds the 2 that a step of one can follow."""
+    """Set fictitious masses (n,) with frequencies below 2, the limit of a unit time step."""
     nodal_bounds(law, net, u, inertia)
-    inertia *= net.mass * MARGIN / 4.0
+    inertia *= net.mass * MASS_FACTOR / 4.0
 
 
 @kernel()
 def kick(force: Floats, inertia: Floats, share: float, v: Floats) -> float:
-    """Add a share of force over inertia to v; twice the kinetic energy then."""
+    """Add a share of force over inertia to v; return twice the kinetic energy."""
     energy = 0.0
     for i in range(v.shape[0]):
         for d in range(3):
@@ -113,8 +115,8 @@ def kick(force: Floats, inertia: Floats, share: float, v: Floats) -> float:
 
 
 @kernel()
-def size_of(x: Floats) -> float:
-    """Root of the sum of the squares of x (n, 3)."""
+def norm(x: Floats) -> float:
+    """Frobenius norm of x (n, 3)."""
     total = 0.0
     for i in range(x.shape[0]):
         total += x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2

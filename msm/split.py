@@ -1,13 +1,13 @@
-"""Symplectic Euler with the volume term implicit, for tissue that is nearly incompressible.
+"""Semi-implicit Euler with an implicit volume term, for nearly incompressible tissue.
 
-Near nu = 1/2 only the volume term makes the explicit step short. Here springs, foundation and load
-act as in symplectic Euler, and the cells then push back on the volume that they would have:
+Near nu = 1/2 the volume term alone limits the explicit step. Here springs, foundation and load act
+as in symplectic Euler, which gives v*; then the pressures act on the volume at the end of the step:
 
     m (v - v*) = -dt G^T p,   p = kappa V [J(u) - 1 + dt G v],   G = dJ/du
 
-With v put into p, one equation per cell is left, symmetric and positive definite for every kappa,
-solved by conjugate gradients. The step is bounded by springs and foundation alone. The price, as
-with every implicit Euler: fast changes of volume are damped. J is linearised once per step.
+Substituting v in p leaves one equation per cell, symmetric and positive definite for every kappa,
+which conjugate gradients solve. Springs and foundation alone limit the step. As in every implicit
+Euler method, fast changes of volume are damped. J is linearised once per step.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import add_external_forces, apply_tool_contact
 from msm.forces import (
     add_foundation_forces,
     add_linear_spring_forces,
@@ -28,25 +29,25 @@ from msm.forces import (
 from msm.kernel import kernel
 from msm.kinematics import gradient_of
 from msm.network import Network
-from msm.outer import add_outer_forces, stop_at_tools
 from msm.tangent import Tangent, corner_slope, empty_tangent, linearise_cells
 
 Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Of the pressures in a step, relative. The volume that it leaves is seen by the next step and does
-not add up: a tighter one changed displacements by less than 1e-5, for up to four times the cost."""
+"""Relative residual of the pressures in a step. The remaining volume error enters the next step and
+does not accumulate: a tighter tolerance changed displacements by less than 1e-5, for up to four
+times the cost."""
 SOLVER_STEPS = 3000
 
 
 @kernel(nogil=True)
 def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
-    """Springs kick, nodal damping and pressure act at the end of the step, then u += dt v."""
+    """Explicit springs, implicit nodal damping and pressure, then u += dt v."""
     force, inertia = np.empty_like(u), np.empty(u.shape[0])
     at, pressure = empty_tangent(net), np.empty((6, net.cells.shape[0]))
     for n in range(factors.shape[0]):
         other_forces(law, net, u, force)
-        add_outer_forces(net.outer, factors[n], 0, force.T)
+        add_external_forces(net.external, factors[n], 0, force.T)
         for i in range(u.shape[0]):
             inertia[i] = net.mass[i] + dt * damping(net, u, i)
             for d in range(3):
@@ -58,7 +59,7 @@ def split_volume(law: Any, net: Network, factors: Floats, dt: float, u: Floats, 
         spread_pressure(net, at, pressure[0], inertia, -dt, force)
         v += force
         u += dt * v
-        stop_at_tools(net.outer, factors[n], dt, u.T, v.T)
+        apply_tool_contact(net.external, factors[n], dt, u.T, v.T)
 
 
 @kernel()
@@ -83,10 +84,10 @@ def solve_pressure(
     work: Floats,
     nodal: Floats,
 ) -> bool:
-    """Set work[0] to q (c,), the pressure over the root of kappa V; False if it was not found.
+    """Set work[0] to q (c,), the pressure over s = sqrt(kappa V); False without convergence.
 
-    In q the equation is (1 + s dt^2 G M^-1 G^T s) q = s (J - 1 + dt G v), with s the root of
-    kappa V: fit for kappa = 0 too. The first guess is the pressure of the volume as it is.
+    Scaled by s, the equation (1 + s dt^2 G M^-1 G^T s) q = s (J - 1 + dt G v) is regular for
+    kappa = 0 too. The start value is the pressure of the volume at the start of the step.
     """
     q, r, p = work[0], work[1], work[2]
     ap, diagonal, rates = work[3], work[4], work[5]
@@ -165,7 +166,7 @@ def set_rates(net: Network, at: Tangent, v: Floats, share: float, rates: Floats)
 
 @kernel()
 def set_diagonal(net: Network, at: Tangent, inertia: Floats, dt: float, out: Floats) -> None:
-    """Set out (c,) to the diagonal of what `multiply` multiplies with."""
+    """Set out (c,) to the diagonal of the matrix of `multiply`."""
     for c in range(net.cells.shape[0]):
         out[c] = 1.0
         for a in range(8):

@@ -1,4 +1,4 @@
-"""Springs of a cubic lattice, calibrated to Young's modulus whatever the mix of families.
+"""Springs of a cubic lattice, calibrated to Young's modulus for any mix of spring families.
 
 Structural springs run along cell edges, shear springs along face diagonals and, as a share, body
 diagonals, flexion springs from a node to its second neighbour along an axis. With
@@ -7,9 +7,10 @@ k_ref = 0.4 E h [N/m] and weights relative to it, the bulk lattice has
     C44 = (k_face + 4/3 k_body) / h = k_ref / h,    C12 = C44,    C11 = 3 C44,
 
 that is E = 2.5 k_ref / h and, as for every lattice of central springs, nu = 1/4 (Golec et al. 2020,
-doi 10.1007/s00371-019-01663-0). Each cell adds its share of its springs times its fill fraction, so
-boundary springs carry only what exists; and each flexion spring takes from the two structural
-springs under it exactly the stiffness it adds in uniform strain, at free surfaces too.
+doi 10.1007/s00371-019-01663-0). Each cell contributes its share of its springs times its fill
+fraction, so that boundary springs represent the existing tissue only. A flexion spring reduces the
+two structural springs under it by exactly the stiffness that it adds in uniform strain, also at
+free surfaces.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ LARGEST_BODY_SHARE = 0.9
 
 @dataclass(frozen=True)
 class Springs:
-    """Ends (s, 2), rest vectors [m] (s, 3) from the first end, stiffness relative to k_ref (s,)."""
+    """Ends (s, 2), rest vectors [m] (s, 3) from the first end, `weight` (s,): over k_ref."""
 
     ends: Ints
     rest: Floats
@@ -52,8 +53,8 @@ def connect(
 ) -> Springs:
     """Springs of the lattice.
 
-    `flexion`: share of the axial stiffness in flexion springs; `body_diagonals`: share of the shear
-    stiffness in body diagonals; `stiffness` (c,): of each cell relative to the others, 1 by
+    `flexion`: fraction of the axial stiffness in flexion springs; `body_diagonals`: fraction of the
+    shear stiffness in body diagonals; `stiffness` (c,): relative stiffness of each cell, 1 by
     default. ValueError outside [0, 1] and [0, LARGEST_BODY_SHARE].
     """
     filled = lattice.fill if stiffness is None else lattice.fill * stiffness
@@ -83,7 +84,7 @@ def connect(
 def _cell_springs(
     lattice: CellLattice, filled: Floats, changes: int, share: float
 ) -> tuple[Ints, Floats]:
-    """Springs between corners that differ in `changes` coordinates, shares of cells added up."""
+    """Springs between corners that differ in `changes` coordinates, summed over the cells."""
     pairs = np.array(
         [
             (a, b)
@@ -100,10 +101,10 @@ def _cell_springs(
 def _with_flexion(
     lattice: CellLattice, structural: tuple[Ints, Floats], flexion: float
 ) -> tuple[tuple[Ints, Floats], tuple[Ints, Floats]]:
-    """Structural springs relieved by the flexion springs over them, and those flexion springs.
+    """Structural springs reduced by the flexion springs over them, and those flexion springs.
 
     A flexion spring k_f of length 2 h stores 2 k_f h^2 strain^2, as does 2 k_f added to each of its
-    two edges; with k_f a quarter of the share of the weaker edge, no edge becomes negative.
+    two edges. With k_f a quarter of `flexion` times the weaker edge, no edge becomes negative.
     """
     ends, weight = structural
     axis = np.abs(lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]).argmax(axis=1)
@@ -121,7 +122,7 @@ def _with_flexion(
 
 
 def stiffness_matrix(springs: Springs, node_count: int, k_ref: float) -> csc_array:
-    """Stiffness [N/m] (3 n, 3 n) of the springs at rest, unknowns node by node."""
+    """Stiffness [N/m] (3 n, 3 n) of the springs at rest, degrees of freedom node by node."""
     direction = springs.rest / springs.rest_length[:, None]
     block = (k_ref * springs.weight)[:, None, None] * direction[:, :, None] * direction[:, None, :]
     i, j = springs.ends.T

@@ -1,18 +1,18 @@
-"""The critical step: how long a step may be before the motion grows without bound.
+"""The critical time step of a lattice, at rest and as it deforms.
 
 An explicit integrator is stable up to omega_max dt = `oscillation`, omega_max^2 the largest
-eigenvalue of M^-1 K(u), K the tangent stiffness at the state u. Nodal damping that is treated
-implicitly only lengthens the step, for symplectic Euler by sqrt(1 + zeta^2) + zeta; no use is made
-of that here. Explicit damping shortens it, as does the stiffness part beta K of Rayleigh's, whose
-dashpots never exceed beta times the stiffness along springs: by sqrt(1 + zeta^2) - zeta with
-zeta = beta omega_max / 2 the damping ratio that it gives the fastest mode.
+eigenvalue of M^-1 K(u), K the tangent stiffness at the displacement u. Implicit nodal damping only
+lengthens the critical step, for symplectic Euler by sqrt(1 + zeta^2) + zeta, which is not used
+here. Explicit damping shortens it. So does the stiffness part beta K of Rayleigh damping, whose
+dashpots never exceed beta times the axial stiffness of the springs: by sqrt(1 + zeta^2) - zeta,
+where zeta = beta omega_max / 2 is its damping ratio of the fastest mode.
 
-As the body deforms the limit moves. No Hookean spring becomes stiffer than at rest: along itself it
-keeps its stiffness; across, it resists less than that under tension, and pushes aside under
-compression, which makes the body buckle but not the step too long. Hence springs alone stay below
-their `frequency_bound` at rest, however deformed. They do exceed their largest frequency at rest
-where they are turned into line (by a third, deformed at random), and so do stretched cells and
-stiffening laws, without such a bound. `Follower` keeps up with them.
+The critical step changes with deformation. No Hookean spring becomes stiffer than at rest: its
+axial stiffness is constant, and its transverse stiffness is smaller under tension and negative
+under compression, which makes the body buckle but does not shorten the step. Hence springs alone
+stay below their `frequency_bound` at rest, however deformed. They exceed their largest frequency
+at rest where deformation aligns them (by a third, deformed at random). Stretched cells and
+stiffening laws exceed both. `CriticalStepTracker` updates the critical step during a run.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from msm.calibration import lame
 from msm.hanging import interpolate
 from msm.integrators import INTEGRATORS, Integrator
 from msm.laws import Law, stiffness_at_rest
-from msm.linearised import largest_turn, nodal_bounds
+from msm.linearised import largest_vector_change, nodal_bounds
 from msm.network import Network
 from msm.tangent import add_product, empty_tangent, linearise
 
@@ -36,57 +36,57 @@ Floats = NDArray[np.float64]
 
 DEFAULT = "symplectic-euler"
 
-SHARED = 0.17
-"""How much of the damping limit counts towards that of oscillation, where damping is explicit.
+DAMPING_WEIGHT = 0.17
+"""Weight of explicit damping in the combined limit of oscillation and damping.
 
 Runge-Kutta's region is not a rectangle: with 0.17 the ellipse (omega dt / 2.83)^2 +
 0.17 (c dt / m / 2.79)^2 = 1 stays inside it, by a scan of the roots of its polynomial.
 """
-SHARP = 1e-3
-"""Residual, relative to omega^2, at which a frequency is accepted."""
-RESOLVED = 3e-3
-"""Residual, relative to omega^2, at which one that is followed is accepted."""
+TOLERANCE = 1e-3
+"""Residual of the largest eigenvalue, relative to omega^2."""
+TRACKING_TOLERANCE = 3e-3
+"""The same in `CriticalStepTracker`."""
 GROWTH = 1.05
-"""Growth of the stiffness about any node after which the frequency is found anew."""
-RELIEF = 0.8
-"""Fall of the largest stiffness about a node after which it is found anew."""
-TURN = 0.1
-"""Change of a spring's vector over its length after which it is found anew."""
+"""Growth of a nodal stiffness bound after which the frequency is computed again."""
+DECREASE = 0.8
+"""Ratio of the largest nodal stiffness bounds below which it is computed again."""
+ALIGNMENT = 0.1
+"""Change of a spring vector over its rest length after which it is computed again."""
 LANCZOS_VECTORS = 8
 NOISE = 1.0
-"""Random motion in the start vector relative to the last mode, for modes at a new place."""
+"""Random part of the start vector relative to the last mode, which finds modes elsewhere."""
 
 
 def critical_time_step(assembly: Assembly, material: Material, integrator: str = DEFAULT) -> float:
-    """Largest stable step [s] of the lattice at rest.
+    """Critical time step [s] of the lattice at rest.
 
-    A stiffening law shortens it by the root of its largest stiffness over its initial one, and
-    large deformation further.
+    A stiffening law shortens it by up to the square root of its largest over its initial stiffness,
+    and large deformation further.
     """
     net = arrays(assembly, material)
     method = INTEGRATORS[integrator]
-    still = np.zeros_like(net.load)
+    zero = np.zeros_like(net.load)
     steepest = at_rest(material.law, bounding(net, method))
-    omega, _ = largest_frequency(material.law, steepest, still)
-    return longest_step(method, omega, damping_rate(net, still), net.beta)
+    omega, _ = largest_frequency(material.law, steepest, zero)
+    return longest_step(method, omega, damping_rate(net, zero), net.beta)
 
 
 def longest_step(method: Integrator, omega: float, rate: float, beta: float = 0.0) -> float:
     """Largest stable step [s] at frequencies up to omega [rad/s] and damping c / m = rate [1/s].
 
-    `beta` [s]: explicit damping over stiffness, of methods with an oscillation limit of 2.
+    `beta` [s]: stiffness-proportional damping, for methods with an oscillation limit of 2.
     """
-    pace, damped = omega / method.oscillation, rate / method.damping
-    slowest = max(float(np.hypot(pace, np.sqrt(SHARED) * damped)), damped)
+    oscillation, damped = omega / method.oscillation, rate / method.damping
+    inverse = max(float(np.hypot(oscillation, np.sqrt(DAMPING_WEIGHT) * damped)), damped)
     zeta = 0.5 * beta * omega
-    return (float(np.hypot(1.0, zeta)) - zeta) / slowest if slowest > 0.0 else float("inf")
+    return (float(np.hypot(1.0, zeta)) - zeta) / inverse if inverse > 0.0 else float("inf")
 
 
 def cell_bound(youngs_modulus: float, poisson_ratio: float, density: float, h: float) -> float:
     """Step [s] safe for symplectic Euler on an unsupported lattice at rest: h sqrt(rho / (3 K)).
 
-    E [Pa], rho [kg/m^3], h [m]; K the bulk modulus. A cell alone has no higher frequency, and no
-    assembly of cells has one above its highest cell. Fill fractions do not change it.
+    E [Pa], rho [kg/m^3], h [m]; K is the bulk modulus. No assembly of cells has a frequency above
+    the highest of its single cells. Fill fractions do not change the bound.
     """
     first, mu = lame(youngs_modulus, poisson_ratio)
     return float(h * np.sqrt(density / (3.0 * first + 2.0 * mu)))
@@ -111,23 +111,23 @@ def bounding(net: Network, method: Integrator) -> Network:
 
 
 def at_rest(law: Law, net: Network) -> Network:
-    """The network with every spring as stiff as on the steeper side of rest.
+    """The network with each spring as stiff as on the stiffer side of zero strain.
 
-    A law with a corner there has one slope towards stretching, which counts at no strain, and one
-    towards compression; the least motion feels both. The same network without a corner.
+    A law with a kink at zero strain has one slope in tension, which `stiffness` returns there, and
+    another in compression; the smallest motion meets both. Without a kink, the same network.
     """
     below, above = stiffness_at_rest(law)
     return net._replace(scale=net.scale * (below / above)) if below > above else net
 
 
 def largest_frequency(
-    law: Law, net: Network, u: Floats, start: Floats | None = None, tolerance: float = SHARP
+    law: Law, net: Network, u: Floats, start: Floats | None = None, tolerance: float = TOLERANCE
 ) -> tuple[float, Floats]:
     """Largest frequency [rad/s] of small motions about u [m] (n, 3), and its mode (3 n,).
 
-    Lanczos on M^-1/2 K M^-1/2 without the matrix, from `start` (3 n,), until the residual is
-    `tolerance` of omega^2, so from below by less than half of it where the mode is the highest one
-    that `start` has a part along. Zero if nothing resists.
+    Matrix-free Lanczos iteration on M^-1/2 K M^-1/2 from `start` (3 n,), to a residual of
+    `tolerance` times omega^2. The result is a lower bound, low by less than half of `tolerance`
+    unless `start` is orthogonal to the highest mode. Zero for a body without stiffness.
     """
     root = np.sqrt(net.mass)[:, None]
     free = np.ones_like(u)
@@ -153,32 +153,32 @@ def largest_frequency(
 
 
 def random_motion(size: int) -> Floats:
-    """A unit vector with a part along every mode, the same at each call."""
+    """A random unit vector, the same at each call."""
     noise = np.random.default_rng(0).standard_normal(size)
     return np.asarray(noise / np.linalg.norm(noise))
 
 
-class Follower:
-    """The critical step of one run, kept up with its deformation.
+class CriticalStepTracker:
+    """The critical step of one run, updated as the body deforms.
 
-    The frequency is found at some states. Since then it is taken to have grown by the root of the
-    largest growth of the stiffness about any node, and by half the largest `turn`: how far a
-    spring's vector has changed over its length, for springs turned into line add up. Beyond GROWTH
-    or TURN it is found anew, from the last mode and some noise. `found`: how often.
+    Between computations the largest frequency is extrapolated: it grows by the square root of the
+    largest growth of a nodal stiffness bound, and by half the largest relative change of a spring
+    vector, since aligned springs add up. Beyond GROWTH, DECREASE or ALIGNMENT it is computed again,
+    from the last mode and random noise. `updates`: number of computations.
     """
 
     def __init__(self, law: Law, net: Network, method: Integrator) -> None:
         self.law, self.net, self.method = law, bounding(net, method), method
         self.bounded = bool(np.isfinite(method.oscillation))
-        self.found = 0
+        self.updates = 0
         self.omega = 0.0
         self.bound = np.zeros(len(net.mass))
-        self.bound_then, self.then = self.bound, np.zeros_like(net.load)
+        self.last_bound, self.last_displacement = self.bound, np.zeros_like(net.load)
         self.noise = NOISE * random_motion(net.load.size)
         self.mode = self.noise
 
     def limit(self, u: Floats) -> float:
-        """Largest stable step [s] at the state u [m] (n, 3), which must be finite."""
+        """Critical step [s] at the displacement u [m] (n, 3), which must be finite."""
         rate = damping_rate(self.net, u)
         if not self.bounded:
             return longest_step(self.method, 0.0, rate)
@@ -186,20 +186,20 @@ class Follower:
         nodal_bounds(self.law, net, u, self.bound)
         return longest_step(self.method, self._frequency(net, u), rate, self.net.beta)
 
-    def stiffest(self) -> int:
-        """The node about which the network was stiffest when last looked at."""
+    def stiffest_node(self) -> int:
+        """The node with the largest stiffness bound at the last check."""
         return int(np.argmax(self.bound))  # NaN counts as largest
 
     def _frequency(self, net: Network, u: Floats) -> float:
-        """Carried on from where it was found last, or found anew."""
-        if self.found:
-            growth = float((self.bound / self.bound_then).max())
-            relief = float(self.bound.max() / self.bound_then.max())
-            turn = largest_turn(net, u, self.then)
-            if growth < GROWTH and relief > RELIEF and turn < TURN:
-                return float(self.omega * (np.sqrt(max(growth, 1.0)) + 0.5 * turn))
+        """Largest frequency [rad/s], extrapolated from the last computation or computed again."""
+        if self.updates:
+            growth = float((self.bound / self.last_bound).max())
+            decrease = float(self.bound.max() / self.last_bound.max())
+            change = largest_vector_change(net, u, self.last_displacement)
+            if growth < GROWTH and decrease > DECREASE and change < ALIGNMENT:
+                return float(self.omega * (np.sqrt(max(growth, 1.0)) + 0.5 * change))
         start = self.mode + self.noise
-        self.omega, self.mode = largest_frequency(self.law, net, u, start, RESOLVED)
-        self.bound_then, self.then = self.bound.copy(), u.copy()
-        self.found += 1
+        self.omega, self.mode = largest_frequency(self.law, net, u, start, TRACKING_TOLERANCE)
+        self.last_bound, self.last_displacement = self.bound.copy(), u.copy()
+        self.updates += 1
         return self.omega

@@ -27,6 +27,19 @@ def static_displacement(assembly: Assembly, material: Material) -> Floats:
     return extended(assembly, solved(stiffness, assembly.load.ravel())).reshape(-1, 3)
 
 
+def sag(assembly: Assembly, material: Material) -> Floats:
+    """Displacement [m] (n, 3) in equilibrium under gravity alone, linearised at rest.
+
+    It is zero if the given nodes are those under gravity. ValueError if the support does not hold
+    the lattice.
+    """
+    loads = assembly.external_loads
+    if loads is None or loads.given_loaded or not loads.dead.any():
+        return np.zeros_like(assembly.load)
+    stiffness = stiffness_at_rest(assembly, material)
+    return extended(assembly, solved(stiffness, loads.dead.ravel())).reshape(-1, 3)
+
+
 def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> Floats:
     """Displacement [m] (3 n,) under nodal forces [N] (3 n,), to a residual of `tolerance` of them.
 

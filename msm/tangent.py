@@ -1,7 +1,7 @@
-"""The tangent stiffness kept at one state, for solvers that multiply with it many times.
+"""Tangent stiffness stored at one displacement, for iterative solvers.
 
-What `msm.linearised` finds for a spring or a cell is stored here, so that a product needs neither
-roots nor divisions, and what can make the stiffness indefinite can be left out.
+The stiffness of each spring and cell (`msm.linearised`) is stored, so that a product needs neither
+square roots nor divisions, and terms that can make the tangent indefinite can be left out.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (
 
 
 class Tangent(NamedTuple):
-    """Springs and cells at a state.
+    """Tangent of springs and cells at a displacement.
 
-    Springs: `direction` (s, 3), stiffness `along` and `across` [N/m] (s,). Cells: `deformation` F
-    and its `cofactor` (c, 3, 3), `swelling` J - 1, less that at which the
-    cell is unstressed, and `pressure` kappa V times it [J] (c,).
+    Springs: `direction` (s, 3), axial stiffness `along` and transverse stiffness `across` [N/m]
+    (s,). Cells: `deformation` F and its `cofactor` (c, 3, 3); `swelling` (c,), J - 1 minus its
+    stress-free value; `pressure` [J] (c,), kappa V times the swelling.
     """
 
     direction: Floats
@@ -43,7 +43,7 @@ class Tangent(NamedTuple):
 
 @kernel()
 def empty_tangent(net: Network) -> Tangent:
-    """Arrays for the stiffness of a network."""
+    """Uninitialised arrays for the tangent of a lattice."""
     springs, cells = net.ends.shape[0], net.cells.shape[0]
     return Tangent(
         np.empty((springs, 3)),
@@ -58,7 +58,7 @@ def empty_tangent(net: Network) -> Tangent:
 
 @kernel()
 def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
-    """Set the stiffness at the displacement u [m] (n, 3)."""
+    """Set the tangent at the displacement u [m] (n, 3)."""
     for s in range(net.ends.shape[0]):
         x, y, z, at.along[s], at.across[s] = spring_state(law, net, u, s)
         at.direction[s, 0], at.direction[s, 1], at.direction[s, 2] = x, y, z
@@ -67,7 +67,7 @@ def linearise(law: Any, net: Network, u: Floats, at: Tangent) -> None:
 
 @inner_kernel()
 def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
-    """Set F, its cofactors, J - 1 less its unstressed value, and the pressure of each cell."""
+    """Set F, its cofactor matrix, the swelling and the pressure of each cell."""
     for c in range(net.cells.shape[0]):
         at.swelling[c] = deform(net, c, u, at.deformation[c], at.cofactor[c])
         at.pressure[c] = 0.0 if net.linear else net.bulk[c] * at.swelling[c]
@@ -75,13 +75,16 @@ def linearise_cells(net: Network, u: Floats, at: Tangent) -> None:
 
 @inner_kernel()
 def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
-    """Set F and its cofactors (3, 3) of a cell; J - 1. At rest, and div u, if the net is linear."""
+    """Set F and its cofactor matrix (3, 3) of a cell; return the swelling.
+
+    For a linear lattice these are F = 1 and div u.
+    """
     for d in range(3):
         f[d, 0], f[d, 1], f[d, 2] = gradient_of(net.cells[c], u, d, 0.25 / net.edges[c])
     swelling = f[0, 0] + f[1, 1] + f[2, 2]
     if net.linear:
         f[:] = 0.0
-    else:  # J - 1 without the difference of numbers near 1, as in `msm.forces`
+    else:  # J - 1 without cancellation, as in `msm.forces`
         around = f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1]
         swelling += f[0, 0] * (f[1, 1] + f[2, 2]) + (1.0 + f[0, 0]) * around
     for d in range(3):
@@ -95,10 +98,10 @@ def deform(net: Network, c: int, u: Floats, f: Floats, g: Floats) -> Any:
 
 @kernel()
 def make_definite(at: Tangent) -> None:
-    """Leave out what can make the stiffness indefinite.
+    """Drop the terms that can make the tangent indefinite.
 
-    A compressed spring pushes its ends sideways (T < 0 across it), and pressure turns with the
-    faces of its cell. What remains is a sum of squares.
+    These are the negative transverse stiffness of compressed springs, and the geometric stiffness
+    of pressures. The remaining quadratic form is a sum of squares.
     """
     for s in range(at.across.shape[0]):
         at.across[s] = max(at.across[s], 0.0)
@@ -107,7 +110,7 @@ def make_definite(at: Tangent) -> None:
 
 @kernel()
 def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
-    """Add `share` times the stiffness times p (n, 3), zero where a component is fixed."""
+    """Add `share` times the tangent times p (n, 3), with zeros at constrained components."""
     add_spring_product(net, at, p, share, out)
     add_cell_product(net, at, p, share, out)
     for i in range(p.shape[0]):
@@ -120,7 +123,7 @@ def add_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats)
 
 @inner_kernel()
 def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
-    """Add that of the springs."""
+    """Add the product of the springs."""
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
         nx, ny, nz = at.direction[s, 0], at.direction[s, 1], at.direction[s, 2]
@@ -138,7 +141,7 @@ def add_spring_product(net: Network, at: Tangent, p: Floats, share: float, out: 
 
 @inner_kernel()
 def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Floats) -> None:
-    """Add that of the cells."""
+    """Add the product of the cells."""
     for c in range(net.cells.shape[0]):
         to_gradient = 0.25 / net.edges[c]
         cell, f, g = net.cells[c], at.deformation[c], at.cofactor[c]
@@ -163,7 +166,7 @@ def add_cell_product(net: Network, at: Tangent, p: Floats, share: float, out: Fl
 
 @kernel()
 def add_diagonal(net: Network, at: Tangent, share: float, out: Floats) -> None:
-    """Add `share` times the diagonal (n, 3) of the stiffness made definite."""
+    """Add `share` times the diagonal (n, 3) of the tangent after `make_definite`."""
     for s in range(net.ends.shape[0]):
         across = max(at.across[s], 0.0)
         for d in range(3):

@@ -1,14 +1,14 @@
-"""Springs along the edges of a tetrahedral mesh: what most codes do, and less accurate.
+"""Springs along the edges of a tetrahedral mesh: common, and less accurate than a lattice.
 
 Each edge of length L gets k = E sum(V) / L^2, summed over the tetrahedra round it (Van Gelder 1998,
 J. Graph. Tools 3(2)). Uniform strain explains the constant. Each tetrahedron of volume V adds E V
-to k L^2 of six edges, so the springs have C_ijkl = 6 E <n_i n_j n_k n_l> over their directions n;
-evenly spread, these give C44 = C12 = 6 E / 15 = 0.4 E, the material of E and nu = 1/4.
+to k L^2 of six edges, so the springs have C_ijkl = 6 E <n_i n_j n_k n_l> over their directions n.
+Uniformly distributed directions give C44 = C12 = 6 E / 15 = 0.4 E, the material of E and nu = 1/4.
 
-A mesh falls short of that in one of two ways. If it repeats itself, its few directions are not
-evenly spread: it is anisotropic. If it does not, its nodes are no centres of symmetry: they give
-way under uniform strain, and the moduli are those that the irregularity of the mesh leaves.
-Refinement cures neither, and no stiffness does. The tests have the figures.
+No mesh attains that. A periodic mesh has few spring directions and is anisotropic. In an irregular
+mesh the nodes are no centres of symmetry: they relax under uniform strain, which reduces the moduli
+by an amount that depends on the mesh. Neither refinement nor another spring stiffness removes these
+errors. The tests quantify them.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 OUTSIDE = 1e-9
-"""A barycentric coordinate below minus this is outside, and not on a face up to rounding."""
+"""A point with a barycentric coordinate below minus this lies outside; above, on a face."""
 
 
 @dataclass(frozen=True)
 class TetrahedralLattice:
-    """A mesh as a lattice."""
+    """A tetrahedral mesh as a lattice."""
 
     mesh: TetrahedralMesh
 
@@ -61,9 +61,9 @@ class TetrahedralLattice:
         return mean_edge(self.mesh)
 
     def interpolation(self, points: Floats) -> tuple[csr_array, int]:
-        """Linear weights (q, n) at points [m] (q, 3), and how many lie outside all tetrahedra.
+        """Linear weights (q, n) at points [m] (q, 3), and the number outside all tetrahedra.
 
-        Those are extrapolated from one nearby, which keeps force and moment of a load.
+        At those a nearby tetrahedron is extrapolated, which preserves force and moment of a load.
         """
         tetrahedron, barycentric = locate(self.mesh, points)
         rows = np.repeat(np.arange(len(points)), 4)
@@ -73,7 +73,7 @@ class TetrahedralLattice:
         return csr_array((barycentric.ravel(), (rows, columns)), shape=shape), outside
 
     def inverted_cells(self, displacement: Floats) -> int:
-        """How many tetrahedra are turned inside out by a displacement [m] (n, 3)."""
+        """Number of tetrahedra that a displacement [m] (n, 3) inverts."""
         moved = TetrahedralMesh(self.mesh.points + displacement, self.mesh.tetrahedra)
         return int((volumes(moved) <= 0.0).sum())
 
@@ -88,7 +88,7 @@ def assemble(
 ) -> Assembly:
     """Springs on a mesh. ValueError if it is not held, or not touched by the tool.
 
-    `tissue`: what differs from place to place, if anything; `density` is that around.
+    `density` [kg/m^3] of the homogeneous tissue; `tissue` has its inclusions, if any.
     """
     lattice, made = TetrahedralLattice(mesh), of_tetrahedra(mesh, tissue)
     weights, _ = lattice.interpolation(surface.points)
@@ -105,9 +105,9 @@ def assemble(
 
 
 def connect(mesh: TetrahedralMesh, stiffness: Floats | None = None) -> Springs:
-    """One spring per edge, weights relative to the reference stiffness at the mean edge.
+    """One spring per edge, with weights relative to the reference stiffness of the mean edge.
 
-    `stiffness` (c,): of each tetrahedron relative to the others, 1 by default.
+    `stiffness` (c,): relative stiffness of each tetrahedron, 1 by default.
     """
     ends = edges(mesh.tetrahedra)
     rest = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
@@ -117,7 +117,7 @@ def connect(mesh: TetrahedralMesh, stiffness: Floats | None = None) -> Springs:
 
 
 def _round(mesh: TetrahedralMesh, ends: Ints, values: Floats) -> Floats:
-    """Sum of the values (c,) of the tetrahedra round each edge."""
+    """Sum of the values (c,) of the tetrahedra at each edge."""
     row_major = np.array([len(mesh.points), 1])
     pairs = np.sort(mesh.tetrahedra[:, EDGES], axis=2) @ row_major
     edge = np.searchsorted(ends @ row_major, pairs)
@@ -126,12 +126,12 @@ def _round(mesh: TetrahedralMesh, ends: Ints, values: Floats) -> Floats:
 
 
 def node_volumes(mesh: TetrahedralMesh) -> Floats:
-    """Volume [m^3] that each node stands for, a quarter of each tetrahedron; shape (n,)."""
+    """Volume [m^3] (n,) lumped at each node, a quarter of each tetrahedron."""
     return at_nodes(mesh, np.ones(len(mesh.tetrahedra)))
 
 
 def at_nodes(mesh: TetrahedralMesh, density: Floats) -> Floats:
-    """A quarter of a density (c,) times a tetrahedron's volume, of all at a node, shape (n,)."""
+    """Density (c,) times volume of the tetrahedra, lumped at the nodes, (n,)."""
     share = np.repeat(density * volumes(mesh) / 4.0, 4)
     count = len(mesh.points)
     return np.bincount(mesh.tetrahedra.ravel(), share, count).astype(np.float64)

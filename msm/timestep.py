@@ -1,4 +1,4 @@
-"""How the step of a run is chosen: it follows the limit, or it is given."""
+"""Choice of the time steps of a run: a fraction of the critical step, or prescribed."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 
 ROUNDING = 1e-9
-"""By how much of itself an interval may miss a whole number of steps."""
+"""Relative deviation of an interval from a whole number of steps that counts as rounding."""
 LOOK = 50
-"""Steps after which the limit is looked at."""
+"""Steps between two checks of the critical step."""
 ALLOWED = 0.95
-"""How much of the limit a step that follows it may take up before it is repeated shorter."""
+"""Fraction of the critical step above which a stretch of automatic steps is repeated shorter."""
 SHORTENINGS = 3
-"""How often a run that followed the limit and still went beyond all bounds halves its steps."""
+"""How often a run with automatic steps that still diverges halves its steps."""
 SHORTEST = 0.02
-"""Of the limit at rest: a body that needs shorter steps is lost."""
+"""Fraction of the critical step at rest below which the run counts as diverged."""
 
 
 class Automatic(NamedTuple):
-    """At most `fraction` of the critical step, which is followed as the body deforms.
+    """At most `fraction` of the critical step, which is updated as the body deforms.
 
-    Up to 1 excluded, a stretch in which the limit fell below the step is repeated with shorter
-    ones. From 1 on the run is left to diverge.
+    For fractions below 1, a stretch in which the critical step fell below the step is repeated with
+    shorter steps. For 1 and above, the run may diverge.
     """
 
     fraction: float = 0.8
 
 
 class Fixed(NamedTuple):
-    """A step [s] that is never changed; it must divide the sampling interval."""
+    """A constant step [s] that divides the sampling interval."""
 
     seconds: float
 
 
 class Rate(NamedTuple):
-    """Steps per second [Hz], raised to the next rate of which a sample takes whole steps."""
+    """Steps per second [Hz], raised to the next rate with whole steps in a sampling interval."""
 
     hertz: float
 
 
 class Counts(NamedTuple):
-    """Steps in each sampling interval (samples - 1,), such as twice those of an earlier run."""
+    """Number of steps in each sampling interval (samples - 1,), such as those of another run."""
 
     substeps: Ints
 
@@ -52,10 +52,10 @@ class Counts(NamedTuple):
 Step = Automatic | Fixed | Rate | Counts
 
 
-def planned(step: Step, interval: float, intervals: int) -> Ints | None:
-    """Steps in each interval of the given length [s], or None if the limit decides.
+def prescribed_steps(step: Step, interval: float, intervals: int) -> Ints | None:
+    """Steps in each interval of the given length [s]; None if the critical step decides.
 
-    ValueError if a step is not positive, does not divide the interval, or if counts are missing.
+    ValueError if a step is not positive or does not divide the interval, or if counts are missing.
     """
     if isinstance(step, Automatic):
         if not step.fraction > 0.0:
@@ -72,7 +72,7 @@ def planned(step: Step, interval: float, intervals: int) -> Ints | None:
         if not step.hertz > 0.0:
             raise ValueError(f"step.hertz must be positive, not {step.hertz:g}")
         return np.full(intervals, whole_steps(interval, 1.0 / step.hertz))
-    return np.full(intervals, _dividing(step.seconds, interval))
+    return np.full(intervals, _steps_dividing(step.seconds, interval))
 
 
 def whole_steps(interval: float, longest: float) -> int:
@@ -80,7 +80,7 @@ def whole_steps(interval: float, longest: float) -> int:
     return max(1, int(np.ceil(interval / longest * (1.0 - ROUNDING))))
 
 
-def _dividing(seconds: float, interval: float) -> int:
+def _steps_dividing(seconds: float, interval: float) -> int:
     if not seconds > 0.0:
         raise ValueError(f"step.seconds must be positive, not {seconds:g}")
     count = round(interval / seconds)
@@ -93,57 +93,61 @@ def _dividing(seconds: float, interval: float) -> int:
     return count
 
 
-class Pace:
-    """The steps of one run as it goes.
+class StepControl:
+    """Step-size control of one run.
 
-    `at_rest` [s]: the critical step at rest, `now` [s] where it was last looked at. `substeps`:
-    steps taken in each interval; `margin`: smallest ratio of the limit to a step that was kept.
+    `at_rest` [s]: critical step at rest; `current` [s]: critical step at the last check.
+    `substeps`: steps taken in each interval; `margin`: smallest ratio of the critical step to an
+    accepted step.
     """
 
     def __init__(self, step: Step, interval: float, intervals: int, at_rest: float) -> None:
         self.fraction = step.fraction if isinstance(step, Automatic) else 0.0
         self.repeats = 0.0 < self.fraction < 1.0
-        self.plan = planned(step, interval, intervals)
+        self.prescribed = prescribed_steps(step, interval, intervals)
         self.interval = interval
         self.substeps = np.zeros(intervals, dtype=np.int64)
-        self.now = self.at_rest = at_rest
+        self.current = self.at_rest = at_rest
         self.margin = float("inf")
         self.halvings = 0
 
     def choose(self, sample: int) -> int:
-        """Steps in the interval ahead; a tenth fewer than before are not worth the change."""
-        if self.plan is not None:
-            count = int(self.plan[sample])
+        """Number of steps in the next interval; kept where it would fall by a tenth at most."""
+        if self.prescribed is not None:
+            count = int(self.prescribed[sample])
         else:
-            count = whole_steps(self.interval, self.fraction * self.now)
+            count = whole_steps(self.interval, self.fraction * self.current)
             before = int(self.substeps[sample - 1]) if sample else 0
             count = before if 0.9 * before <= count <= before else count
         self.substeps[sample] = count
-        self.margin = min(self.margin, self.now * count / self.interval)
+        self.margin = min(self.margin, self.current * count / self.interval)
         return count
 
-    def is_due(self, sample: int, unseen: int) -> bool:
-        """Whether to look: every LOOK steps, also at the end of long intervals and of the run."""
-        long = self.substeps[sample] > LOOK or sample == len(self.substeps) - 1
-        return bool(long or unseen >= LOOK)
+    def is_check_due(self, sample: int, unchecked: int) -> bool:
+        """Whether the critical step must be checked: every LOOK steps, and at the end of the run.
 
-    def keeps_up(self, dt: float, limit: float) -> bool:
-        """Take in the limit [s]; False if the steps of dt [s] since the last look were too long."""
-        self.now = limit
-        longest = max(ALLOWED, self.fraction) * self.now * (1.0 + ROUNDING)
+        In intervals of more than LOOK steps, also at the end of each.
+        """
+        long = self.substeps[sample] > LOOK or sample == len(self.substeps) - 1
+        return bool(long or unchecked >= LOOK)
+
+    def accepts(self, dt: float, critical: float) -> bool:
+        """Update the critical step [s]; False if the steps of dt [s] since then were too long."""
+        self.current = critical
+        longest = max(ALLOWED, self.fraction) * self.current * (1.0 + ROUNDING)
         if self.repeats and (not dt <= longest or self._is_too_short()):
             return False
-        self.margin = min(self.margin, self.now / dt)
+        self.margin = min(self.margin, self.current / dt)
         return True
 
     def halve(self) -> None:
-        """Take half the steps from now on: with these the body went beyond all bounds."""
+        """Halve the steps from now on, after a divergence."""
         self.halvings += 1
         self.fraction *= 0.5
 
     def gives_up(self) -> bool:
-        """Whether shorter steps would not help, or are not wanted."""
+        """Whether to end the run as diverged, because shorter steps are excluded or do not help."""
         return not self.repeats or self._is_too_short() or self.halvings > SHORTENINGS
 
     def _is_too_short(self) -> bool:
-        return not self.now >= SHORTEST * self.at_rest
+        return not self.current >= SHORTEST * self.at_rest

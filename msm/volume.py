@@ -1,11 +1,11 @@
-"""The volume term: one energy per cell, which lifts Poisson's ratio off the springs' 1/4.
+"""Volume term: an energy per cell that gives a lattice Poisson ratios above the 1/4 of springs.
 
     W = 1/2 kappa V (J - 1)^2,   kappa = lambda - mu
 
 with J = det F of the mean deformation gradient of the cell, F = I + sum_a u_a B_a^T,
-B_a = (+-1, +-1, +-1) / (4 h). The springs carry mu and, being central, lambda = mu; the term adds
-the rest (after Golec et al. 2020, doi 10.1007/s00371-019-01663-0). One J per cell does not lock.
-Linearised, J - 1 is div u. A cell filled to phi counts with phi V.
+B_a = (+-1, +-1, +-1) / (4 h). The springs provide mu and, being central, lambda = mu; the term adds
+lambda - mu (after Golec et al. 2020, doi 10.1007/s00371-019-01663-0). A single J per cell avoids
+volumetric locking. Linearised, J - 1 is div u. A cell of fill fraction phi has volume phi V.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ Ints = NDArray[np.int64]
 
 
 ROUNDING = 1e-9
-"""Of kappa, the difference of two moduli."""
+"""Rounding of kappa, a difference of two moduli, relative to its largest value."""
 
 
 @dataclass(frozen=True)
 class VolumeTerm:
-    """Cells (c, 8), their kappa V [J] and edge [m], each (c,); no cells means no volume term.
+    """Cells (c, 8) with kappa V, `bulk` [J] (c,), and `edges` [m] (c,); without cells, no term.
 
-    `spacing` [m]: that of the lattice. `poisson_ratio`: of the material that the springs are with
-    it.
+    `spacing` [m] of the lattice; `poisson_ratio` of springs and volume term together.
     """
 
     cells: Ints
@@ -44,17 +43,17 @@ class VolumeTerm:
 
 
 def none(spacing: float) -> VolumeTerm:
-    """Springs alone."""
+    """No volume term."""
     return VolumeTerm(
         np.zeros((0, 8), dtype=np.int64), np.zeros(0), np.zeros(0), spacing, SPRING_POISSON_RATIO
     )
 
 
 def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: float) -> VolumeTerm:
-    """The term that makes the lattice's springs of modulus mu a material of E [Pa] and nu.
+    """The volume term of a lattice of Young's modulus E [Pa] and Poisson ratio nu.
 
     ValueError for a lattice that is not cubic, for a Poisson ratio below 1/4, where kappa is
-    negative and swelling gains energy, or above LARGEST_POISSON_RATIO.
+    negative and the energy not positive definite, or above LARGEST_POISSON_RATIO.
     """
     if not isinstance(lattice, CellLattice | GradedLattice):
         raise ValueError(  # noqa: TRY004 - a scene's choice, reported as such
@@ -75,9 +74,9 @@ def volume_term(lattice: LatticeMesh, youngs_modulus: float, poisson_ratio: floa
 def of_cells(
     lattice: CellLattice | GradedLattice, kappa: Floats, poisson_ratio: float
 ) -> VolumeTerm:
-    """The term of cells with a kappa [Pa] (c,) each, whose surrounding tissue has the given ratio.
+    """The volume term of cells with a kappa [Pa] (c,) each, in a tissue of the given Poisson ratio.
 
-    ValueError where kappa is negative, and swelling would gain energy.
+    ValueError where kappa is negative.
     """
     if kappa.min() < -ROUNDING * np.abs(kappa).max():
         raise ValueError(
@@ -95,7 +94,7 @@ def _why(poisson_ratio: float) -> str:
 
 
 def divergence(term: VolumeTerm, node_count: int) -> csr_array:
-    """Div u of each cell [1/m] from the nodal displacements, shape (c, 3 n)."""
+    """Matrix [1/m] (c, 3 n) from nodal displacements to div u of each cell."""
     slopes = (2.0 * CORNERS - 1.0) / (4.0 * term.edges[:, None, None])
     cells = len(term.cells)
     rows = np.repeat(np.arange(cells), 24)
@@ -104,7 +103,7 @@ def divergence(term: VolumeTerm, node_count: int) -> csr_array:
 
 
 def stiffness_matrix(term: VolumeTerm, node_count: int) -> csr_array:
-    """Stiffness [N/m] (3 n, 3 n) of the term at rest."""
+    """Stiffness [N/m] (3 n, 3 n) of the volume term at rest."""
     d = divergence(term, node_count)
     scaled = csr_array(d.multiply(term.bulk[:, None]))
     return csr_array(d.T @ scaled)

@@ -1,15 +1,15 @@
-"""Extended position-based dynamics, compiled: one sweep over the constraints in each small step.
+"""Extended position-based dynamics (XPBD), compiled: one sweep over the constraints per step.
 
-After Macklin et al. (2016; in small steps 2019, doi 10.1145/3309486.3340247). The nodes move on
-freely, then each spring, each cell and each node on the foundation in turn goes to where it would
-be, were it alone, at the end of a step of implicit Euler:
+After Macklin et al. (2016; in small steps 2019, doi 10.1145/3309486.3340247). The nodes move
+freely; then each spring, each cell and each node on the foundation in turn is moved to its
+position at the end of a step of implicit Euler with all others absent:
 
     C = length - rest length,  compliance 1 / (w k);   C = J - 1,  compliance 1 / (kappa V)
 
-No step was found at which a linear lattice is unstable. But the longer the step, the softer the
-material, at rest too, and most where it is stiffest: each part gives back only
-1 / (1 + (omega dt)^2) of its force, with omega its own frequency. Nodal damping counts as inertia
-m + dt c, as in implicit Euler. Linear springs only.
+No unstable step of a linear lattice was found. The material softens with the step, in statics too,
+and most in its stiffest parts: each constraint returns only 1 / (1 + (omega dt)^2) of its force,
+where omega is its own frequency. Nodal damping enters as inertia m + dt c, as in implicit Euler.
+Linear springs only.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msm.external_loads import add_external_forces
 from msm.forces import damping
 from msm.kernel import kernel
 from msm.laws import stiffness
 from msm.network import Network
-from msm.outer import add_outer_forces
 from msm.tangent import corner_slope, deform
 
 Floats = NDArray[np.float64]
@@ -31,17 +31,17 @@ Floats = NDArray[np.float64]
 
 @kernel(nogil=True)
 def xpbd(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Floats) -> None:
-    """Springs, cells and foundation in their order, once per step. Load at the end of the step."""
+    """One sweep over springs, cells and foundation per step; load at the end of the step."""
     inertia, before = np.empty(u.shape[0]), np.empty_like(u)
-    work, outer = np.empty((3, 8, 3)), np.empty_like(u)
+    work, external = np.empty((3, 8, 3)), np.empty_like(u)
     for n in range(factors.shape[0]):
-        before[:], outer[:] = u, 0.0
-        add_outer_forces(net.outer, factors[n], 0, outer.T)
+        before[:], external[:] = u, 0.0
+        add_external_forces(net.external, factors[n], 0, external.T)
         for i in range(u.shape[0]):
             inertia[i] = net.mass[i] + dt * damping(net, u, i)
             for d in range(3):
                 momentum = net.mass[i] * v[i, d] + dt * factors[n, 0] * net.load[i, d]
-                momentum += dt * outer[i, d]
+                momentum += dt * external[i, d]
                 u[i, d] += dt * momentum / inertia[i]
         project_springs(law, net, inertia, dt, u)
         project_cells(net, inertia, dt, u, work)
@@ -51,7 +51,7 @@ def xpbd(law: Any, net: Network, factors: Floats, dt: float, u: Floats, v: Float
 
 @kernel()
 def project_springs(law: Any, net: Network, inertia: Floats, dt: float, u: Floats) -> None:
-    """Bring the ends of each spring together or apart."""
+    """Project each spring."""
     k = stiffness(law, 0.0)
     for s in range(net.ends.shape[0]):
         i, j = net.ends[s, 0], net.ends[s, 1]
@@ -79,7 +79,7 @@ def project_springs(law: Any, net: Network, inertia: Floats, dt: float, u: Float
 
 @kernel()
 def project_cells(net: Network, inertia: Floats, dt: float, u: Floats, work: Floats) -> None:
-    """Move the corners of each cell along the gradient of its volume."""
+    """Project the volume constraint of each cell."""
     f, g, slope = work[0, :3], work[1, :3], work[2]
     for c in range(net.cells.shape[0]):
         swelling = deform(net, c, u, f, g)
@@ -96,7 +96,7 @@ def project_cells(net: Network, inertia: Floats, dt: float, u: Floats, work: Flo
 
 @kernel()
 def project_foundation(net: Network, inertia: Floats, dt: float, u: Floats) -> None:
-    """Let the foundation push each node in turn, its neighbours held."""
+    """Project the foundation at each node in turn, with its neighbours fixed."""
     for i in range(u.shape[0]):
         for d in range(3):
             hold, own = 0.0, 0.0

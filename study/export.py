@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.burden import burden_of
 from fem_reference.dynamics import Oscillator, hht, march
 from fem_reference.elasticity import Body
 from fem_reference.elements import chosen_element
@@ -20,6 +19,7 @@ from fem_reference.exchange import calculix
 from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from fem_reference.external_loads import external_loads
 from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.model import Method
 from fem_reference.solvers import solve_static
@@ -150,21 +150,23 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
     from fem_reference.exchange import vtu
 
     scene, (body, problem) = target.scene, _discretised(target, progress)
-    given = nodal_problem(body, scene.tissue, problem.foundation, burden_of(problem))
+    given = nodal_problem(body, scene.tissue, problem.foundation, external_loads(problem))
     with progress.stage("at rest under full load"):
         displacement = solve_static(body).reshape(-1, 3)
     _write(
         folder,
         {
             VTU: vtu.text(given, displacement),
-            MARK: _about_vtu(scene, given) + _burdened(problem, given) + _noted(scene, problem),
+            MARK: _about_vtu(scene, given)
+            + _external_loads_note(problem, given)
+            + _noted(scene, problem),
         },
     )
 
 
 def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
     scene, (body, problem) = target.scene, _discretised(target, progress, steps=True)
-    given = nodal_problem(body, scene.tissue, problem.foundation, burden_of(problem))
+    given = nodal_problem(body, scene.tissue, problem.foundation, external_loads(problem))
     motion = None if problem.weights else motion_of(scene, problem)
     files = calculix.files(given, motion)
     theirs = integrated(body, scene.tissue, given)
@@ -181,7 +183,7 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
         pairs = zip(moved, own_moved, strict=True)
         differences = (at_rest, max(_difference(u, v) for (_, u), (_, v) in pairs))
         about = _about_calculix(scene, given, motion, differences)
-    about += _burdened(problem, given, merged=given.is_merged) + _noted(scene, problem)
+    about += _external_loads_note(problem, given, merged=given.is_merged) + _noted(scene, problem)
     _write(folder, files | {MARK: about})
 
 
@@ -242,7 +244,7 @@ def motion_of(scene: Scene, problem: Problem) -> Transient:
     """The scene's steps and load history, from no load: a step load is a ramp over one step."""
     times = problem.observation.times
     stepping = Method("hht-alpha", scene.reference.steps_per_sample)
-    count = stepping.pace(problem.factors, times).steps(len(times) - 1)
+    count = stepping.time_steps(problem.factors, times).count(len(times) - 1)
     factors = problem.factors(np.linspace(0.0, times[-1], count + 1))
     factors[0] = 0.0
     damping = reference_of(scene).damping
@@ -353,7 +355,7 @@ displacement differs by {at_rest:.1e}, relative L2 over the nodes.
 """
 
 
-def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
+def _external_loads_note(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
     """What acts beside the first load, and in which files; empty if nothing does.
 
     `merged`: whether the files have all loads as one.
@@ -373,7 +375,7 @@ def _burdened(problem: Problem, given: NodalProblem, *, merged: bool = False) ->
         said.append("a motion starts from rest under it, counts from there, and has it left out")
     elif problem.gravity.any():
         said.append("the given shape is that under gravity: displacements count from it")
-    if given.hanging is not None:
+    if given.weight_forces is not None:
         said.append("weights hang as nodal forces (weights.inp, weights)")
     elif problem.weights:
         said.append("weights have mass alone, which rest does not show")

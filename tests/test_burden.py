@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msm import settled
-from msm.assembly import Assembly, burdened
+from msm import dead_load
+from msm.assembly import Assembly, with_external_loads
 from msm.integrators import INTEGRATORS
 from msm.stepper import LatticeStepper
 from study.models.lattice import requested_step
@@ -88,9 +88,9 @@ def test_the_unloaded_shape_loaded_again_is_the_given_one(volume_term):
 
 def test_a_missing_part_of_the_foundation_is_seen(monkeypatch):
     """Negative control: without what the support bears the body is not at rest as given."""
-    genuine = settled.unloaded
+    genuine = dead_load.unloaded_network
     monkeypatch.setattr(
-        "msm.stepper.unloaded", lambda law, net, dead: (genuine(law, net, dead)[0], dead)
+        "msm.stepper.unloaded_network", lambda law, net, dead: (genuine(law, net, dead)[0], dead)
     )
     _, found = moved("gravity.given=loaded", "support.stiffness=2 MPa/m")
     assert np.abs(found.trajectory.displacement).max() > 1e-5
@@ -157,20 +157,20 @@ def test_every_integrator_takes_a_second_load_as_if_it_were_the_first(integrator
 
 def test_a_body_that_nothing_holds_against_its_weight_is_refused():
     with pytest.raises(ValueError, match=r"gravity.*come to rest|come to rest"):
-        settled.sagged(*falling())
+        dead_load.rest_under_dead_load(*falling())
 
 
 def falling():
     made = prepared()
     stepper = stepper_of(made)
     net = stepper.net._replace(value=np.zeros_like(stepper.net.value))
-    return stepper.law, net, made.assembly.burden.dead
+    return stepper.law, net, made.assembly.external_loads.dead
 
 
 def test_a_load_beside_the_body_is_refused(small_posed):
     made = prepared()
     beside = replace(small_posed.tool, centre=np.array([1.0, 1.0, 1.0]))
     load = Load(beside, np.ones_like)
-    bare: Assembly = replace(made.assembly, burden=None)
+    bare: Assembly = replace(made.assembly, external_loads=None)
     with pytest.raises(ValueError, match="touches no surface"):
-        burdened(bare, made.problem.surface_rule, np.zeros(3), [load])
+        with_external_loads(bare, made.problem.surface_rule, np.zeros(3), [load])

@@ -12,14 +12,14 @@ from scipy.integrate import quad_vec
 from scipy.linalg import eigh, expm
 from scipy.sparse import csc_array
 
-from fem_reference import certified, definite
+from fem_reference import certified, stiffness_bound
 from fem_reference.certificate import Certificate, certificate, krylov_space, residual
 from fem_reference.certified import CertifiedMotion
-from fem_reference.definite import stiffness_floor
 from fem_reference.direct import factorised, pivots
 from fem_reference.elasticity import discretise
 from fem_reference.free_motion import decay, free_products
 from fem_reference.observation import evaluation
+from fem_reference.stiffness_bound import stiffness_lower_bound
 from fem_reference.subspace import (
     Subspace,
     modal_subspace,
@@ -300,7 +300,7 @@ def test_the_residual_of_a_krylov_space_has_one_direction_of_known_norm(bodies):
             return factors(np.concatenate([f, padding]))[:n]
 
         space = krylov_space(body, solve, 9)
-        found = residual(body, space, solve, stiffness_floor(body, squares[0]))
+        found = residual(body, space, solve, stiffness_lower_bound(body, squares[0]))
         V = space.vectors
         KV = np.column_stack([body.stiffness @ v for v in V.T])
         whole = body.mass @ V - KV @ np.linalg.inv(space.stiffness)
@@ -314,7 +314,7 @@ def test_a_floor_is_proven_below_all_eigenvalues(bodies):
     for one in bodies:
         lowest = one.modes[0][0]
         for tried in (lowest, 30.0 * lowest):  # the lowest modes may not move under the load
-            floor = stiffness_floor(one.body, tried)
+            floor = stiffness_lower_bound(one.body, tried)
             assert 0.2 * lowest < floor.eigenvalue < lowest
             K = one.modes[1] * np.sqrt(floor.diagonal)[:, None]
             assert np.linalg.norm(K / np.sqrt(one.modes[0]), 2) < 1.0
@@ -325,7 +325,7 @@ def test_pivots_count_the_eigenvalues_below_a_shift(bodies):
         squares, pressures = one.modes[0], one.body.unknowns - one.body.stiffness.size
         shift = 0.5 * (squares[4] + squares[5])
         nothing = np.zeros(one.body.stiffness.size)
-        found = pivots(definite._shifted(one.body, shift, nothing))
+        found = pivots(stiffness_bound._shifted(one.body, shift, nothing))
         assert found.in_place
         assert found.negative == 5 + pressures
         assert 0.0 < found.rounding < 1e-8  # far below the gap to the next eigenvalue
@@ -340,7 +340,7 @@ def test_a_body_that_nothing_holds_has_no_floor(bodies):
         ),
     )
     with pytest.raises(ValueError, match="nothing holds the body"):
-        stiffness_floor(loose, 1e-3)
+        stiffness_lower_bound(loose, 1e-3)
 
 
 DAMPINGS = [(0.0, 0.0), (0.3, 0.0), (40.0, 0.0), (0.0, 3e-3), (0.0, 0.8), (5.0, 1.0)]

@@ -17,7 +17,7 @@ from msm.explicit import symplectic_euler
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke
 from msm.model import (
-    FOLLOWED,
+    AUTOMATIC,
     Automatic,
     Counts,
     Fixed,
@@ -64,7 +64,7 @@ def watch(body, seconds=0.4):
     return Observation(times, nodes[[-1]], (SAMPLES // 2, SAMPLES - 1), nodes[:9], nodes[-9:])
 
 
-def go(case, step=FOLLOWED, **options):
+def go(case, step=AUTOMATIC, **options):
     body, material = case
     return run(body, material, ramp, watch(body), step, **options)
 
@@ -197,13 +197,13 @@ def test_all_that_changes_in_a_run_is_in_its_state(monkeypatch):
         seen["parts"], seen["before"] = parts, snapshot(parts)
         return parts
 
-    genuine = model._parts
-    monkeypatch.setattr(model, "_parts", lambda *things: watched(genuine(*things)))
+    genuine = model._mutable_parts
+    monkeypatch.setattr(model, "_mutable_parts", lambda *things: watched(genuine(*things)))
     monkeypatch.setattr(states, "write", lambda *_: None)
     go(press(), checkpoint=Checkpoint(None, seconds=1e9))
     changed = differences(seen["before"], snapshot(seen["parts"]))
     assert changed <= {(part, name) for part, names in states.CHANGING.items() for name in names}
-    assert {("pace", "now"), ("follower", "mode"), ("stepper", "u")} <= changed
+    assert {("steps", "current"), ("tracker", "mode"), ("stepper", "u")} <= changed
 
 
 def snapshot(parts):
@@ -219,7 +219,7 @@ def differences(before, after):
     return {key for key in after if not np.array_equal(before[key], after[key], equal_nan=True)}
 
 
-@pytest.mark.parametrize("left_out", ["pace.now", "follower.mode", "stepper.v"])
+@pytest.mark.parametrize("left_out", ["steps.current", "tracker.mode", "stepper.v"])
 def test_a_state_that_lacks_a_part_is_noticed_by_these_tests(
     pressed, left_out, tmp_path, monkeypatch
 ):
@@ -399,7 +399,7 @@ def test_a_lattice_that_is_stepped_goes_where_the_run_goes():
     for _ in range(200):
         stepper.take_step(1e-3)
     np.testing.assert_allclose(stepper.u[-1], found[20], rtol=1e-9)
-    looked = stepper.follower.limit(stepper.u)
+    looked = stepper.tracker.limit(stepper.u)
     assert looked < 0.9 * stepper.limit_at_rest  # its springs have stiffened
     stepper.restart()
     assert (stepper.t, np.abs(stepper.u).max(), np.abs(stepper.v).max()) == (0.0, 0.0, 0.0)
@@ -416,5 +416,5 @@ def test_a_stepper_looks_at_the_limit_as_often_as_a_run():
     seen = []
     for _ in range(2 * LOOK + 1):
         stepper.take_step(1e-3)
-        seen.append(stepper.unseen)
-    assert [step for step, unseen in enumerate(seen, 1) if unseen == 0] == [LOOK, 2 * LOOK]
+        seen.append(stepper.unchecked)
+    assert [step for step, unchecked in enumerate(seen, 1) if unchecked == 0] == [LOOK, 2 * LOOK]

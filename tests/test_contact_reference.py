@@ -9,12 +9,12 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from fem_reference import model as fem
-from fem_reference.burden import Burden, laden
 from fem_reference.contact.law import Areas, dragged, forces
 from fem_reference.contact.motion import Pressed, at_peak, run
 from fem_reference.contact.patch import patch
 from fem_reference.contact.reduction import answered, krylov, reduced
 from fem_reference.elasticity import discretise
+from fem_reference.external_loads import ExternalLoads, with_external_loads
 from study.known import pressed
 from study.known.pressed import DOWN
 from study.known.verification import indentation
@@ -223,7 +223,7 @@ def test_a_column_hangs_as_in_closed_form():
     tissue = Tissue(poisson_ratio=0.0)
     g, k, length = 9.81, 1e6, 0.06
     body = pressed.column(block_mesh((0.04, 0.04, length), 0.02), tissue, "p2", k, 0.0)
-    hung = laden(body, Burden(gravity=np.array([0.0, 0.0, g])))
+    hung = with_external_loads(body, ExternalLoads(gravity=np.array([0.0, 0.0, g])))
     found = fem.start_of(hung).reshape(-1, 3)
     z, weight = body.points[:, 2], tissue.density * g
     exact = weight * length / k + weight * (length * z - 0.5 * z**2) / tissue.youngs_modulus
@@ -232,13 +232,13 @@ def test_a_column_hangs_as_in_closed_form():
 
 def test_a_given_shape_under_gravity_stays_where_it_is():
     g = np.array([0.0, 0.0, -9.81])
-    assert laden(block(), Burden(gravity=g, given_loaded=True)).dead is None
+    assert with_external_loads(block(), ExternalLoads(gravity=g, given_loaded=True)).dead is None
 
 
 def test_weights_add_their_mass_and_hang_on_the_body():
     patch = ToolPatch(TOP, DOWN, 0.02, 1.0)
     bare, g = block(), np.array([0.0, 0.0, -9.81])
-    held = laden(bare, Burden(weights=(Weight(patch, 0.05),), gravity=g))
+    held = with_external_loads(bare, ExternalLoads(weights=(Weight(patch, 0.05),), gravity=g))
     assert (held.mass.sum() - bare.mass.sum()) / 3.0 == pytest.approx(0.05)
     whole = bare.mass.sum() / 3.0 + 0.05
     assert held.dead.reshape(-1, 3).sum(axis=0) == pytest.approx(whole * g)
@@ -255,7 +255,7 @@ def test_several_loads_move_a_body_as_each_of_them_does(method):
         ToolPatch(TOP, DOWN, 0.02, 0.1),
         "p2",
     )
-    both = laden(bare, Burden(loads=(other,)))
+    both = with_external_loads(bare, ExternalLoads(loads=(other,)))
 
     def histories(times):
         return np.column_stack([np.minimum(times / 0.1, 1.0), np.sin(10.0 * times)])
@@ -296,7 +296,7 @@ def test_gravity_moves_the_start_and_leaves_the_motion():
         ToolPatch(TOP, DOWN, 0.02, 0.1),
         "p2",
     )
-    hung = laden(bare, Burden(gravity=np.array([2.0, 0.0, -9.81])))
+    hung = with_external_loads(bare, ExternalLoads(gravity=np.array([2.0, 0.0, -9.81])))
     a, b = (fem.run(one, DAMPING, np.ones_like, seen).trajectory for one in (bare, hung))
     sag = b.displacement[0, 0]
     assert np.linalg.norm(sag) > 1e-4

@@ -220,6 +220,61 @@ def test_it_is_stepped_under_several_loads_as_it_is_run(two):
     assert apart(stepper.displacement()[used], found.surface_field[1]) < 0.02
 
 
+# --- gravity and weights --------------------------------------------------------------------------
+
+LEVEL = ("gravity.acceleration=0.05 m/s^2", "gravity.towards=right", "tool.force=0.5 mN")
+"""So little that all is linear, across the block."""
+HUNG = 'weight=[{mass="30 g", radius="10 mm", place={side="superior", at=[0.8, 0.5]}}]'
+
+
+def beside_elements(*overrides):
+    """The sum, and its elements by themselves, as displacement [m] (samples, probes, 3)."""
+    one = prepared(FEW, *overrides)
+    return (found.simulate().trajectory.displacement for found in (one, one.fine))
+
+
+@pytest.mark.parametrize("more", [(), (HUNG,)])
+def test_little_gravity_moves_it_as_the_elements_from_the_sag_on(more):
+    """The sag of both lattices cancels, and so does what weights do to the motion."""
+    own, linear = beside_elements(*LEVEL, *more)
+    assert size(linear[0]) > 0.3 * size(linear[-1])
+    assert apart(own[0], linear[0]) < 5e-3
+    assert apart(own - own[0], linear - linear[0]) < 5e-3
+
+
+def test_a_shape_given_loaded_starts_where_it_is_and_is_moved_by_its_prestress_too():
+    given = "tool.force=1 mN", "gravity.towards=inferior", "gravity.given=loaded"
+    own, linear = beside_elements(*given, "gravity.acceleration=9.81 m/s^2")
+    assert not own[0].any()
+    prestressed = apart(own, linear)  # the load is small, and what it meets is not
+    own, linear = beside_elements(*given, "gravity.acceleration=0.05 m/s^2")
+    assert prestressed > 2e-3 > 2.0 * apart(own, linear)
+
+
+def test_under_gravity_it_is_nearer_to_fine_lattice_and_elements_than_either_part():
+    heavy = FEW, "gravity.acceleration=9.81 m/s^2", "gravity.towards=right", "tool.force=0.5 N"
+    one, finer = prepared(*heavy), prepared(*heavy, spacing=0.005)
+    truth = finer.simulate().trajectory.displacement
+    own, linear, coarse = (
+        part.simulate().trajectory.displacement for part in (one, one.fine, one.coarse)
+    )
+    assert apart(own, truth) < 0.5 * apart(linear, truth)
+    assert apart(own, truth) < 0.2 * apart(coarse, truth)
+
+
+def test_it_is_stepped_from_its_sag_as_it_is_run():
+    heavy = "gravity.acceleration=9.81 m/s^2", "gravity.towards=right", "tool.force=0.3 N"
+    one = prepared(FEW, *heavy, HUNG, "lattice.time_step=0.5 ms")
+    found, stepper = one.simulate().trajectory, one.stepper()
+    mesh, seen = one.problem.geometry.mesh.points, one.problem.geometry.surface.points
+    used = [int(abs(mesh - point).sum(axis=1).argmin()) for point in seen]
+    for _ in range(2):
+        stepper.restart()
+        assert apart(stepper.displacement()[used], found.surface_field[0]) > 0.01
+        stepper.take_steps(600)
+        assert apart(stepper.displacement()[used], found.surface_field[1]) < 1e-5
+
+
 # --- what goes wrong -----------------------------------------------------------------------------
 
 

@@ -5,16 +5,17 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
-from fem_reference import small_motion
-from fem_reference.driven import Drive, solve_driven, solve_linear
+from fem_reference import natural_frequency
+from fem_reference.displacement_control import Loading, solve_linear
+from fem_reference.displacement_control import equilibrium_path as solve_driven
 from fem_reference.grid import curved, straight
 from fem_reference.laws import NeoHookean
 from fem_reference.mixed_strain import mixed_solid
-from msm import driven, volume
+from msm import displacement_control, volume
 from msm import lattice as cells
 from msm.calibration import lame, reference_stiffness
 from msm.damping import UNDAMPED
-from msm.driven import move_driven
+from msm.displacement_control import equilibrium_path
 from msm.laws import Hooke
 from msm.network import network
 from msm.springs import connect
@@ -61,7 +62,7 @@ def uniaxial(nu, stretch):
 def test_sliding_plates_take_the_closed_form(nu):
     solid = body(nu)
     prescribed, high = plates(solid.points, 0.3)
-    path = solve_driven(solid, Drive(prescribed, np.zeros(solid.size)))
+    path = solve_driven(solid, Loading(prescribed, np.zeros(solid.size)))
     (state,) = path.states
     lateral, stress = uniaxial(nu, 0.7)
     exact = solid.points * (np.array([lateral, lateral, 0.7]) - 1.0)
@@ -69,7 +70,7 @@ def test_sliding_plates_take_the_closed_form(nu):
     assert state.reaction[high, 2].sum() == pytest.approx(stress * EDGE**2, rel=1e-8)
     assert state.largest_strain == pytest.approx(abs(np.log(0.7)), rel=1e-8)
     # The linear law is far from it.
-    assert solve_linear(solid, Drive(prescribed, np.zeros(solid.size))).reaction[
+    assert solve_linear(solid, Loading(prescribed, np.zeros(solid.size))).reaction[
         high, 2
     ].sum() == pytest.approx(-0.3 * E * EDGE**2, rel=1e-8)
 
@@ -96,7 +97,7 @@ def test_patch_at_finite_strain(rng):
     x = solid.points
     inner = np.all((x > 1e-9) & (x < x.max(axis=0) - 1e-9), axis=1)
     prescribed = np.where(inner[:, None], np.nan, x @ (F - EYE).T)
-    (state,) = solve_driven(solid, Drive(prescribed, np.zeros(solid.size))).states
+    (state,) = solve_driven(solid, Loading(prescribed, np.zeros(solid.size))).states
     assert np.abs(state.displacement - x @ (F - EYE).T).max() < 1e-9 * EDGE
     first, mu = lame(E, 0.499)
     assert state.pressure == pytest.approx(first * np.log(np.linalg.det(F)), rel=1e-6)
@@ -110,7 +111,7 @@ def test_linear_answer_is_that_of_the_linear_reference(nu):
     own = solid(straight(distorted()), "taylor-hood", tissue(nu))
     x, load = mixed.points, mixed.weight(np.array([1.0, 0.0, -9.81]), 1000.0)
     prescribed = np.where(x[:, 2:] < 1e-9, 0.0, np.full_like(x, np.nan))
-    state = solve_linear(mixed, Drive(prescribed, load))
+    state = solve_linear(mixed, Loading(prescribed, load))
     expected = at_rest(own.stiffness, load, prescribed).reshape(-1, 3)
     assert np.abs(state.displacement - expected).max() < 1e-9 * np.abs(expected).max()
     # What holds it carries its weight.
@@ -121,23 +122,23 @@ def test_linear_answer_is_that_of_the_linear_reference(nu):
 def test_small_strain_is_the_limit_of_large():
     solid = body(0.499)
     prescribed, high = plates(solid.points, 1e-5, bonded=True)
-    drive = Drive(prescribed, np.zeros(solid.size))
-    (large,), small = solve_driven(solid, drive).states, solve_linear(solid, drive)
+    loading = Loading(prescribed, np.zeros(solid.size))
+    (large,), small = solve_driven(solid, loading).states, solve_linear(solid, loading)
     assert large.reaction[high, 2].sum() == pytest.approx(small.reaction[high, 2].sum(), rel=1e-4)
 
 
 def test_a_body_that_is_not_held_or_turned_inside_out_ends_declared():
     solid = body(0.499)
     prescribed, _ = plates(solid.points, 0.99, bonded=True)
-    path = solve_driven(solid, Drive(prescribed, np.zeros(solid.size)), (0.1, 1.0))
+    path = solve_driven(solid, Loading(prescribed, np.zeros(solid.size)), (0.1, 1.0))
     assert not path.converged
     assert len(path.states) == 1
     assert 0.1 <= path.reached < 1.0
     assert "times what is asked for" in path.failure
     with pytest.raises(ValueError, match="do not fit"):
-        solve_driven(solid, Drive(prescribed[1:], np.zeros(solid.size)))
+        solve_driven(solid, Loading(prescribed[1:], np.zeros(solid.size)))
     with pytest.raises(ValueError, match="not zero"):
-        solve_driven(solid, Drive(prescribed, np.zeros(solid.size)), (0.0,))
+        solve_driven(solid, Loading(prescribed, np.zeros(solid.size)), (0.0,))
     for nu in (0.0, -0.2):
         with pytest.raises(ValueError, match=r"tissue\.poisson_ratio"):
             mixed_solid(straight(block_mesh((EDGE,) * 3, EDGE)), Tissue(poisson_ratio=nu))
@@ -151,7 +152,7 @@ def test_a_slender_column_buckles_under_its_own_weight():
     prescribed = np.where(x[:, 2:] < 1e-9, 0.0, np.full_like(x, np.nan))
     greatest = 7.837 * E * side**4 / 12.0 / length**3
     weight = solid.weight(np.array([0.0, 0.0, -greatest / (1000.0 * side**2)]), 1000.0)
-    path = solve_driven(solid, Drive(prescribed, weight), (0.8, 1.2))
+    path = solve_driven(solid, Loading(prescribed, weight), (0.8, 1.2))
     assert np.abs(path.states[0].displacement[:, :2]).max() < 0.02 * length
     # Two cells of the elements more in width would come nearer; bent, it is followed no further.
     assert 0.95 < path.reached < 1.15
@@ -166,23 +167,25 @@ def test_a_rod_between_walls_vibrates_at_its_closed_form():
     solid = body(nu, size=0.01)
     prescribed = np.zeros_like(solid.points)
     prescribed[solid.points[:, 2] > 1e-9, 2] = np.nan
-    drive = Drive(prescribed, np.zeros(solid.size))
-    assert small_motion.lowest_frequency(solid, drive, rho) == pytest.approx(exact, rel=1e-3)
+    loading = Loading(prescribed, np.zeros(solid.size))
+    assert natural_frequency.lowest_frequency(solid, loading, rho) == pytest.approx(exact, rel=1e-3)
     # Stretched, it is stiffer or softer by the slope of its law there: lambda (1 - ln s) + mu
     # (s^2 + 1) over s^2, with the mass of the unloaded body.
     stretch = 1.2
     pulled = prescribed.copy()
     pulled[solid.points[:, 2] > length - 1e-9, 2] = (stretch - 1.0) * length
-    (state,) = solve_driven(solid, Drive(pulled, np.zeros(solid.size))).states
+    (state,) = solve_driven(solid, Loading(pulled, np.zeros(solid.size))).states
     slope = (first * (1.0 - np.log(stretch)) + mu * (stretch**2 + 1.0)) / stretch**2
-    found = small_motion.lowest_frequency(solid, drive, rho, state)
+    found = natural_frequency.lowest_frequency(solid, loading, rho, state)
     assert found == pytest.approx(np.sqrt(slope / rho) / (4.0 * length), rel=1e-3)
     nodes, law, net = lattice(nu, 0.005)
     volumes = np.prod(np.where((nodes < 1e-9) | (nodes > EDGE - 1e-9), 0.5, 1.0) * 0.005, axis=1)
     net = net._replace(mass=rho * volumes)
     prescribed = np.zeros_like(nodes)
     prescribed[nodes[:, 2] > 1e-9, 2] = np.nan
-    assert driven.lowest_frequency(law, net, prescribed) == pytest.approx(exact, rel=5e-3)
+    assert displacement_control.lowest_frequency(law, net, prescribed) == pytest.approx(
+        exact, rel=5e-3
+    )
 
 
 def test_the_cylinder_has_its_volume_and_converges():
@@ -198,7 +201,7 @@ def test_the_cylinder_has_its_volume_and_converges():
             prescribed[x[:, axis] < 1e-9, axis] = 0.0
         top = x[:, 2] > height - 1e-9
         prescribed[top] = [0.0, 0.0, -0.01 * height]
-        state = solve_linear(solid, Drive(prescribed, np.zeros(solid.size)))
+        state = solve_linear(solid, Loading(prescribed, np.zeros(solid.size)))
         forces.append(state.reaction[top, 2].sum())
     # An upper bound of the stiffness comes down as the mesh is refined.
     assert abs(forces[0]) > abs(forces[1]) > abs(forces[2])
@@ -225,7 +228,7 @@ def lattice(nu, spacing=0.01):
 def test_the_lattice_between_sliding_plates_has_its_modulus(nu):
     nodes, law, net = lattice(nu)
     prescribed, high = plates(nodes, 1e-6)
-    (rest,) = move_driven(law, net, prescribed).rests
+    (rest,) = equilibrium_path(law, net, prescribed).states
     assert rest.reaction[high, 2].sum() == pytest.approx(-1e-6 * E * EDGE**2, rel=1e-4)
     across = rest.displacement[:, 0].max() / EDGE
     assert across == pytest.approx(nu * 1e-6, rel=1e-4)
@@ -236,11 +239,11 @@ def test_forces_that_hold_the_lattice_are_the_slope_of_its_energy():
     nodes, law, net = lattice(0.499)
     prescribed, high = plates(nodes, 0.2, bonded=True)
     factors = tuple(np.linspace(0.0, 1.0, 21)[1:])
-    found = move_driven(law, net, prescribed, factors)
+    found = equilibrium_path(law, net, prescribed, factors)
     assert not found.failure
-    force = np.array([0.0, *(rest.reaction[high, 2].sum() for rest in found.rests)])
+    force = np.array([0.0, *(rest.reaction[high, 2].sum() for rest in found.states)])
     work = np.trapezoid(force, -0.2 * EDGE * np.array([0.0, *factors]))
-    last = found.rests[-1].displacement
+    last = found.states[-1].displacement
     stretch = np.linalg.norm(net.rest + last[net.ends[:, 1]] - last[net.ends[:, 0]], axis=1)
     energy = 0.5 * law.k * (net.scale / net.length) @ (stretch - net.length) ** 2
     F = np.einsum("cai,aj->cij", last[net.cells], (2 * cells.CORNERS - 1) / (4 * net.spacing)) + EYE
@@ -251,7 +254,7 @@ def test_forces_that_hold_the_lattice_are_the_slope_of_its_energy():
 def test_newtons_method_converges_quadratically_near_incompressibility():
     nodes, law, net = lattice(0.4999)
     prescribed, _ = plates(nodes, 0.1, bonded=True)
-    (rest,) = move_driven(law, net, prescribed).rests
+    (rest,) = equilibrium_path(law, net, prescribed).states
     assert len(rest.residuals) <= 7
     assert rest.residuals[-1] < 0.1 * rest.residuals[-2] ** 1.5 or rest.residuals[-1] < 1e-12
 
@@ -260,17 +263,17 @@ def test_a_lattice_that_gives_way_says_so():
     nodes, law, net = lattice(0.25)
     free = np.full_like(nodes, np.nan)
     loaded = net._replace(load=np.tile([0.0, 0.0, -1e-3], (len(nodes), 1)))
-    found = move_driven(law, loaded, free)
+    found = equilibrium_path(law, loaded, free)
     assert found.failure
     assert found.reached == 0.0
     prescribed, _ = plates(nodes, 0.999, bonded=True)
-    found = move_driven(law, net, prescribed, (0.1, 1.0))
+    found = equilibrium_path(law, net, prescribed, (0.1, 1.0))
     assert found.failure
-    assert len(found.rests) == 1
+    assert len(found.states) == 1
     with pytest.raises(ValueError, match="does not fit"):
-        move_driven(law, net, prescribed[1:])
+        equilibrium_path(law, net, prescribed[1:])
     with pytest.raises(ValueError, match="not zero"):
-        move_driven(law, net, prescribed, (0.0,))
+        equilibrium_path(law, net, prescribed, (0.0,))
 
 
 def test_a_wrong_volume_term_is_seen():
@@ -278,7 +281,7 @@ def test_a_wrong_volume_term_is_seen():
     nodes, law, net = lattice(0.45)
     wrong = replace_bulk(net)
     prescribed, high = plates(nodes, 1e-6)
-    (rest,) = move_driven(law, wrong, prescribed).rests
+    (rest,) = equilibrium_path(law, wrong, prescribed).states
     assert rest.reaction[high, 2].sum() != pytest.approx(-1e-6 * E * EDGE**2, rel=1e-3)
 
 

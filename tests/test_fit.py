@@ -136,7 +136,7 @@ def test_models_that_there_are_not_are_refused():
 def test_a_model_that_cannot_follow_the_scene_or_is_several_is_refused(model, overrides, message):
     scene = read_scene("block", (*SCENE, *overrides))
     column = "force_N" if overrides is MOVED else "displacement_m"
-    given = curve(TIMES, column=column)
+    given = curve(1e-3 * TIMES, column=column)
     with pytest.raises(ValueError, match=message):
         fit(scene, given, ["damping.ratio"], model, QUIET)
 
@@ -167,17 +167,25 @@ def write(path, header, rows):
 @pytest.mark.parametrize(
     ("header", "rows", "message"),
     [
-        ("time_s,displacement_m", ["0,0", "1,x", "2,1"], r"line 3: displacement_m: 'x'"),
-        ("time_s,displacement_m", ["0,0", "1,nan", "2,1"], r"line 3: displacement_m"),
-        ("time_s,displacement_m", ["0,0", "1", "2,1"], r"line 3: 1 cells"),
-        ("time_s,displacement_m", ["0,0", "1,1", "1,2"], r"line 4: time_s does not grow"),
-        ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r"line 5: time_s does not grow"),
-        ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r"displacement_m stands there tw"),
-        ("time_s,displacement_m", ["0,0"], r"give 3 or more"),
-        ("time_s,displacement_m,force_N", ["0,0,0"], r"give one of the columns"),
-        ("displacement_m", ["0", "1", "2"], r"time_s is missing"),
-        ("time_s,depth", ["0,0"], r"give one of the columns"),
-        ("time_s,displacement_m,uncertainty", ["0,0,1", "1,1,0", "2,2,1"], r"line 3: uncertainty"),
+        ("time_s,displacement_m", ["0,0", "1,x", "2,1"], r":3: displacement_m: 'x' is no number"),
+        ("time_s,displacement_m", ["0,0", "1,nan", "2,1"], r":3: displacement_m: 'nan'"),
+        ("time_s,displacement_m", ["0,0", "1,1_0", "2,1"], r":3: displacement_m: '1_0'"),
+        ("time_s,displacement_m", ["0,0", "1", "2,1"], r":3: 1 cells under 2 columns"),
+        ("time_s,displacement_m", ["0,0", "1,1", "1,2"], r":4: time_s does not grow"),
+        ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r":5: time_s does not grow"),
+        ("time_s,displacement_m", ["0,0", ",", "1,1"], r":3: time_s: the cell is empty"),
+        ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' stands there twice"),
+        ("time_s,displacement_m", ["0,0"], r":2: 1 lines of numbers; give 3 or more"),
+        ("time_s,displacement_m,force_N", ["0,0,0"], r":1: give one of the columns"),
+        ("displacement_m", ["0", "1", "2"], r":1: the column time_s is missing"),
+        ("time_s,depth", ["0,0"], r":1: column 'depth' is none of .* rename or remove it"),
+        ("time_s,displacement_m,uncertainty", ["0,0,1", "1,1,0", "2,2,1"], r":3: uncertainty must"),
+        # A name misspelt: its numbers would be left out, and the intervals with them.
+        ("time_s,force_N,uncertanty", ["0,0,1"] * 3, r":1: .* did you mean uncertainty\?"),
+        ("time_s,force_N,Uncertainty", ["0,0,1"] * 3, r":1: .* did you mean uncertainty\?"),
+        ("time_s,force_N,sigma", ["0,0,1"] * 3, r":1: column 'sigma' is none of"),
+        # Points would be decimal ones in one column, and of thousands in the next.
+        ("time_s;force_N", ["0,0;0", "0,5;1.500", "1,0;2"], r":3: force_N: '1.500' stands beside"),
     ],
 )
 def test_a_curve_that_is_none_is_refused_by_line(tmp_path, header, rows, message):
@@ -189,7 +197,8 @@ def test_a_curve_that_is_none_is_refused_by_line(tmp_path, header, rows, message
     "text",
     [
         "time_s;force_N\n0,0;0\n0,5;1,5e-3\n1,0;2\n",
-        "time_s\tforce_N\r\n0\t0\r\n0.5\t0,0015\r\n1\t2\r\n",
+        "time_s\tforce_N\r\n0\t0\r\n0,5\t0,0015\r\n1\t2\r\n",
+        "sep=;\r\ntime_s;force_N;\r\n0;0;\r\n0,5;0,0015;\r\n1;2;\r\n",
         "\ufeff\n time_s , force_N\n0,0\n\n0.5,1.5e-3\n1,2\n,\n",
     ],
 )
@@ -226,8 +235,21 @@ def test_markers_outside_of_the_organ_are_refused_by_line(posed, tmp_path):
         next(found)
 
 
+def test_displacements_longer_than_the_organ_are_refused_by_line(posed, tmp_path):
+    """Millimetres in a column of metres."""
+    scene, _, _ = posed
+    rows = ["0.03,0.03,0.02,0,0,0", "0.03,0.03,0.01,0,0,4", "0.03,0.03,0.04,0,0,0"]
+    markers = read_markers(write(tmp_path / "markers.csv", "x_m,y_m,z_m,ux_m,uy_m,uz_m", rows))
+    with pytest.raises(ValueError, match=r"markers.csv: line 3: a displacement of 4 m in an organ"):
+        next(user_scene.comparisons(scene, UserData({}, markers), QUIET))
+    curve = write(tmp_path / "c.csv", "time_s,displacement_m", ["0,0", "0.1,-4", "0.2,2"])
+    data = UserData({"c": read_curve(curve)}, None)
+    with pytest.raises(ValueError, match=r"displacement_m: line 3: a displacement of 4 m .* metr"):
+        next(user_scene.comparisons(scene, data, QUIET))
+
+
 def test_files_that_are_not_there_or_no_text_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="no such file"):
+    with pytest.raises(ValueError, match="No such file"):
         read_curve(tmp_path / "none.csv")
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ValueError, match="UTF-8"):
@@ -237,7 +259,7 @@ def test_files_that_are_not_there_or_no_text_are_refused(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match="holds no CSV"):
         user_scene.read_folder(tmp_path / "empty")
-    with pytest.raises(ValueError, match="x_m is missing"):
+    with pytest.raises(ValueError, match="column 'a' is none of x_m"):
         read_markers(write(tmp_path / "m.csv", "a,b", ["1,2"]))
 
 

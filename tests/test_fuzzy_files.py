@@ -749,7 +749,7 @@ def test_a_flawed_table_is_refused_with_file_and_line(table, tipper, tmp_path, f
 
 @pytest.mark.parametrize("text", ["", "\n\n", "service,food\n"])
 def test_a_table_without_readings_is_refused(table, tipper, text):
-    with pytest.raises(TableError, match=r"in\.csv: holds no readings"):
+    with pytest.raises(TableError, match=r"in\.csv: holds no numbers"):
         table(tipper, text)
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msm.settled import NoRestError
+from msm.dead_load import NoEquilibriumError
 from reports import organ_ranking as told
 from reports.ranking_study import FEWEST, movers
 from study.commands.flags import WorkerFlags
@@ -23,7 +23,9 @@ from study.robustness.organ_unknowns import PLACE, TABLE_II, OrganDraw, draws, u
 from study.robustness.unknowns import Placed, Sampled, groups
 from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.study import run_study
+from study.scene import Place
 from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 COARSE = 0.02
 SHORT = (
@@ -121,10 +123,54 @@ def test_a_draw_that_finds_no_rest_under_its_weight_counts_for_no_one(monkeypatc
     hung = organ.prepared(read_scene("block", HUNG))
 
     def lost(*_):
-        raise NoRestError("it falls", "hold it")
+        raise NoEquilibriumError("it falls", "hold it")
 
-    monkeypatch.setattr("msm.stepper.sagged", lost)
+    monkeypatch.setattr("msm.stepper.rest_under_dead_load", lost)
     assert np.isnan(scored(as_the_scene(hung), scene_problem(**scene_arguments(hung)))).all()
+
+
+WAY = (
+    *SHORT,
+    "tool.radius=15 mm",
+    "control_points={}",
+    'tool.path=[{time="0 s", offset=[0, 0, 0]}, {time="0.5 s", offset=["30 mm", 0, 0]}]',
+)
+
+
+@pytest.fixture(scope="module")
+def travelling():
+    """The block under a tool that travels, and one that does not."""
+    wanted = organ.prepared(read_scene("block", WAY))
+    beside = replace(wanted.tool, place=Place(side="superior", at=(0.2, 0.2)), path=())
+    return replace(wanted, further_tools=(beside,))
+
+
+def test_a_way_is_moved_as_a_scene_that_has_it_elsewhere(travelling):
+    """Stations of the drawn radius, from the drawn place on; other tools stay."""
+    problem = problem_of(travelling)
+    draw = as_the_scene(travelling, across=0.4, radius=1.4, force=0.5)
+    drawn = organ.as_drawn(travelling, draw)
+    found = organ._posed(draw, drawn, problem)
+    x, y, z = map(float, found.tool.centre)
+    moved = replace(drawn.tool, place=Place(point=(x, y, z)))
+    known = problem_of(replace(drawn, tool=moved))
+    assert np.linalg.norm(found.tool.centre - problem.tool.centre) == pytest.approx(0.4 * 0.015)
+    assert len(found.loads) == len(known.loads) < len(problem.loads)
+    times = np.linspace(0.0, 0.6, 61)
+    np.testing.assert_allclose(found.factors(times), known.factors(times), atol=1e-12)
+    for one, other in zip(found.loads, known.loads, strict=True):
+        np.testing.assert_allclose(one.tool.centre, other.tool.centre, atol=1e-9)
+        assert (one.tool.radius, one.tool.force) == (other.tool.radius, other.tool.force)
+    assert found.loads[-1].tool.radius == problem.loads[-1].tool.radius == 0.015
+
+
+def test_a_way_has_its_scores_and_one_that_leaves_the_surface_none():
+    wanted = organ.prepared(read_scene("block", WAY))
+    posed = scene_problem(**scene_arguments(wanted))
+    away = as_the_scene(wanted, across=0.5), as_the_scene(wanted, along=-3.0)
+    kept, lost = (scored(one, posed) for one in away)
+    assert np.isfinite(kept).all()
+    assert np.isnan(lost).all()
 
 
 def test_tools_that_are_moved_are_refused_with_the_reason():

@@ -129,7 +129,7 @@ def test_multigrid_gives_the_same_bits_each_time_and_leaves_the_generator_alone(
     first, again = (iterative(body, 1e-3)(body.load) for _ in range(2))
     assert first.tobytes() == again.tobytes()
     np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # noqa: NPY002
-    monkeypatch.setattr(multigrid, "_drawing_alike", nullcontext)  # negative control
+    monkeypatch.setattr(multigrid, "_seeded", nullcontext)  # negative control
     assert iterative(body, 1e-3)(body.load).tobytes() != first.tobytes()
 
 
@@ -157,7 +157,7 @@ def test_rounding_of_a_huge_answer_excuses_no_imbalance(monkeypatch):
     def runs_away(*_, **_options):
         return np.full(2, 1e17), 0
 
-    monkeypatch.setitem(module.STRICTER, runs_away, 1.0)
+    monkeypatch.setitem(module.TOLERANCE_FACTOR, runs_away, 1.0)
     with pytest.raises(ValueError, match="support"):
         module._refined(runs_away, free, np.asarray, np.array([1.0, 0.0]), 1e-10)
 

@@ -186,12 +186,14 @@ def test_a_region_throughout_is_what_the_plain_lattice_is(what):
         if one is not None:
             np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(whole.springs.weight, plain.springs.weight, rtol=1e-12)
-    assert (whole.burden is None) == (plain.burden is None)
-    if plain.burden is not None:
-        np.testing.assert_allclose(whole.burden.dead, plain.burden.dead, rtol=1e-12, atol=1e-18)
-        assert whole.burden.tools == plain.burden.tools
-        for name, has in (("attached", what == "weights"), ("loads", "loads" in what)):
-            one, other = getattr(plain.burden, name), getattr(whole.burden, name)
+    assert (whole.external_loads is None) == (plain.external_loads is None)
+    if plain.external_loads is not None:
+        np.testing.assert_allclose(
+            whole.external_loads.dead, plain.external_loads.dead, rtol=1e-12, atol=1e-18
+        )
+        assert whole.external_loads.tools == plain.external_loads.tools
+        for name, has in (("attached_mass", what == "weights"), ("loads", "loads" in what)):
+            one, other = getattr(plain.external_loads, name), getattr(whole.external_loads, name)
             assert one.any() == has
             np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-18)
 

@@ -478,7 +478,7 @@ def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
-    assert "this place of the load only" in said
+    assert "this place of the load, or its way, only" in said
     assert "MB kept while it steps" in said
     scene = read_scene(str(tmp_path / "block-10percent.toml"))
     assert scene.models[-1] in {"superposition", "corrected", "region"}

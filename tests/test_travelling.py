@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fem_reference.model import start_of
+from fem_reference.observation import at_points, evaluation
 from fem_reference.subspace import ritz_subspace
 from reports import field_figures
 from reports.page import data as page_data
@@ -18,7 +20,6 @@ from study.problem import tool_travel
 from study.problem.tool_travel import StationFactor, station_loads, stations
 from study.progress import Silent
 from study.results.folder import read, write
-from study.robustness import organ_request
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
@@ -186,7 +187,7 @@ def test_a_lattice_carries_the_whole_force(scene, problem):
     times = np.array([0.05, 0.22, 0.4])
     first, *others = problem.factors(times).T
     whole = first[:, None, None] * found.load + np.einsum(
-        "kt,knd->tnd", np.array(others), found.burden.loads
+        "kt,knd->tnd", np.array(others), found.external_loads.loads
     )
     expected = -scene.tool.history.factor(times) * scene.tool.force
     np.testing.assert_allclose(whole.sum(axis=1)[:, 2], expected, rtol=1e-9)
@@ -327,9 +328,23 @@ def _left(wanted, seen, spacing):
 
 
 def test_no_corrected_lattice_is_foretold_of_what_it_cannot_follow():
-    wanted, seen = looked("gravity.acceleration=9.81 m/s^2")
+    wanted, seen = looked("lattice.geometry=linear")
     assert seen.beyond is None
     assert not list(moved.corrected(wanted, seen))
+
+
+def test_what_is_foretold_of_elements_is_of_their_sag_too():
+    sagging = "gravity.acceleration=9.81 m/s^2", "gravity.towards=right"
+    wanted, seen = looked(*sagging)
+    assert list(moved.corrected(wanted, seen))
+    body = model(wanted, "fem").prepare(problem_of(wanted)).body()
+    finest = seen.elements.elements[-1]
+    assert finest.unknowns >= body.unknowns
+    sag = evaluation(body, seen.elements.problem.observation.probes)
+    _, light = looked()
+    added = finest.rest.probes - light.elements.elements[-1].rest.probes
+    known = at_points(sag, start_of(body))
+    assert np.linalg.norm(added - known) < 0.1 * np.linalg.norm(known)
 
 
 def test_rest_is_refused_of_a_tool_that_travels():
@@ -370,8 +385,3 @@ def test_contenders_are_those_that_follow(scene):
     found = contenders_of(scene)
     assert {"corrected", "corrected-graded", "region", "finite-elements", "springs"} <= set(found)
     assert "superposition" not in found
-
-
-def test_draws_of_a_patient_refuse_a_tool_that_travels(scene):
-    with pytest.raises(ValueError, match=r"robustness: .* travels; leave out its path"):
-        organ_request._refuse_moved(scene)

@@ -44,9 +44,11 @@ def test_the_tangent_is_the_derivative_of_what_does_not_balance(body, bare):
     z, way = (sizes * random.standard_normal(len(sizes)) for _ in range(2))
 
     def off(there):
-        return unloading._off(solid, load, bare.free, there, unloading._point(solid, there))
+        return unloading._residual(
+            solid, load, bare.free, there, unloading._point_values(solid, there)
+        )
 
-    tangent = unloading._tangent(solid, z, unloading._point(solid, z), bare.free)
+    tangent = unloading._tangent(solid, z, unloading._point_values(solid, z), bare.free)
     found = (off(z - 1e-4 * way) - off(z + 1e-4 * way)) / 2e-4
     assert np.abs(solid.volume_ratio(z) - 1.0).max() > 0.01
     for part in (slice(0, solid.size), slice(solid.size, None)):

@@ -73,8 +73,8 @@ def files(problem: NodalProblem, motion: Transient | None = None) -> dict[str, s
     """
     loads = (problem.full_load,) if problem.is_merged else problem.loads
     parts = dict(zip(load_files(problem), loads, strict=True))
-    if problem.hanging is not None:
-        parts[WEIGHTS] = problem.hanging
+    if problem.weight_forces is not None:
+        parts[WEIGHTS] = problem.weight_forces
     named = {
         "mesh.inp": _lines(_mesh(problem, motion)),
         "foundation.inp": _lines(_foundation(problem)),

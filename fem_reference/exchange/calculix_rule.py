@@ -43,5 +43,5 @@ def integrated(body: Body, tissue: Tissue, given: NodalProblem | None = None) ->
     dead = None
     if given is not None and given.gravity is not None:
         dead = mass.sum(axis=1) * np.tile(given.gravity, body.node_count)
-        dead += 0.0 if given.hanging is None else given.hanging.ravel()
+        dead += 0.0 if given.weight_forces is None else given.weight_forces.ravel()
     return replace(body, stiffness=stiffness, mass=mass, dead=dead)

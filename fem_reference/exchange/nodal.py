@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fem_reference.burden import Burden, hanging
 from fem_reference.elasticity import Body
+from fem_reference.external_loads import ExternalLoads, weight_forces
 from study.mesh.tetrahedra import FACES
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 DIRECTIONS = 3
-WEIGHTLESS = Burden()
+WEIGHTLESS = ExternalLoads()
 # Corners of an edge, and mid-side nodes of each face of FACES, by their place in an element.
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACE_EDGES = np.array([[5, 8, 9], [6, 7, 9], [4, 7, 8], [4, 5, 6]])
@@ -26,16 +26,16 @@ FACE_EDGES = np.array([[5, 8, 9], [6, 7, 9], [4, 7, 8], [4, 5, 6]])
 
 @dataclass(frozen=True)
 class NodalProblem:
-    """What another code needs to solve the body again.
+    """The problem in nodal quantities, for another code to solve.
 
     `nodes` [m] (n, 3), mid-side nodes where the element has them; `elements` (t, 4) or (t, 10),
     corners, then the middles of edges 01, 12, 02, 03, 13, 23, the order of C3D10 and of VTK;
     `load` [N] (n, 3), nodal forces at full load; `support` [N/m] (n, n), the foundation, which
     couples the nodes in each direction alike; `support_density` [Pa/m] (n,), its stiffness per
-    area, mean of the facets at a node. `others` [N] (n, 3) each: of further loads. `gravity`
-    [m/s^2] (3,) on the tissue and `hanging` [N] (n, 3), its forces on attached weights; None and
-    zero where the given shape is the one under gravity, from which displacements count. `full`
-    (loads,): share of each load at rest in full, None for all of each.
+    area, mean of the facets at a node. `others` [N] (n, 3) each: further loads. `gravity` [m/s^2]
+    (3,) on the tissue and `weight_forces` [N] (n, 3), its forces on attached weights; both None
+    where the given shape is the one under gravity. `full` (loads,): factor of each load in the
+    static problem, None for 1 each.
     """
 
     nodes: Floats
@@ -46,7 +46,7 @@ class NodalProblem:
     support_density: Floats
     others: tuple[Floats, ...] = ()
     gravity: Floats | None = None
-    hanging: Floats | None = None
+    weight_forces: Floats | None = None
     full: Floats | None = None
 
     @property
@@ -80,7 +80,7 @@ class NodalProblem:
 
 
 def nodal_problem(
-    body: Body, tissue: Tissue, foundation: Support, burden: Burden = WEIGHTLESS
+    body: Body, tissue: Tissue, foundation: Support, external: ExternalLoads = WEIGHTLESS
 ) -> NodalProblem:
     """The problem that a body is, as plain arrays.
 
@@ -100,16 +100,16 @@ def nodal_problem(
         csr_array(body.support[::DIRECTIONS, ::DIRECTIONS]),
         _density(body.points, elements, foundation),
         tuple(other.reshape(-1, DIRECTIONS) for other in body.others),
-        None if body.dead is None else burden.gravity,
-        _hanging(body, burden),
+        None if body.dead is None else external.gravity,
+        _weight_forces(body, external),
         body.full,
     )
 
 
-def _hanging(body: Body, burden: Burden) -> Floats | None:
-    if body.dead is None or not burden.weights:
+def _weight_forces(body: Body, external: ExternalLoads) -> Floats | None:
+    if body.dead is None or not external.weights:
         return None
-    return hanging(body, burden).reshape(-1, DIRECTIONS)
+    return weight_forces(body, external).reshape(-1, DIRECTIONS)
 
 
 def _density(nodes: Floats, elements: Ints, foundation: Support) -> Floats:

@@ -30,7 +30,7 @@ def text(problem: NodalProblem, displacement: Floats) -> str:
         "load": problem.load,
         "support_density": problem.support_density,
         **{f"load_{n}": forces for n, forces in enumerate(problem.others, 2)},
-        **({} if problem.hanging is None else {"weights": problem.hanging}),
+        **({} if problem.weight_forces is None else {"weights": problem.weight_forces}),
     }
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(_grid(problem, fields))

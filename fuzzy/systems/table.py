@@ -13,8 +13,8 @@ from fuzzy.systems.inference import Inferred, infer
 from fuzzy.systems.kinds import check_kind
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Array
-from fuzzy.systems.spreadsheet import Table, TableError, read_table, write_table
 from fuzzy.systems.system import FuzzySystem
+from study.spreadsheet import Table, TableError, decimal_commas, number, read_table, write_table
 
 VALUE = "estimate"
 BOUNDS = ("lower", "upper")
@@ -77,7 +77,7 @@ def evaluate_table(
             raise TableError(f"{table.file}: {_with_lines(str(error), part, system)}") from error
         answers[group.rows] = _columns(inferred)
         notes += [_with_lines(note, part, system) for note in inferred.notes]
-    point = "," if _decimal_commas(table, system) else "."
+    point = "," if decimal_commas(table, _input_columns(table, system)) else "."
     texts = ([repr(x).replace(".", point) for x in row] for row in answers.tolist())
     rows = (cells + answer for cells, answer in zip(table.rows, texts, strict=True))
     write_table(csv_out, [*table.header, *added], rows, table.delimiter)
@@ -154,13 +154,13 @@ def _readings(table: Table, system: FuzzySystem, *, blanks: bool) -> Array:
     """The columns of the inputs as numbers, shape (rows, inputs); NaN where blank, if allowed."""
     names = [name.strip() for name in table.header]
     columns = _input_columns(table, system)
-    commas = _decimal_commas(table, system)
+    commas = decimal_commas(table, columns)
     return np.array(
         [
             [
                 math.nan
                 if blanks and not cells[column].strip()
-                else _reading(cells[column], table, line, names[column], commas=commas)
+                else number(cells[column], table, line, names[column], commas=commas)
                 for column in columns
             ]
             for cells, line in zip(table.rows, table.lines, strict=True)
@@ -174,12 +174,6 @@ def _input_columns(table: Table, system: FuzzySystem) -> list[int]:
     return [_column(name, names, inputs, table) for name in inputs]
 
 
-def _decimal_commas(table: Table, system: FuzzySystem) -> bool:
-    """Whether readings are written with decimal commas, as where semicolons part the columns."""
-    columns = _input_columns(table, system)
-    return table.delimiter != "," and any("," in row[k] for row in table.rows for k in columns)
-
-
 def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int:
     if name.strip() in names:
         return names.index(name.strip())
@@ -189,24 +183,6 @@ def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int
     hint = f"; did you mean {folded[closest[0]]!r}? Rename it" if closest else "; add it"
     present = ", ".join(repr(one) for one in names)
     raise table.fault(table.header_line, f"no column {name!r} among {present}{hint}")
-
-
-def _reading(cell: str, table: Table, line: int, name: str, *, commas: bool) -> float:
-    if commas and "." in cell:
-        raise table.fault(
-            line, f"{name}: {cell!r} stands beside decimal commas; write it as the others"
-        )
-    try:
-        value = float(cell.replace(",", ".") if commas else cell)
-    except ValueError:
-        what = f"{cell!r} is no number" if cell.strip() else "the cell is empty"
-        remedy = "give a number or remove the row"
-        if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
-            remedy = "write a point, or part columns by semicolons for decimal commas"
-        raise table.fault(line, f"{name}: {what}; {remedy}") from None
-    if not math.isfinite(value) or "_" in cell:
-        raise table.fault(line, f"{name}: {cell!r} is no finite number; correct it")
-    return value
 
 
 def _with_lines(message: str, table: Table, system: FuzzySystem) -> str:

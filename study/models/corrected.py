@@ -83,9 +83,8 @@ class CorrectedLattice:
                 f"lattice.integrator: xpbd is softer the longer its step, and {self.name} needs a "
                 "lattice whose small motions are those of its stiffness; choose another"
             )
-        return PreparedCorrected(
-            self, problem, self.fine.prepare(problem), self.coarse.prepare(problem)
-        )
+        coarse = _weights_damped(self.coarse.prepare(problem))
+        return PreparedCorrected(self, problem, self.fine.prepare(problem), coarse)
 
 
 @dataclass(eq=False)
@@ -210,7 +209,7 @@ class PreparedCorrected:
         coarse = self.model.coarse
         spacing = FINER * coarse.spacing
         try:
-            other = coarse.varied(spacing=spacing).prepare(self.problem)
+            other = _weights_damped(coarse.varied(spacing=spacing).prepare(self.problem))
             remainder = PreparedRemainder(other, found.vectors)
             with progress.stage(f"{self.model.name}: {1e3 * spacing:.3g} mm") as advance:
                 compared = remainder.run(requested_step(other.model.lattice), advance).trajectory
@@ -299,6 +298,15 @@ def _springs(scene: Scene, mesh: LatticeMesh, *, damping: RayleighDamping) -> Sp
     return replace(made, material=replace(made.material, damping=damped))
 
 
+def _weights_damped(lattice: PreparedLattice) -> PreparedLattice:
+    """The lattice with attached weights damped as tissue, as in the elements and the modes."""
+    plain, loads = lattice.assembly, lattice.assembly.external_loads
+    if loads is None or not loads.attached_mass.any():
+        return lattice
+    damped = replace(loads, attached_mass=np.zeros_like(loads.attached_mass))
+    return replace(lattice, assembly=replace(plain, external_loads=damped))
+
+
 def assumptions(scene: Scene) -> list[str]:
     """On what the sum takes for granted."""
     coarse = _coarse(scene)
@@ -320,6 +328,13 @@ KIND = ModelKind(
     follows_law=True,
     any_load=False,
     supported_features=frozenset(
-        {"several-loads", "travelling-loads", "inclusions", "fixed-surfaces"}
+        {
+            "several-loads",
+            "travelling-loads",
+            "gravity",
+            "weights",
+            "inclusions",
+            "fixed-surfaces",
+        }
     ),
 )

@@ -70,6 +70,7 @@ class CoupledStepper:
         self.delivered: Floats | None = None
         self.elements = SubspaceMotion(shape.subspace, damping, factor, self.step)
         self.frame = Frame(self.elements, damping, self.every)
+        self.start = shape.start - shape.weights @ remainder.start
         below = np.asarray(shape.weights @ self.reduced.shapes.reshape(shape.weights.shape[1], -1))
         own = shape.subspace.vectors @ self.elements.modes
         shapes = np.hstack([own, -below.reshape(len(own), -1)])
@@ -113,7 +114,8 @@ class CoupledStepper:
             self._catch_up()
             coordinates = np.concatenate([self.elements.state[:, 0], self.linear.coordinates])
             linear = (self.shapes @ coordinates.astype(np.float32)).reshape(-1, 3)
-            self.delivered = linear + self.shape.weights @ self.lattice.displacement()
+            nonlinear = self.shape.weights @ self.lattice.displacement()
+            self.delivered = self.start + linear + nonlinear
         return self.delivered
 
     def restart(self) -> None:

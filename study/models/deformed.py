@@ -24,13 +24,15 @@ class Deformed:
     """The vertices of the finite elements' mesh, displaced by both parts.
 
     `weights` (v, n): of the coarse lattice's nodes at the vertices; `subspace`: that of the
-    elements, with its vectors (3 v, m) at the vertices only; `motion`: of the elements.
+    elements, with its vectors (3 v, m) at the vertices only; `motion`: of the elements, from
+    `start` [m] (v, 3), their displacement under gravity.
     """
 
     mesh: TetrahedralMesh
     weights: csr_array
     subspace: Subspace
     motion: Superposed
+    start: Floats
 
     @classmethod
     def of(cls, solved: MeshSolution, lattice: LatticeMesh) -> Deformed:
@@ -41,14 +43,16 @@ class Deformed:
         vertices = np.ascontiguousarray(among.vectors[: mesh.points.size])
         weights, _ = lattice.interpolation(mesh.points)
         own = Subspace(vertices, among.stiffness, among.load, among.others)
-        return cls(mesh, weights, own, found)
+        rest = solved.found.start
+        start = np.zeros_like(mesh.points) if rest is None else rest[: mesh.points.size]
+        return cls(mesh, weights, own, found, start.reshape(-1, 3))
 
     def state(self, sample: int, found: Remainder) -> tuple[Floats, Floats]:
         """Displacement [m] and velocity [m/s] (v, 3) at a sample."""
         own = self.motion.coordinates[sample], self.motion.rates[sample]
         linear = (np.asarray(self.subspace.vectors @ y).reshape(-1, 3) for y in own)
         u, v = (a + self.weights @ b for a, b in zip(linear, found.nodal[sample], strict=True))
-        return u, v
+        return self.start + u, v
 
     def inverted_cells(self, found: Remainder) -> int:
         """Largest number over the samples of inverted cells.

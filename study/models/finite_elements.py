@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.burden import burden_of, laden
 from fem_reference.contact.motion import run as in_contact
 from fem_reference.dynamics import ORDER, Oscillator, SteppedMotion
 from fem_reference.elasticity import Body, Loaded, bare, of_tissue
+from fem_reference.external_loads import external_loads, with_external_loads
 from fem_reference.grid import Projection
 from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
-from fem_reference.pace import Pace
 from fem_reference.solvers import solve_static
+from fem_reference.time_steps import TimeSteps
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.errors import (
@@ -156,7 +156,7 @@ class PreparedElements:
         loaded = self._looked_at[1] if self._looked_at and self._looked_at[0] is found else None
         self._looked_at = None  # releases its shape functions on the facets, which are large
         built = fem.build(found.mesh, *self._body_arguments(), method, loaded)
-        return laden(built, burden_of(self.problem))
+        return with_external_loads(built, external_loads(self.problem))
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion on one level, by the table's steps, those of the rate, or equal ones."""
@@ -261,9 +261,9 @@ class PreparedElements:
             return own and self._times < MOST_HALVED
         return self._pace().samples > 1
 
-    def _pace(self) -> Pace:
+    def _pace(self) -> TimeSteps:
         problem = self.problem
-        return self.model.method(self._times).pace(problem.factors, problem.observation.times)
+        return self.model.method(self._times).time_steps(problem.factors, problem.observation.times)
 
     def _solve(
         self, coarsest: MeshSolution, progress: Progress

@@ -39,4 +39,4 @@ class IndentedStepper:
                 motion.advance(LOOK, self.dt)
             self.dt, self.deepest = self.step(motion.limit()), motion.state()
         motion.put_back(self.deepest)
-        motion.t, motion.unseen = self.at, 0
+        motion.t, motion.unchecked = self.at, 0

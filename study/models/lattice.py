@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from msm import model as msm
 from msm import tetrahedra
-from msm.assembly import burdened
+from msm.assembly import with_external_loads
 from msm.graded import GradedLattice
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
@@ -173,7 +173,7 @@ def _loaded(problem: Problem, bare: Assembly) -> Assembly:
     """Add gravity, weights, further loads and rigid tools to a lattice."""
     surface, times = problem.geometry.surface, problem.observation.times
     points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
-    return burdened(
+    return with_external_loads(
         bare,
         problem.surface_rule,
         problem.gravity,

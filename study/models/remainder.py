@@ -5,6 +5,10 @@ same integrator. What the two have in common cancels: the error of the steps, of
 the surface, of the load spread over few nodes. What is left is small and smooth, so that a coarse
 lattice shows it: its error falls about with the spacing to the power ORDER, and a lattice
 of half the spacing tells how large it is.
+
+Under gravity both start at rest under it, each by its own forces, and what large displacements
+change of the sag is in the difference too. A shape that is given loaded is where both start; what
+its prestress does to a load is then of the nonlinear lattice alone.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from scipy.sparse import csr_array
 from msm import model as msm
 from msm.model import Step
 from msm.reduction import ReducedLattice, ReducedMotion, reduced, ritz_vectors
+from msm.statics import sag
 from study.models.lattice import PreparedLattice
 from study.problem.trajectory import Trajectory
 from study.progress import Advance
@@ -75,6 +80,11 @@ class PreparedRemainder:
         one = self.lattice
         return ritz_vectors(one.assembly, one.springs.material, self.count)
 
+    @cached_property
+    def start(self) -> Floats:
+        """Displacement [m] (n, 3) at which the linear lattice starts, at rest under gravity."""
+        return sag(self.lattice.assembly, self.lattice.springs.material)
+
     def linear(self, count: int | None = None) -> ReducedLattice:
         """The lattice linear about rest, among the first `count` vectors or all."""
         one = self.lattice
@@ -115,8 +125,8 @@ class PreparedRemainder:
     def _beyond_linear(self, found: msm.Run, nodal: NDArray[np.float32]) -> Remainder:
         linear = self.linear()
         moved = self._moved(linear, found.substeps)
-        for sample, both in zip(range(len(nodal)), zip(*moved, strict=True), strict=False):
-            nodal[sample] -= [linear.displacement(y) for y in both]
+        for sample, (y, rate) in zip(range(len(nodal)), zip(*moved, strict=True), strict=False):
+            nodal[sample] -= [self.start + linear.displacement(y), linear.displacement(rate)]
         trajectory = plus(found.trajectory, self._seen(linear, *moved), -1.0)
         truncation = self._truncation(linear, moved[0], found)
         return Remainder(trajectory, found, nodal, len(linear.squares), truncation)
@@ -135,14 +145,15 @@ class PreparedRemainder:
     def _seen(self, linear: ReducedLattice, y: Floats, rates: Floats) -> Trajectory:
         """The motion of the linear lattice as it is observed."""
         seen, lattice = self.lattice.problem.observation, self.lattice.assembly.lattice
-        probes = _at(lattice.interpolation(seen.probes)[0], linear)
-        frames = [linear.displacement(y[frame]) for frame in seen.frames]
+        at_probes, _ = lattice.interpolation(seen.probes)
+        probes = _at(at_probes, linear)
+        frames = [self.start + linear.displacement(y[frame]) for frame in seen.frames]
         volume, surface = (
             np.array([weights @ u for u in frames])
             for weights, _ in map(lattice.interpolation, (seen.volume_points, seen.surface_points))
         )
         u, v = (np.einsum("pdm,tm->tpd", probes, one) for one in (y, rates))
-        return Trajectory(u, v, volume, surface)
+        return Trajectory(at_probes @ self.start + u, v, volume, surface)
 
     def _truncation(self, linear: ReducedLattice, y: Floats, found: msm.Run) -> float:
         """Largest relative L2 change of a point's motion by the last quarter of the vectors."""

@@ -87,7 +87,7 @@ class MovedLook:
 class AtRest:
     """Elements, displacements [m] of control points (loads, p, 3) and over the organ (loads, q, 3).
 
-    Under each load by itself, in full.
+    Under each load by itself, in full, gravity among them.
     """
 
     look: ElementsLook
@@ -186,10 +186,11 @@ def _by_motion(measure: Measure, apart: Trajectory, whole: Trajectory) -> float:
 
 
 def _at_rest(level: int, size: float, prepared: PreparedElements) -> AtRest:
-    """Elements at rest under each load by itself, of one that travels at each of its stations."""
+    """Elements at rest under gravity and each load alone, of one that travels at each station."""
     started, body = time.perf_counter(), prepared.body()
     solve, seen = solver(body), prepared.problem.observation
-    rests = np.array([solve(load) for load in body.loads.T])
+    dead = () if body.dead is None else (body.dead,)
+    rests = np.array([solve(load) for load in (*body.loads.T, *dead)])
     wall = (time.perf_counter() - started) / len(rests)
     probes, field = (
         np.array([at_points(weights, u) for u in rests])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.liver.table1 import AETIOLOGIES
-from msm.settled import NoRestError
+from msm.dead_load import NoEquilibriumError
 from study.models.model import Simulation
 from study.models.table import models_of
 from study.problem.problem import Problem
@@ -23,6 +23,7 @@ from study.run.scene_problem import scene_problem
 from study.scene import Place, Scene
 from study.scene.place import resolve
 from study.scene.problem import problem_of
+from study.scene.travel import OffSurfaceError, travelling
 from study.similarity.batch import COLUMNS, scores
 from study.similarity.fields import norm, relative_l2
 from study.sweep.canonical import Plain
@@ -117,8 +118,8 @@ def _seen(problem: Problem) -> Problem:
 def evaluated(drawn: Sequence[OrganDraw], scene: Scene, problem: Problem) -> Block:
     """Estimates and scores of draws; NaN where a motion diverged or cells inverted.
 
-    Also where a body has no rest under its weight. Gravity, weights and further loads are those of
-    the scene in every draw.
+    Also where a body has no rest under its weight, or the path of a tool that travels leaves the
+    surface. Gravity, weights and further loads are those of the scene in every draw.
     """
     moduli = estimates(drawn)
     found = [
@@ -131,11 +132,11 @@ def evaluated(drawn: Sequence[OrganDraw], scene: Scene, problem: Problem) -> Blo
 def _scores(draw: OrganDraw, moduli: Mapping[str, float], scene: Scene, problem: Problem) -> Floats:
     """Scores (contenders, measures) of a draw."""
     drawn = as_drawn(replace(scene, patient=replace(scene.patient, **_patient(draw))), draw)
-    posed = _posed(draw, drawn, problem)
     models = models_of(drawn, {name: _estimate(name, e) for name, e in moduli.items()})
     try:
+        posed = _posed(draw, drawn, problem)
         found = {model.name: model.prepare(posed).simulate() for model in models}
-    except NoRestError:
+    except (NoEquilibriumError, OffSurfaceError):
         return np.tile(DIVERGED, (len(CONTENDERS), 1))
     truth = found.pop("basafa")
     named = {READING: found[READING]} | {name: found[f"msm-{name}"] for name in SYSTEMS}
@@ -153,22 +154,24 @@ def _estimate(system: str, modulus: float) -> StiffnessEstimate:
 
 def _posed(draw: OrganDraw, drawn: Scene, problem: Problem) -> Problem:
     """The problem with tool, support and tissue of a draw."""
-    tool, tissue = problem.tool, drawn.tissue
-    return replace(
+    own, tissue = drawn.tool, drawn.tissue
+    centre = _moved(draw, problem)
+    tool = replace(problem.tool, centre=centre, radius=own.radius, force=own.force)
+    posed = replace(
         problem,
         foundation=problem.foundation.scaled(draw.support),
-        tool=replace(
-            tool,
-            centre=_moved(draw, problem),
-            radius=drawn.tool.radius,
-            force=drawn.tool.force,
-        ),
+        tool=tool,
         tissue=replace(
             problem.tissue,
             youngs_modulus=tissue.youngs_modulus,
             poisson_ratio=tissue.poisson_ratio,
         ),
     )
+    if not own.travels:
+        return posed
+    first, *others = travelling(own, tool, problem.geometry.surface)
+    further = (load for load in problem.loads if load.tool.name != tool.name)
+    return replace(posed, tool=first.tool, factor=first.factor, loads=(*others, *further))
 
 
 def _moved(draw: OrganDraw, problem: Problem) -> Floats:

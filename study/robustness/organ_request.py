@@ -111,12 +111,7 @@ class OrganRequest:
 
 
 def _refuse_moved(scene: Scene) -> None:
-    """Raise ValueError for moved tools, whose force or place a draw cannot change."""
-    if "travelling-loads" in scene.features:
-        raise ValueError(
-            "robustness: a draw changes place and radius of a tool, and the scene has one that "
-            "travels; leave out its path, or use run"
-        )
+    """Raise ValueError for moved tools, whose force a draw cannot change."""
     if "moved-tools" in scene.features:
         raise ValueError(
             "robustness: a draw changes place and force of a blunt tool, and the scene has rigid "
@@ -199,7 +194,7 @@ def lines(found: Found, request: OrganRequest) -> list[str]:
     told = [f"{size} draws on lattices of about {1e3 * request.about:.3g} mm"]
     if draws.lost:
         told.append(
-            f"in {100 * draws.lost:.1f} % a motion diverged or cells turned inside out: they count "
-            "for no one"
+            f"in {100 * draws.lost:.1f} % a motion diverged, cells turned inside out or a way left "
+            "the surface: they count for no one"
         )
     return told

@@ -185,11 +185,11 @@ def _precision_contradictions(lattice: Lattice) -> Iterator[str]:
 
 
 def _undivided_samples(scene: Scene, seconds: float) -> Iterator[str]:
-    from msm.timestep import Fixed, planned
+    from msm.timestep import Fixed, prescribed_steps
 
     intervals = scene.time.samples - 1
     try:
-        planned(Fixed(seconds), scene.time.duration / intervals, intervals)
+        prescribed_steps(Fixed(seconds), scene.time.duration / intervals, intervals)
     except ValueError as error:
         message = str(error).removeprefix("step.seconds: ")
         yield f"lattice.time_step: {message.replace('give a rate', 'give lattice.step_rate')}"

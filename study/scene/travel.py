@@ -16,11 +16,15 @@ from study.scene.schema import Tool
 Floats = NDArray[np.float64]
 
 
+class OffSurfaceError(ValueError):
+    """A way that leaves the surface facing its tool."""
+
+
 def travelling(tool: Tool, patch: ToolPatch, surface: SurfaceMesh) -> tuple[Load, ...]:
     """A load at each station of a tool's path, the first one at its place.
 
-    ValueError naming the path where it leaves the surface, has no length across the push, or takes
-    too many stations.
+    ValueError naming the path where it leaves the surface, an OffSurfaceError, has no length across
+    the push, or takes too many stations.
     """
     offsets = np.array([point.offset or (0.0, 0.0, 0.0) for point in tool.path])
     across = offsets - np.outer(offsets @ patch.direction, patch.direction)
@@ -48,7 +52,7 @@ def _on_surface(patch: ToolPatch, away: Floats, reached: Floats, surface: Surfac
     for offset, time in zip(away, reached, strict=True):
         met = depths(patch.centre + offset, patch.direction, surface)
         if not met.size or np.abs(met - before).min() > patch.radius:
-            raise ValueError(
+            raise OffSurfaceError(
                 f"{patch.name}.path: leaves the surface that faces the tool, "
                 f"{1e3 * np.linalg.norm(offset):.3g} mm across from {patch.name}.place at "
                 f"{time:.3g} s; end it before, or move the place"

@@ -12,7 +12,7 @@ import numpy as np
 
 from msm.integrators import INTEGRATORS
 from msm.stability import DEFAULT
-from msm.stepper import STOPPED
+from msm.stepper import WITH_TOOL_CONTACT
 from study.models.model import Model
 from study.models.table import MODELS, kind, model
 from study.models.tissue import FRACTION, lacks_poisson_ratio
@@ -102,7 +102,7 @@ def _step_sizes(scene: Scene) -> Iterator[Settings]:
 def _integrators(scene: Scene) -> Iterator[Settings]:
     """Every other integrator by spacing and, where nothing limits the step, by step."""
     for name, method in INTEGRATORS.items():
-        if is_moved(scene) and name not in STOPPED:
+        if is_moved(scene) and name not in WITH_TOOL_CONTACT:
             continue
         for times in (2.0, 1.0) if name != DEFAULT else ():
             same = lattice_settings(scene, times, integrator=name)

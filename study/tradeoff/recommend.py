@@ -8,11 +8,11 @@ predicted error is small enough. A prediction includes the spread of the fit, th
 error and the error of the precision. The recommended configuration is then run and timed anew, and
 the next one is taken if it does not keep up after all.
 
-Where the place of the load is known beforehand, models that depend on it are candidates too: Ritz
-vectors, graded lattices, and lattices of either kind corrected by finite elements. There are few of
-them, and the predicted error of each is that of a run of it, or the reference's own error if that
-is larger. All are then compared with the reference with large displacements,
-`study.tradeoff.large_displacements`.
+Where the place of the load, or its path, is known beforehand, models that depend on it are
+candidates too: Ritz vectors of a single load, graded lattices, and lattices of either kind
+corrected by finite elements. There are few of them, and the predicted error of each is that of a
+run of it, or the reference's own error if that is larger. All are then compared with the reference
+with large displacements, `study.tradeoff.large_displacements`.
 
 Under moved tools the criterion is the error of their force over time. Against the finest lattice of
 the same springs every spacing is run, since contact errors vary irregularly with the placement of
@@ -38,7 +38,7 @@ from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.tradeoff import study
 from study.tradeoff.comparison import Comparison
-from study.tradeoff.contenders import Configuration, fraction, may_be_single
+from study.tradeoff.contenders import Configuration, contender, fraction, may_be_single
 from study.tradeoff.demand import Demand
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.large_displacements import with_large_displacements
@@ -288,14 +288,16 @@ def _followed(
 ) -> Followers:
     """Their elements on the mesh of the scene that is judged by.
 
-    Without runs that tell what geometry changes, those of small displacements are left out.
+    Without runs that show the effect of large displacements, models of small displacements are left
+    out. So are the linear elements alone where `superposition` does not support the scene: they are
+    no contender there.
     """
     chosen = list(bound(given.scene))
     _, outcomes = study.judged(given.scene, chosen, store, backend)
     graded = [k for k, one in enumerate(chosen) if one.contender == "corrected-graded"]
     near, far = outcomes[graded[0]], outcomes[graded[-1]]
     whole = with_large_displacements(known, outcomes[0], near, far, given)
-    first = 0 if whole is not None else 1
+    first = 0 if whole is not None and chosen[0].contender == "superposition" else 1
     return Followers(tuple(chosen[first:]), tuple(outcomes[first:]), whole or known)
 
 
@@ -314,8 +316,14 @@ def _bound(
 
 
 def bound(scene: Scene) -> Iterator[Configuration]:
-    """Models that depend on the place of the load: a subspace, graded and corrected lattices."""
-    yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
+    """Models that depend on the place of the load, or its path: graded and corrected lattices.
+
+    First linear elements alone: a subspace, or as many vectors as several loads need.
+    """
+    if contender("superposition").lacks(scene):
+        yield Configuration("fem", {"method": "ritz-vectors", "level": 0})
+    else:
+        yield Configuration("superposition", {"vectors": "ritz", "count": VECTORS, "level": 0})
     step = {"step_fraction": FRACTION}
     for times in BESIDE:
         h = tidy(times * scene.lattice.spacing)
@@ -424,8 +432,8 @@ def lines(found: Recommended) -> list[str]:
         text.append(f"{_in_mb(one.cost.memory)} kept while it steps, on top of the program's")
     if not one.configuration.any_load:
         text.append(
-            "It follows this place of the load only. The error is that against linear elements "
-            "and what corrected lattices add to them."
+            "It follows this place of the load, or its way, only. The error is that against linear "
+            "elements and what corrected lattices add to them."
         )
     text.append(
         "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "

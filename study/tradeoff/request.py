@@ -11,7 +11,6 @@ import numpy as np
 
 from study.folders import check_file, write_text
 from study.models.table import model
-from study.problem.features import BESIDE_ONE_LOAD, FEATURES
 from study.problem.problem import Problem
 from study.progress import Progress
 from study.run.preparation import prepare_models
@@ -162,12 +161,11 @@ def advise(
 
 
 def _refuse_demand(scene: Scene, absolute: float | None, *, known_place: bool) -> None:
-    """Raise ValueError for demands that are undefined for more than one load of given force."""
-    beside = [FEATURES[name] for name in BESIDE_ONE_LOAD if name in scene.features]
-    if known_place and beside:
+    """Raise ValueError for demands that are undefined for tools that are moved."""
+    if known_place and is_moved(scene):
         raise ValueError(
-            f"--known-place: what follows one place of a load only cannot follow "
-            f"{' and '.join(beside)}; leave it out"
+            "--known-place: what follows one place is made of the vectors of a load of a given "
+            "force, and the force of a tool that is moved is a result; leave it out"
         )
     if absolute is not None and is_moved(scene):
         raise ValueError(

@@ -17,13 +17,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
-from fem_reference import small_motion
-from fem_reference.driven import Drive, DrivenState, solve_driven, solve_linear
+from fem_reference import natural_frequency
+from fem_reference.displacement_control import (
+    EquilibriumState,
+    Loading,
+    equilibrium_path,
+    solve_linear,
+)
 from fem_reference.elasticity import Outline
 from fem_reference.grid import curved, straight
 from fem_reference.mixed_strain import MixedSolid, mixed_solid
 from fem_reference.observation import evaluation
-from msm import driven
+from msm import displacement_control
 from msm import lattice as cells
 from msm.calibration import SPRING_POISSON_RATIO, reference_stiffness
 from msm.damping import UNDAMPED
@@ -63,8 +68,8 @@ def neo_hookean(
     specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
 ) -> Prediction:
     """Finite elements at large strain."""
-    solid, drive, watched = _elements(specimen, level, modulus)
-    path = solve_driven(solid, drive, factors)
+    solid, loading, watched = _elements(specimen, level, modulus)
+    path = equilibrium_path(solid, loading, factors)
     return _prediction(specimen, solid, watched, path.states, path.failure)
 
 
@@ -72,8 +77,8 @@ def linear(
     specimen: Specimen, level: int, modulus: float, factors: tuple[float, ...]
 ) -> Prediction:
     """Finite elements of linear elasticity: one solution, scaled."""
-    solid, drive, watched = _elements(specimen, level, modulus)
-    whole = _prediction(specimen, solid, watched, (solve_linear(solid, drive),), "")
+    solid, loading, watched = _elements(specimen, level, modulus)
+    whole = _prediction(specimen, solid, watched, (solve_linear(solid, loading),), "")
     share = np.array(factors)
     return Prediction(
         share,
@@ -85,22 +90,22 @@ def linear(
 
 def neo_hookean_frequency(specimen: Specimen, level: int, modulus: float) -> float:
     """Frequency [Hz] of small vibrations about the loaded rest; nan if there is no rest."""
-    solid, drive, _ = _elements(specimen, level, modulus)
-    path = solve_driven(solid, drive)
+    solid, loading, _ = _elements(specimen, level, modulus)
+    path = equilibrium_path(solid, loading)
     if not path.converged:
         return float("nan")
-    return small_motion.lowest_frequency(solid, drive, specimen.density, path.states[-1])
+    return natural_frequency.lowest_frequency(solid, loading, specimen.density, path.states[-1])
 
 
 def linear_frequency(specimen: Specimen, level: int, modulus: float) -> float:
     """Frequency [Hz] of vibrations of linear elasticity, which does not depend on the rest."""
-    solid, drive, _ = _elements(specimen, level, modulus)
-    return small_motion.lowest_frequency(solid, drive, specimen.density)
+    solid, loading, _ = _elements(specimen, level, modulus)
+    return natural_frequency.lowest_frequency(solid, loading, specimen.density)
 
 
 def _elements(
     specimen: Specimen, level: int, modulus: float
-) -> tuple[MixedSolid, Drive, csr_array]:
+) -> tuple[MixedSolid, Loading, csr_array]:
     chosen = specimen.meshes[level]
     mesh, project = chosen.mesh(), chosen.project
     grid = straight(mesh) if project is None else curved(mesh, project)
@@ -110,7 +115,7 @@ def _elements(
     if len(specimen.at):
         load += (evaluation(outline, specimen.at).T @ specimen.forces).ravel()
     watched = evaluation(outline, specimen.watched) if len(specimen.watched) else _nothing(solid)
-    return solid, Drive(specimen.prescribed(solid.points), load), watched
+    return solid, Loading(specimen.prescribed(solid.points), load), watched
 
 
 def _nothing(solid: MixedSolid) -> csr_array:
@@ -121,7 +126,7 @@ def _prediction(
     specimen: Specimen,
     solid: MixedSolid,
     watched: csr_array,
-    states: tuple[DrivenState, ...],
+    states: tuple[EquilibriumState, ...],
     failure: str,
 ) -> Prediction:
     face, axis = specimen.face(solid.points), specimen.along[0]
@@ -185,14 +190,16 @@ def of_lattice(
     """Rest states of a lattice."""
     chosen = make(specimen, level, modulus)
     lattice, net = _network(specimen, level, chosen)
-    found = driven.move_driven(chosen.law, net, specimen.prescribed(lattice.nodes), factors)
+    found = displacement_control.equilibrium_path(
+        chosen.law, net, specimen.prescribed(lattice.nodes), factors
+    )
     face, axis = specimen.face(lattice.nodes), specimen.along[0]
     watched, _ = lattice.interpolation(specimen.watched)
-    moved = [watched @ rest.displacement for rest in found.rests]
-    force = [specimen.parts * rest.reaction[face, axis].sum() for rest in found.rests]
+    moved = [watched @ rest.displacement for rest in found.states]
+    force = [specimen.parts * rest.reaction[face, axis].sum() for rest in found.states]
     return Prediction(
-        np.array([rest.factor for rest in found.rests]),
-        np.reshape(moved, (len(found.rests), len(specimen.watched), 3)),
+        np.array([rest.factor for rest in found.states]),
+        np.reshape(moved, (len(found.states), len(specimen.watched), 3)),
         np.array(force),
         3 * len(lattice.nodes),
         found.failure,
@@ -204,10 +211,12 @@ def lattice_frequency(make: Make, specimen: Specimen, level: int, modulus: float
     chosen = make(specimen, level, modulus)
     lattice, net = _network(specimen, level, chosen)
     prescribed = specimen.prescribed(lattice.nodes)
-    found = driven.move_driven(chosen.law, net, prescribed)
+    found = displacement_control.equilibrium_path(chosen.law, net, prescribed)
     if found.failure:
         return float("nan")
-    return driven.lowest_frequency(chosen.law, net, prescribed, found.rests[-1].displacement)
+    return displacement_control.lowest_frequency(
+        chosen.law, net, prescribed, found.states[-1].displacement
+    )
 
 
 @dataclass(frozen=True)

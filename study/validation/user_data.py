@@ -4,21 +4,22 @@ A curve has the columns `time_s` and either `displacement_m`, of a control point
 push, or `force_N`, with which a tool that is moved is pushed; `uncertainty`, in the unit of the
 curve and one standard uncertainty of each value, if it is known. `markers.csv` has `x_m`, `y_m`,
 `z_m`, where markers were before the load, and `ux_m`, `uy_m`, `uz_m`, how far they had moved when
-it was largest, and `uncertainty`. Columns are parted by commas, or by semicolons or tabs, where
-decimal commas are read too.
+it was largest, and `uncertainty`. A column of another name is refused: it may be one of these that
+is misspelt. Columns are parted by commas, or by semicolons or tabs, where decimal commas are read
+too.
 """
 
 from __future__ import annotations
 
-import csv
-import io
-import math
+import difflib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study.spreadsheet import Table, decimal_commas, number, read_table
 
 Floats = NDArray[np.float64]
 
@@ -27,17 +28,20 @@ CURVES = {"displacement_m": "m", "force_N": "N"}
 """Columns of curves, and their units."""
 PLACES, MOVES = ("x_m", "y_m", "z_m"), ("ux_m", "uy_m", "uz_m")
 FEWEST = 3
-DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Values (k,) of a column at increasing times [s] (k,); their standard uncertainty, or None."""
+    """Values (k,) of a column at increasing times [s] (k,); their standard uncertainty, or None.
+
+    `lines` (k,): their lines in the file, for messages.
+    """
 
     column: str
     times: Floats
     values: Floats
     uncertainty: Floats | None
+    lines: tuple[int, ...] = ()
 
     @property
     def unit(self) -> str:
@@ -60,101 +64,76 @@ class UserMarkers:
 
 def read_curve(path: Path) -> Curve:
     """A curve from a CSV file; ValueError naming file, line and column if it is malformed."""
-    table = _table(path)
-    found = [name for name in CURVES if name in table.header]
+    table = read_table(path)
+    names = _names(table, (TIME, *CURVES, UNCERTAINTY))
+    found = [name for name in CURVES if name in names]
     if len(found) != 1:
-        raise ValueError(f"{path}: give one of the columns {' and '.join(CURVES)} beside {TIME}")
-    times, values = table.numbers((TIME, found[0])).T
+        raise table.fault(
+            table.header_line, f"give one of the columns {' and '.join(CURVES)} beside {TIME}"
+        )
+    times, values = _numbers(table, names, (TIME, found[0])).T
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
-        raise table.fault(int(late[0]) + 1, f"{TIME} does not grow; sort the lines by it")
-    return Curve(found[0], times, values, _uncertainty(table))
+        line = table.lines[int(late[0]) + 1]
+        raise table.fault(line, f"{TIME} does not grow; sort the lines by it")
+    return Curve(found[0], times, values, _uncertainty(table, names), tuple(table.lines))
 
 
 def read_markers(path: Path) -> UserMarkers:
     """Markers from a CSV file; ValueError naming file, line and column if it is malformed."""
-    table = _table(path)
-    numbers = table.numbers((*PLACES, *MOVES))
-    return UserMarkers(numbers[:, :3], numbers[:, 3:], _uncertainty(table), table.lines)
+    table = read_table(path)
+    names = _names(table, (*PLACES, *MOVES, UNCERTAINTY))
+    numbers = _numbers(table, names, (*PLACES, *MOVES))
+    spread = _uncertainty(table, names)
+    return UserMarkers(numbers[:, :3], numbers[:, 3:], spread, tuple(table.lines))
 
 
-def _uncertainty(table: _Table) -> Floats | None:
-    if UNCERTAINTY not in table.header:
+def _names(table: Table, known: Sequence[str]) -> list[str]:
+    """Names of the columns, each a known one that stands there once."""
+    names = [name.strip() for name in table.header]
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, [one for one in known if one not in names], 1)
+            what = f"did you mean {near[0]}? Rename it" if near else "rename or remove it"
+            raise table.fault(
+                table.header_line, f"column {name!r} is none of {', '.join(known)}; {what}"
+            )
+        if names.count(name) > 1:
+            raise table.fault(
+                table.header_line, f"column {name!r} stands there twice; rename or remove one"
+            )
+    return names
+
+
+def _uncertainty(table: Table, names: list[str]) -> Floats | None:
+    if UNCERTAINTY not in names:
         return None
-    found = table.numbers((UNCERTAINTY,))[:, 0]
+    found = _numbers(table, names, (UNCERTAINTY,))[:, 0]
     wrong = np.flatnonzero(found <= 0.0)
     if len(wrong):
-        raise table.fault(int(wrong[0]), f"{UNCERTAINTY} must be above 0")
+        raise table.fault(
+            table.lines[int(wrong[0])],
+            f"{UNCERTAINTY} must be above 0; remove the column where it is not known",
+        )
     return found
 
 
-class _Table(NamedTuple):
-    """Cells of a CSV file: its header, the rows that hold any, and the lines on which they end."""
-
-    path: Path
-    header: list[str]
-    rows: list[list[str]]
-    lines: tuple[int, ...]
-    decimal: str
-
-    def fault(self, row: int, what: str) -> ValueError:
-        """The error that blames a row."""
-        return ValueError(f"{self.path}: line {self.lines[row]}: {what}")
-
-    def numbers(self, columns: tuple[str, ...]) -> Floats:
-        """Numbers (rows, columns) of the named columns."""
-        for name in columns:
-            if self.header.count(name) != 1:
-                said = "stands there twice" if name in self.header else "is missing"
-                raise ValueError(f"{self.path}: line 1: the column {name} {said}; give {columns}")
-        if len(self.rows) < FEWEST:
-            raise ValueError(
-                f"{self.path}: {len(self.rows)} lines of numbers; give {FEWEST} or more"
+def _numbers(table: Table, names: list[str], columns: Sequence[str]) -> Floats:
+    """Numbers (rows, columns) of the columns of these names."""
+    for name in columns:
+        if name not in names:
+            raise table.fault(
+                table.header_line, f"the column {name} is missing; give {', '.join(columns)}"
             )
-        places = [self.header.index(name) for name in columns]
-        return np.array(
-            [[self._number(row, place) for place in places] for row in range(len(self.rows))]
+    if len(table.rows) < FEWEST:
+        raise table.fault(
+            table.lines[-1], f"{len(table.rows)} lines of numbers; give {FEWEST} or more"
         )
-
-    def _number(self, row: int, place: int) -> float:
-        cells = self.rows[row]
-        if len(cells) != len(self.header):
-            raise self.fault(row, f"{len(cells)} cells, the first line has {len(self.header)}")
-        try:
-            found = float(cells[place].replace(self.decimal, "."))
-        except ValueError:
-            found = math.nan
-        if not math.isfinite(found):
-            name, text = self.header[place], cells[place].strip()
-            raise self.fault(row, f"{name}: {text!r} is not a finite number")
-        return found
-
-
-def _table(path: Path) -> _Table:
-    """The cells, parted by commas, semicolons or tabs, whichever parts the header into most.
-
-    Where it is not commas, they may stand in numbers as decimal ones.
-    """
-    text = _text(path)
-    delimiter = max(DELIMITERS, key=text.partition("\n")[0].count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-    try:
-        filled = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise ValueError(f"{path}: line {reader.line_num}: {error}; export it again") from None
-    header = [name.strip() for name in filled[0][1]] if filled else []
-    rows = [row for _, row in filled[1:]]
-    decimal = "." if delimiter == "," else ","
-    return _Table(path, header, rows, tuple(line for line, _ in filled[1:]), decimal)
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return file.read()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: not a text in UTF-8; save it as CSV in UTF-8") from None
-    except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
-        raise ValueError(f"{path}: there is no such file; give a CSV file") from None
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror}); give a CSV file") from None
+    commas = decimal_commas(table, range(len(names)))
+    places = [names.index(name) for name in columns]
+    return np.array(
+        [
+            [number(cells[k], table, line, names[k], commas=commas) for k in places]
+            for cells, line in zip(table.rows, table.lines, strict=True)
+        ]
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -113,8 +113,22 @@ def _marked(problem: Problem, markers: UserMarkers) -> Problem:
             f"{MARKERS}: {line}({place}) m lies outside the organ, which is {extent} m; give "
             "metres in the axes of the scene, and markers inside the organ"
         )
+    _refuse_beyond(problem, markers.moved, MARKERS, markers.lines)
     probes = np.concatenate([problem.observation.probes, markers.places])
     return replace(problem, observation=replace(problem.observation, probes=probes))
+
+
+def _refuse_beyond(problem: Problem, moved: Floats, where: str, lines: Sequence[int] = ()) -> None:
+    """ValueError for a displacement [m] of (k, ...) that is longer than the organ."""
+    longest = float(np.linalg.norm(np.ptp(problem.geometry.mesh.points, axis=0)))
+    length = np.linalg.norm(moved.reshape(len(moved), -1), axis=1)
+    worst = int(length.argmax())
+    if length[worst] > longest:
+        line = f"line {lines[worst]}: " if lines else ""
+        raise ValueError(
+            f"{where}: {line}a displacement of {length[worst]:.4g} m in an organ that is "
+            f"{longest:.3g} m across; give metres"
+        )
 
 
 def probe_number(problem: Problem, name: str | None) -> int:
@@ -140,6 +154,8 @@ def refuse_unanswered(problem: Problem, curve: Curve) -> None:
             f"time_s: {curve.times[0]:g} to {curve.times[-1]:g} s is not within the {last:g} s "
             "simulated; enlarge time.duration or shorten the curve"
         )
+    if curve.column == "displacement_m":
+        _refuse_beyond(problem, curve.values, curve.column, curve.lines)
 
 
 def seen(problem: Problem, trajectory: Trajectory, curve: Curve, probe: int) -> Floats:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from msm.grid import grid_of
+from msm.grid import grids_of
 from msm.grid_explicit import symplectic_euler
 from study.models.table import model
 from study.problem.problem import Problem
@@ -84,7 +84,7 @@ def steps() -> Iterator[Step]:
         count = max(2, SPRINGS_PER_REPEAT // len(net.ends))
         factors = np.ones((count, 1))
         for precision in ("double", "single"):
-            grid = grid_of(lattice, net, single=precision == "single")
+            grid = grids_of(lattice, net, single=precision == "single")
             u, v = np.zeros((2, *net.load.shape))
             # Many steps of a call against one of a few: what enters and leaves is not theirs.
             whole = least(lambda: symplectic_euler(LAW, grid, factors, 1e-4, u, v))  # noqa: B023

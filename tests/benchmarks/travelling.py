@@ -214,9 +214,9 @@ def _harder(turn: StationFactor, force: float) -> StationFactor:
 
 def pressed(one: PreparedLattice, problem: Problem) -> PreparedLattice:
     """A lattice under the same loads, with the factors of a problem."""
-    assert one.assembly.burden is not None
-    burden = replace(one.assembly.burden, factors=tuple(x.factor for x in problem.loads))
-    return replace(one, problem=problem, assembly=replace(one.assembly, burden=burden))
+    assert one.assembly.external_loads is not None
+    loads = replace(one.assembly.external_loads, factors=tuple(x.factor for x in problem.loads))
+    return replace(one, problem=problem, assembly=replace(one.assembly, external_loads=loads))
 
 
 @dataclass(frozen=True)

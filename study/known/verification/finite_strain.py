@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fem_reference.driven import Drive, solve_driven, solve_linear
+from fem_reference.displacement_control import Loading, equilibrium_path, solve_linear
 from fem_reference.grid import curved, straight
 from fem_reference.mixed_strain import MixedSolid, mixed_solid
 from study.known.finding import Finding, error_of, number_of
@@ -47,7 +47,7 @@ def _sliding(tissue: Tissue) -> Iterator[Finding]:
     body = mixed_solid(straight(block_mesh((EDGE, EDGE, EDGE), 0.5 * EDGE)), tissue)
     prescribed, top = _symmetric(body, EDGE)
     prescribed[top, 2] = (STRETCH - 1.0) * EDGE
-    path = solve_driven(body, Drive(prescribed, np.zeros(body.size)))
+    path = equilibrium_path(body, Loading(prescribed, np.zeros(body.size)))
     lateral, stress = uniaxial(tissue, STRETCH)
     label = f"taylor-hood, nu {tissue.poisson_ratio:g}"
     if not path.converged:
@@ -78,7 +78,7 @@ def _bonded(tissue: Tissue) -> Finding:
     body = mixed_solid(curved(mesh, onto_side(radius, RINGS)), tissue)
     prescribed, top = _symmetric(body, half)
     prescribed[top] = [0.0, 0.0, -0.01 * half]
-    state = solve_linear(body, Drive(prescribed, np.zeros(body.size)))
+    state = solve_linear(body, Loading(prescribed, np.zeros(body.size)))
     apparent = -4.0 * float(state.reaction[top, 2].sum()) / (np.pi * radius**2 * 0.01)
     expected = (1.0 + 2.0 * SHAPE**2) * tissue.youngs_modulus
     label = f"apparent modulus of a bonded disc [Pa], S = {SHAPE:g}"

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.burden import Burden, laden
 from fem_reference.contact.motion import AtPeak, at_peak, run
 from fem_reference.elasticity import Body
+from fem_reference.external_loads import ExternalLoads, with_external_loads
 from study.known import pressed
 from study.known.case import Case, Family
 from study.known.finding import Finding, at_most, value
@@ -98,7 +98,7 @@ def hangs(times: float) -> Finding:
     """End displacement of a hanging column with nu 0: rho g L^2 / 2 E + rho g L / k."""
     tissue, length, g = Tissue(poisson_ratio=0.0), 0.06, 9.81 * times
     body = pressed.column(block_mesh((0.04, 0.04, length), 0.02), tissue, "p2", 1e6, 0.0)
-    start = fem.start_of(laden(body, Burden(gravity=-g * DOWN)))
+    start = fem.start_of(with_external_loads(body, ExternalLoads(gravity=-g * DOWN)))
     found = 0.0 if start is None else float(start[2::3].max())
     weight = tissue.density * g
     exact = weight * length / 1e6 + 0.5 * weight * length**2 / tissue.youngs_modulus

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msm.assembly import Assembly, Material
-from msm.model import FAR, Fixed, Rate, critical_time_step, run
+from msm.model import DIVERGED_SIZE, Fixed, Rate, critical_time_step, run
 from msm.statics import stiffness_at_rest
 from study.known.case import Case, Family
 from study.known.finding import Finding, beside, value
@@ -61,7 +61,7 @@ def held(integrator: str, times: float) -> Finding:
     if integrator == "split-volume":  # the run uses the conservative limit of springs alone
         limit = split_limit(assembly, material)
     dt = times * limit
-    far = FAR * float(np.ptp(assembly.lattice.nodes, axis=0).max())
+    far = DIVERGED_SIZE * float(np.ptp(assembly.lattice.nodes, axis=0).max())
     seen = watch(assembly, STEPS * dt, STEPS + 1)
     dt = float(seen.times[1] - seen.times[0])
     found = run(

@@ -7,6 +7,7 @@ what is left of a larger sheet, and dropped.
 
 import csv
 import io
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -47,7 +48,7 @@ def read_table(path: Path) -> Table:
         delimiter = max(DELIMITERS, key=lambda one: _header_width(text, one))
     found = list(_filled(path, text, delimiter))
     if len(found) < 2:
-        raise TableError(f"{path}: holds no readings; give a header and at least one row")
+        raise TableError(f"{path}: holds no numbers; give a header and at least one row")
     lines, rows = [line for line, _ in found], [cells for _, cells in found]
     width = max(i for i, name in enumerate(rows[0], start=1) if name.strip())
     rows = [_without_blanks(cells, width) for cells in rows]
@@ -61,7 +62,7 @@ def _text(path: Path) -> str:
         with path.open(newline="", encoding="utf-8-sig") as file:
             return file.read()
     except OSError as error:
-        raise TableError(f"{path}: cannot be read ({error.strerror})") from None
+        raise TableError(f"{path}: cannot be read ({error.strerror}); give a CSV file") from None
     except UnicodeDecodeError:
         raise TableError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
 
@@ -106,6 +107,33 @@ def _check_widths(table: Table) -> None:
             raise table.fault(
                 line, f"{len(cells)} cells under {len(table.header)} columns; correct the row"
             )
+
+
+def decimal_commas(table: Table, columns: Iterable[int]) -> bool:
+    """Whether numbers of the columns are written with decimal commas, as between semicolons."""
+    return table.delimiter != "," and any("," in row[k] for row in table.rows for k in columns)
+
+
+def number(cell: str, table: Table, line: int, name: str, *, commas: bool) -> float:
+    """The finite number in a cell; TableError naming its line and column for what is none.
+
+    `commas`: whether the numbers of the table have decimal commas.
+    """
+    if commas and "." in cell:
+        raise table.fault(
+            line, f"{name}: {cell!r} stands beside decimal commas; write it as the others"
+        )
+    try:
+        value = float(cell.replace(",", ".") if commas else cell)
+    except ValueError:
+        what = f"{cell!r} is no number" if cell.strip() else "the cell is empty"
+        remedy = "give a number or remove the row"
+        if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
+            remedy = "write a point, or part columns by semicolons for decimal commas"
+        raise table.fault(line, f"{name}: {what}; {remedy}") from None
+    if not math.isfinite(value) or "_" in cell:
+        raise table.fault(line, f"{name}: {cell!r} is no finite number; correct it")
+    return value
 
 
 def write_table(

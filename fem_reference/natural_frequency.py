@@ -1,4 +1,4 @@
-"""Free vibration of small amplitude about a rest, at large strain or none."""
+"""Lowest natural frequency of a body about an equilibrium, at large strain or at rest."""
 
 from __future__ import annotations
 
@@ -8,35 +8,36 @@ from scipy.sparse import csc_array, eye_array, kron
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem_reference.direct import factorised
-from fem_reference.driven import Drive, DrivenState
+from fem_reference.displacement_control import EquilibriumState, Loading
 from fem_reference.mixed_strain import MixedSolid
 
 Floats = NDArray[np.float64]
 
 
 def lowest_frequency(
-    body: MixedSolid, drive: Drive, density: float, about: DrivenState | None = None
+    body: MixedSolid, loading: Loading, density: float, about: EquilibriumState | None = None
 ) -> float:
-    """Of undamped free motion [Hz], what is prescribed held still; about a rest, or none.
+    """Lowest natural frequency [Hz], undamped, about an equilibrium, by default at rest.
 
-    `density` [kg/m^3]. ValueError if nothing holds the body.
+    Components with a prescribed displacement are fixed; `density` in [kg/m^3]. ValueError if the
+    stiffness is singular.
     """
     w = np.zeros(body.size + body.pressures)
     if about is not None:
         w = np.concatenate([about.displacement.ravel(), about.pressure])
-    free = np.flatnonzero(drive.free)
-    every = np.concatenate([free, np.arange(body.size, len(w))])
-    solve = factorised(body.tangent(w)[every][:, every])
+    free = np.flatnonzero(loading.free)
+    unknowns = np.concatenate([free, np.arange(body.size, len(w))])
+    solve = factorised(body.tangent(w)[unknowns][:, unknowns])
     volume = csc_array(kron(body.nodal_volume, eye_array(3), format="csc"))
     mass = density * volume[free][:, free]
 
     def compliance(force: Floats) -> Floats:
-        whole = np.zeros(len(every))
-        whole[: len(free)] = force.ravel()
-        return solve(whole)[: len(free)]
+        padded = np.zeros(len(unknowns))
+        padded[: len(free)] = force.ravel()
+        return solve(padded)[: len(free)]
 
     inverse = LinearOperator(mass.shape, compliance, dtype=np.float64)
-    # Between zero and the lowest there is none: its inverse is what the iteration finds first.
+    # No eigenvalue lies between 0 and the lowest, so shift-invert at 0 finds the lowest.
     start = np.ones(len(free))
     (found,) = eigsh(mass, 1, mass, 0.0, OPinv=inverse, return_eigenvectors=False, v0=start)
     return float(np.sqrt(found) / (2.0 * np.pi))

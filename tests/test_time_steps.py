@@ -10,8 +10,8 @@ import pytest
 import fem_reference as fem
 from fem_reference import dynamics
 from fem_reference import superposition as module
-from fem_reference.pace import OWN_STEPS, Pace, own_pace
 from fem_reference.subspace import superposition
+from fem_reference.time_steps import LEAST_STEPS, TimeSteps, steps_for_load
 from study.models.finite_elements import reference_of
 from study.models.model import SILENT
 from study.problem.damping import RayleighDamping
@@ -107,18 +107,18 @@ def test_a_superposition_is_exact_within_its_steps(coarse):
 
 def test_a_load_that_own_steps_miss_shortens_them():
     times = np.linspace(0.0, 10.0, 6401)
-    assert own_pace(np.ones_like, times) == Pace(samples=32)
+    assert steps_for_load(np.ones_like, times) == TimeSteps(samples=32)
     # A whole number of periods in each of these steps, at whose ends the load is 0.
-    assert own_pace(lambda t: np.sin(2.0 * np.pi * 20.0 * t), times) == Pace()
-    assert own_pace(np.ones_like, times[: 2 * OWN_STEPS]) == Pace()
+    assert steps_for_load(lambda t: np.sin(2.0 * np.pi * 20.0 * t), times) == TimeSteps()
+    assert steps_for_load(np.ones_like, times[: 2 * LEAST_STEPS]) == TimeSteps()
 
 
 def test_a_pace_is_quickened_by_powers_of_two():
-    assert Pace(samples=8).times(2) == Pace(samples=4)
-    assert Pace(samples=8).times(16) == Pace(per_sample=2)
-    assert Pace(samples=8).steps(4001) == 501
-    assert Pace(per_sample=3).steps(10) == 30
-    assert Pace(samples=4).length(0.1) == pytest.approx(0.4)
+    assert TimeSteps(samples=8).refined(2) == TimeSteps(samples=4)
+    assert TimeSteps(samples=8).refined(16) == TimeSteps(per_sample=2)
+    assert TimeSteps(samples=8).count(4001) == 501
+    assert TimeSteps(per_sample=3).count(10) == 30
+    assert TimeSteps(samples=4).step(0.1) == pytest.approx(0.4)
 
 
 def test_steps_of_a_run_are_halved_until_their_error_passes(small_scene, small_posed):
@@ -135,7 +135,7 @@ def test_steps_of_a_run_are_halved_until_their_error_passes(small_scene, small_p
         posed, geometry=dataclasses.replace(small_posed.geometry, level=levels.get)
     )
     found = reference_of(scene).prepare(posed).run(SILENT).record
-    assert found.steps > 2 * OWN_STEPS
+    assert found.steps > 2 * LEAST_STEPS
     assert all(check.velocity < 0.05 for check in found.time_step_errors.values()) or (
         found.steps == 1600
     )

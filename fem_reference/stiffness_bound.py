@@ -1,4 +1,4 @@
-"""A proof, by the signs of pivots, of how stiff a body is at least."""
+"""Proven lower bounds of the stiffness of a body, by Sylvester's law of inertia."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ from fem_reference.elasticity import Body
 Floats = NDArray[np.float64]
 
 MASS_SHARE, DIAGONAL_SHARE = 0.8, 1.0 / 16.0
-"""Of the eigenvalue tried; a mass is 0.39 of its diagonal or more, in straight tetrahedra."""
+"""Shares of a trial eigenvalue. In straight tetrahedra, M >= 0.39 diag(M)."""
 TRIES = 30
 
 
-class StiffnessFloor(NamedTuple):
-    """K - eigenvalue M and K - diag(diagonal) are positive definite, [1/s^2] and [N/m] (n,)."""
+class StiffnessBound(NamedTuple):
+    """K - eigenvalue M and K - diag(diagonal) are positive definite; [1/s^2] and [N/m] (n,)."""
 
     eigenvalue: float
     diagonal: Floats
 
 
-def stiffness_floor(body: Body, eigenvalue: float) -> StiffnessFloor:
-    """A floor near an upper bound of the lowest squared angular frequency [1/s^2].
+def stiffness_lower_bound(body: Body, eigenvalue: float) -> StiffnessBound:
+    """Lower bounds near `eigenvalue`, an upper bound of the lowest eigenvalue [1/s^2] of M^-1 K.
 
-    The pivots of K - 0.8 s M - s D / 16, D the diagonal of M, have the signs of its eigenvalues
-    (Sylvester's law of inertia), those of a saddle point beside one negative sign for each
-    pressure; s is halved until they prove it definite. What rounding may do to them is taken off.
-    ValueError if no floor is found.
+    The pivots of K - 0.8 s M - s D / 16, with D the diagonal of M, have the signs of its
+    eigenvalues (Sylvester's law of inertia). Mixed elements add one negative pivot per pressure.
+    The shift s is halved until the pivots prove the matrix positive definite. The effect of
+    rounding on the pivots is subtracted. ValueError if no bound is found.
     """
     diagonal = body.mass.diagonal()
     stiffest = float((body.stiffness.matrix.diagonal() / diagonal).max())
     for halvings in range(TRIES):
         tried = eigenvalue * 0.5**halvings
         found = pivots(_shifted(body, tried * MASS_SHARE, tried * DIAGONAL_SHARE * diagonal))
-        left = tried * DIAGONAL_SHARE - found.rounding * stiffest
-        if left <= 0.0:
+        margin = tried * DIAGONAL_SHARE - found.rounding * stiffest
+        if margin <= 0.0:
             break
         if found.in_place and found.negative == body.unknowns - body.stiffness.size:
-            return StiffnessFloor(tried * MASS_SHARE, left * diagonal)
+            return StiffnessBound(tried * MASS_SHARE, margin * diagonal)
     raise ValueError("the stiffness is not definite beyond rounding: nothing holds the body")
 
 
 def _shifted(body: Body, of_mass: float, diagonal: Floats) -> csc_array:
-    """The system less a share of the mass and a diagonal, among displacements."""
+    """The system matrix minus a multiple of the mass and a diagonal, of the displacements."""
     pressures = body.unknowns - body.stiffness.size
     shift = csc_array(of_mass * body.mass + diags_array(diagonal))
     if pressures:
