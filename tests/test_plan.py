@@ -426,6 +426,7 @@ def test_the_largest_force_is_checked_by_spacing_and_steps(small_scene, small_re
     errors = SpacingErrors(
         coarser_m=0.02,
         order=1.0,
+        safety_factor=3.0,
         displacement={"tool": 0.2, "left-lobe": 0.1},
         tool_force={"tool": 0.4},
         peak_force={"tool": 0.3},

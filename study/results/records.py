@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,14 +180,15 @@ class LatticeRecord:
 class SpacingErrors:
     """Estimated discretisation errors of a lattice, from the same motion on a coarser one.
 
-    By Richardson extrapolation from a lattice of `coarser_m` with an assumed `order`: relative L2
-    of the displacement by control point and of the force of each moved tool over time, and that of
-    the largest force, which is not taken smaller, since single numbers of two lattices may
-    coincide. The model error of springs at any spacing is not included.
+    A grid convergence index from a lattice of `coarser_m`, with an assumed `order` and a
+    `safety_factor`: relative L2 of the displacement by control point and of the force of each moved
+    tool over time, and that of the largest force, which is not taken smaller, since single numbers
+    of two lattices may coincide. The model error of springs at any spacing is not included.
     """
 
     coarser_m: float
     order: float
+    safety_factor: float
     displacement: dict[str, float]
     tool_force: dict[str, float] = field(default_factory=dict)
     peak_force: dict[str, float] = field(default_factory=dict)

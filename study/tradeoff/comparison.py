@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.models.lattice import LatticeModel
-from study.models.spacing_error import COARSER, ORDER, force_differences
+from study.models.spacing_error import COARSER, INDEX, force_differences
 from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.similarity.fields import relative_l2, relative_l2_of_curves
@@ -112,7 +112,7 @@ def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
 def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolution:
     """The finest lattice of a family as reference solution, from both runs of `lattices`.
 
-    Its own errors are the changes due to halving the spacing, at an assumed order of one.
+    Its own errors are the changes due to halving the spacing, as grid convergence indices.
     ValueError where one of the two did not finish.
     """
     finest, coarser = (_whole(one, given) for one in outcomes)
@@ -121,13 +121,13 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
             "a lattice that others are to be compared with did not reach the end "
             f"({_said(outcomes)}); reduce the displacement of the tools or lattice.step_fraction"
         )
-    share, volumes = 1.0 / (COARSER**ORDER - 1.0), given.problem.volume_rule.weights
+    volumes = given.problem.volume_rule.weights
     curves = relative_l2_of_curves(coarser.curves - finest.curves, finest.curves)
-    over_time, peak = share * force_differences(given.problem, coarser.force, finest.force)
+    over_time, peak = INDEX * force_differences(given.problem, coarser.force, finest.force)
     return replace(
         finest,
-        field_error=share * relative_l2(coarser.field, finest.field, volumes),
-        curve_errors=share * curves,
+        field_error=INDEX * relative_l2(coarser.field, finest.field, volumes),
+        curve_errors=INDEX * curves,
         force_errors=over_time,
         peak_errors=np.maximum(over_time, peak),  # single numbers may coincide
     )
