@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 MODELS = Choice("study.models.table:MODELS")
 Table = dict[str, Any]
 """A parsed table of TOML, not yet checked."""
+SHAPED = {"size": "block", "volume": "liver"}
+"""Keys of the organ that only one of its shapes has."""
 # What a scene without a mesh cannot use.
 MESH_ONLY = (
     ("organ", "volume"),
@@ -124,6 +126,13 @@ def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for key in ("unit", "axes", "pieces", "suit"):
         if organ.mesh is None and _has(table, ("organ", key)):
             yield f"organ.{key}: has no effect without organ.mesh; remove it"
+    for key in ("shape", *SHAPED):
+        if organ.mesh is not None and _has(table, ("organ", key)):
+            yield f"organ.{key}: has no effect beside organ.mesh; remove one of them"
+    for key, shape in SHAPED.items():
+        shown = organ.mesh is None and not scene.is_point and _has(table, ("organ", key))
+        if shown and organ.shape != shape:
+            yield f"organ.{key}: is of the {shape}, not of the {organ.shape}; remove it"
     if organ.axes is not None:
         yield from _axes_problems(organ.axes, "organ.axes")
 

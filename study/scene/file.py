@@ -6,14 +6,14 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from study.annotation.quantity import Quantity
 from study.scene import Organ, Scene, SpringLaw, Support, Tool
-from study.scene.consistency import LIVER_ONLY, MESH_ONLY, Table, contradictions
+from study.scene.consistency import LIVER_ONLY, MESH_ONLY, SHAPED, Table, contradictions
 from study.scene.error import SceneError
 from study.scene.graded import has_graded
 from study.scene.schema import SuitedKey
@@ -46,8 +46,9 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_files(table, base)
     _split_lists(table)
-    for override in overrides:
-        lines[_apply(table, override)] = 0  # on no line
+    given = {_apply(table, override) for override in overrides}
+    lines |= dict.fromkeys(given, 0)  # on no line
+    _replace_organ(table, given)
     _resolve_files(table, Path.cwd())
     if name in BUILT_IN:
         _suit_the_rest(table, overrides)
@@ -70,6 +71,22 @@ def _join_lists(table: Table) -> None:
         further = table.pop(others, [])
         if further:
             table[name] = [table[name], *further]
+
+
+def _replace_organ(table: Table, given: Collection[str]) -> None:
+    """Drop what belongs to the organ of the file, where the overrides `given` put another one."""
+    organ = table.get("organ")
+    if not isinstance(organ, dict):
+        return
+    gone: set[str] = set()
+    if "organ.mesh" in given:
+        gone = {"shape", *SHAPED}
+    elif "organ.shape" in given:
+        others = (key for key, shape in SHAPED.items() if shape != organ["shape"])
+        gone = {"mesh", "unit", "axes", "pieces", "suit", *others}
+    for key in gone:
+        if f"organ.{key}" not in given:
+            organ.pop(key, None)
 
 
 def _suit_the_rest(table: Table, overrides: Sequence[str]) -> None:
@@ -252,7 +269,7 @@ def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
         yield "organ", "pieces"
     if not organ.suit:
         yield "organ", "suit"
-    for key, shape in (("size", "block"), ("volume", "liver")):
+    for key, shape in SHAPED.items():
         if organ.mesh is not None or organ.shape != shape:
             yield "organ", key
 
