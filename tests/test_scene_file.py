@@ -378,3 +378,32 @@ def test_frames_per_second_are_a_rate():
 def test_a_mesh_given_as_a_scene_is_answered_with_how_to_give_it(name):
     with pytest.raises(SceneError, match=r"--set organ\.mesh="):
         read_scene(name)
+
+
+@pytest.mark.parametrize(
+    ("organ", "message"),
+    [
+        ('shape = "block"\nmesh = "a.stl"', "organ.shape: has no effect beside organ.mesh"),
+        ('size = ["1 m", "1 m", "1 m"]\nmesh = "a.stl"', "organ.size: has no effect beside"),
+        ('volume = "1 l"\nmesh = "a.stl"', "organ.volume: has no effect beside organ.mesh"),
+        ('size = ["60 mm", "60 mm", "60 mm"]', "organ.size: is of the block, not of the liver"),
+        ('shape = "block"\nvolume = "1 l"', "organ.volume: is of the liver, not of the block"),
+    ],
+)
+def test_keys_of_another_organ_are_refused(tmp_path, organ, message):
+    path = tmp_path / "scene.toml"
+    path.write_text(f'[organ]\n{organ}\n[patient]\nhcv = "9.5 kPa"\n')
+    with pytest.raises(SceneError, match=message):
+        read_scene(str(path))
+
+
+def test_an_organ_put_for_that_of_a_file_takes_its_keys_along(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text('[organ]\nmesh = "a.stl"\nunit = "mm"\n[patient]\nhcv = "9.5 kPa"\n')
+    assert read_scene(str(path)).organ.mesh.endswith("a.stl")
+    shaped = read_scene(str(path), ["organ.shape=block"]).organ
+    assert (shaped.mesh, shaped.unit, shaped.shape) == (None, None, "block")
+    assert read_scene("liver", ["organ.shape=block"]).organ.shape == "block"
+    assert read_scene("block", ["organ.mesh=b.stl"]).organ.mesh.endswith("b.stl")
+    with pytest.raises(SceneError, match=r"organ\.size: has no effect beside organ\.mesh"):
+        read_scene("block", ["organ.mesh=b.stl", 'organ.size=["1 m", "1 m", "1 m"]'])

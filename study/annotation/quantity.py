@@ -89,8 +89,10 @@ class Quantity:
 
 def _bare(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        # pydantic reports ValueErrors only.
-        raise ValueError(f'write a number with its unit, for example "1 {unit}"')  # noqa: TRY004 - see above
+        example = (
+            f'write a number with its unit, for example "1 {unit}"' if unit else "write a number"
+        )
+        raise ValueError(example)  # noqa: TRY004 - pydantic reports ValueErrors only
     try:
         return float(value)
     except OverflowError:

@@ -15,7 +15,7 @@ from study.problem.rigid import SLIDING
 from study.scene import graded
 from study.scene.law import SpringLaw
 from study.scene.schema import Inclusion, Lattice, Require, Scene, Tool, Waypoint
-from study.scene.unused import LIVER_ONLY, has_effect
+from study.scene.unused import LIVER_ONLY, SHAPED, has_effect
 
 if TYPE_CHECKING:
     from study.models.model import ModelKind
@@ -121,6 +121,13 @@ def _mesh_contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for key in organ.suit:
         if not has_effect(scene, key):
             yield f"organ.suit: {key} has no effect in this scene; leave it out"
+    for key in ("shape", *SHAPED):
+        if organ.mesh is not None and _has(table, ("organ", key)):
+            yield f"organ.{key}: has no effect beside organ.mesh; remove one of them"
+    for key, shape in SHAPED.items():
+        shown = organ.mesh is None and not scene.is_point and _has(table, ("organ", key))
+        if shown and organ.shape != shape:
+            yield f"organ.{key}: is of the {shape}, not of the {organ.shape}; remove it"
     if organ.axes is not None:
         yield from _axes_problems(organ.axes, "organ.axes")
 

@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -18,7 +18,7 @@ from study.scene.consistency import MESH_ONLY, Table, contradictions
 from study.scene.error import SceneError
 from study.scene.schema import SuitedKey
 from study.scene.text import key_lines, parsed, read_text
-from study.scene.unused import has_effect, unused
+from study.scene.unused import SHAPED, has_effect, unused
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -47,11 +47,12 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
     _resolve_files(table, base)
     _split_lists(table)
-    for override in overrides:
-        lines[_apply(table, override)] = 0  # on no line
+    given = {_apply(table, override) for override in overrides}
+    lines |= dict.fromkeys(given, 0)  # on no line
+    _replace_organ(table, given)
     _resolve_files(table, Path.cwd())
     scene = validate(table, name, lines)
-    return _suiting_the_rest(scene, overrides) if name in BUILT_IN else scene
+    return _suiting_the_rest(scene, given) if name in BUILT_IN else scene
 
 
 def _split_lists(table: Table) -> None:
@@ -72,9 +73,24 @@ def _join_lists(table: Table) -> None:
             table[name] = [table[name], *further]
 
 
-def _suiting_the_rest(scene: Scene, overrides: Sequence[str]) -> Scene:
+def _replace_organ(table: Table, given: Collection[str]) -> None:
+    """Drop what belongs to the organ of the file, where the overrides `given` put another one."""
+    organ = table.get("organ")
+    if not isinstance(organ, dict):
+        return
+    gone: set[str] = set()
+    if "organ.mesh" in given:
+        gone = {"shape", *SHAPED}
+    elif "organ.shape" in given:
+        others = (key for key, shape in SHAPED.items() if shape != organ["shape"])
+        gone = {"mesh", "unit", "axes", "pieces", "suit", *others}
+    for key in gone:
+        if f"organ.{key}" not in given:
+            organ.pop(key, None)
+
+
+def _suiting_the_rest(scene: Scene, given: Collection[str]) -> Scene:
     """A built-in scene is made for its own organ: what is not overridden follows another one."""
-    given = {override.partition("=")[0].strip().lower() for override in overrides}
     whole = {key.partition(".")[0] for key in given if "." not in key}
     if scene.organ.mesh is None or scene.organ.suit or "organ.suit" in given:
         return scene

@@ -12,6 +12,8 @@ LIVER_ONLY = (
     *("absent", "surface", "sensitivity_readings"),
 )
 """Keys of the table fuzzy that only the liver's knowledge bases have."""
+SHAPED = {"size": "block", "volume": "liver"}
+"""Keys of the organ that only one of its shapes has."""
 
 
 def unused(scene: Scene) -> Iterator[tuple[str | int, ...]]:
@@ -107,7 +109,7 @@ def _unused_of_organ(organ: Organ) -> Iterator[tuple[str, ...]]:
         yield "organ", "pieces"
     if not organ.suit:
         yield "organ", "suit"
-    for key, shape in (("size", "block"), ("volume", "liver")):
+    for key, shape in SHAPED.items():
         if organ.mesh is not None or organ.shape != shape:
             yield "organ", key
 
