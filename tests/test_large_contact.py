@@ -11,7 +11,6 @@ from scipy.sparse import csc_array
 
 from fem_reference.contact import large_motion
 from fem_reference.contact.balance import UnbalancedError
-from fem_reference.contact.finite import FiniteContact
 from fem_reference.contact.large_motion import Steps, pressed, run, touched
 from fem_reference.contact.motion import at_peak
 from fem_reference.elasticity import discretise
@@ -78,12 +77,14 @@ def test_derivatives_of_the_gaps(rng, one):
     u, du = 1e-3 * rng.standard_normal((2, contact.size))
     force = rng.random(len(contact.held))
     steps = 0.5 ** np.arange(2, 7)
-    G, bend = contact.derivative(u, 1.0), contact.curvature(u, 1.0, force)
+    begun = contact.at(u, 1.0)
+    G, bend = begun.derivative, begun.curvature(force)
     of_gaps, of_slope = [], []
     for h in steps:
-        off = contact.gaps(u + h * du, 1.0) - contact.gaps(u, 1.0) - h * (G @ du)
+        moved = contact.at(u + h * du, 1.0)
+        off = moved.gaps - begun.gaps - h * (G @ du)
         of_gaps.append(np.linalg.norm(off))
-        turned = contact.derivative(u + h * du, 1.0).T @ force - G.T @ force
+        turned = moved.derivative.T @ force - G.T @ force
         of_slope.append(np.linalg.norm(turned - h * (bend @ du)))
     for off in (of_gaps, of_slope):
         if max(off) > 1e-12:  # of a bonded tool they are linear
@@ -111,8 +112,9 @@ def test_the_body_has_a_potential_whose_second_derivative_is_its_tangent(rng):
 def test_forces_of_body_and_tool_are_in_balance(rng):
     contact = touched(block(), TISSUE, (steady(3e-3),), np.array([0.0, 1.0])).contact
     u, force = 1e-3 * rng.standard_normal(contact.size), rng.random(len(contact.held))
-    on_body = (contact.derivative(u, 1.0).T @ force).reshape(-1, 3).sum(axis=0)
-    assert contact.on_tools(u, 1.0, force)[0] == pytest.approx(-on_body)
+    met = contact.at(u, 1.0)
+    on_body = (met.derivative.T @ force).reshape(-1, 3).sum(axis=0)
+    assert met.on_tools(force)[0] == pytest.approx(-on_body)
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.499])
@@ -200,8 +202,8 @@ def test_what_a_tool_hits_moves_with_the_tool():
     steps, contact, seen = Steps(given), given.body.contact, 0
     for count, state in enumerate(steps.march(steps.start(), step)):
         u, closed = given.body.given(state.w), state.force > 0.0
-        pushed = contact.derivative(u, state.time)[closed] @ state.v
-        nearer = (contact.gaps(u, state.time) - contact.gaps(u, state.time - 1e-6)) / 1e-6
+        now, then = (contact.at(u, t, state.before) for t in (state.time, state.time - 1e-6))
+        pushed, nearer = now.derivative[closed] @ state.v, (now.gaps - then.gaps) / 1e-6
         assert pushed == pytest.approx(-nearer[closed], abs=0.01 * speed)
         seen += int(closed.sum())
         if count == 8:
@@ -276,9 +278,9 @@ def test_what_closes_round_a_sphere_has_not_been_passed_by_it():
     distance, normal = sphere.gap(patch.points + patch.shapes @ u.reshape(-1, 3), 1.0)
     assert (normal @ DOWN).min() < -0.1
     assert distance.max() < 0.0
-    assert not contact.through(u, 1.0)
-    assert contact.through(wrapped(given, 1.0), 1.0)
-    assert not contact.through(wrapped(given, 1.0, 0.025), 1.0)  # nothing is inside
+    assert not contact.at(u, 1.0).through
+    assert contact.at(wrapped(given, 1.0), 1.0).through
+    assert not contact.at(wrapped(given, 1.0, 0.025), 1.0).through  # nothing is inside
 
 
 def test_normals_turn_with_the_body():
@@ -296,8 +298,6 @@ def test_normals_turn_with_the_body():
 @pytest.mark.parametrize(
     ("one", "damping", "nu", "key"),
     [
-        (tool(friction=0.1), DAMPING, 0.4, r"tool\.friction"),
-        (tool(PUNCH), DAMPING, 0.4, r"tool\.shape"),
         (tool(), RayleighDamping(1.0, 1e-3), 0.4, r"damping\.stiffness"),
         (tool(), DAMPING, 0.0, r"tissue\.poisson_ratio"),
     ],
@@ -309,7 +309,6 @@ def test_what_cannot_be_followed_is_refused(one, damping, nu, key):
 
 
 def test_a_bonded_punch_may_pull():
-    FiniteContact.refuse((tool(PUNCH, bonded=True),))
     given, state = at_rest(block(), steady(-1e-3, PUNCH, bonded=True))
     assert given.on_tools(state)[0] @ DOWN > 0.01
 

@@ -4,9 +4,10 @@
 
 with the volumes of `fem_reference.mixed_strain`. Newton's method keeps the factors of one tangent
 for as long as it converges with them, and takes those of the state where it does not. In each
-iteration the forces under the tools follow from their compliance by a primal-dual active set
-(`fem_reference.contact.law`), so that neither penalty nor softening takes part: what is left of
-a gap that should be closed, and of the balance, is below a tolerance when a state is handed out.
+iteration the forces under the tools follow from their compliance by a primal-dual active set, or
+with friction by relaxation (`fem_reference.contact.law`), so that neither penalty nor softening
+takes part: what is left of a gap that should be closed, of a slip that should not be, and of the
+balance, is below a tolerance when a state is handed out.
 """
 
 from __future__ import annotations
@@ -19,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_array, csr_array
 
-from fem_reference.contact.finite import FiniteContact
-from fem_reference.contact.law import Areas, forces
+from fem_reference.contact.finite import Before, Configuration, FiniteContact
 from fem_reference.direct import symmetric_factors
 from fem_reference.mixed_strain import MixedSolid
 
@@ -57,11 +57,15 @@ class Balanced(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What is to balance at a time [s]: `inertia` [1/s^2] times the mass, and a `load` [N] (n,)."""
+    """What is to balance at a time [s]: `inertia` [1/s^2] times the mass, and a `load` [N] (n,).
+
+    `before`: the state that was balanced last; without one the given shape at the start.
+    """
 
     time: float
     inertia: float
     load: Floats
+    before: Before | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +95,13 @@ class TouchedBody:
         left[~self.free] = 0.0
         return left
 
-    def tangent(self, state: Balanced, demand: Demand) -> csc_array:
+    def met(self, w: Floats, demand: Demand) -> Configuration:
+        """Where a state has the body, and a time the tools."""
+        return self.contact.at(self.given(w), demand.time, demand.before)
+
+    def tangent(self, state: Balanced, demand: Demand, met: Configuration) -> csc_array:
         """Derivative of what the body itself and the shape of the tools do, in the order of w."""
-        bend = self.contact.curvature(self.given(state.w), demand.time, state.force)
+        bend = met.curvature(state.force)
         own = csc_array(demand.inertia * self.mass - bend)
         pressures = csc_array((self.solid.pressures, self.solid.pressures))
         whole = self.solid.tangent(state.w) + block_diag([own, pressures], format="csc")
@@ -150,11 +158,10 @@ class Balance:
 
         UnbalancedError where none is found.
         """
-        state, before, begun = guess, np.inf, self.factored
+        state, before, begun = self._under(guess, demand), np.inf, self.factored
         while self.factored - begun <= MOST_FACTORED:
-            u = self.body.given(state.w)
-            gaps = self.body.contact.gaps(u, demand.time)
-            pushed = self.body.contact.derivative(u, demand.time)
+            met = self.body.met(state.w, demand)
+            gaps, pushed = met.gaps, met.derivative
             off = self.body.off(state, demand, pushed)
             size = self._size(off, state, pushed, gaps, scale)
             if not np.isfinite(size):
@@ -163,7 +170,7 @@ class Balance:
                 return state
             fresh = self._worn(demand, size, before)
             if fresh:
-                self._answers = self._factor(state, demand, pushed)
+                self._answers = self._factor(state, demand, met)
             before = size
             try:
                 state = self._next(state, off, gaps, pushed)
@@ -175,18 +182,24 @@ class Balance:
         self._answers = None
         raise UnbalancedError("no balance of forces")
 
-    def in_touch(self, state: Balanced, v: Floats, time: float, since: float) -> Floats:
+    def _under(self, guess: Balanced, demand: Demand) -> Balanced:
+        """Without the forces of what is no longer under a tool."""
+        contact, gaps = self.body.contact, self.body.met(guess.w, demand).gaps
+        beside = np.isinf(gaps)[contact.firsts]
+        return guess._replace(force=np.where(beside, 0.0, guess.force))
+
+    def in_touch(self, state: Balanced, v: Floats, demand: Demand, since: float) -> Floats:
         """The velocity [m/s] (n,) nearest to another with which closed gaps stay closed.
 
-        Nearest by the last tangent. `since` [s]: a time shortly before, by which tools are seen to
-        move.
+        So that what sticks moves with its tool, too. Nearest by the last tangent. `since` [s]: a
+        time shortly before that of the demand, by which tools are seen to move.
         """
-        contact, u, answers = self.body.contact, self.body.given(state.w), self._answers
-        chosen = np.flatnonzero(contact.held | (state.force > 0.0))
+        chosen, answers = np.flatnonzero(self.body.contact.closed(state.force)), self._answers
         if answers is None or not len(chosen):
             return v
-        closing = (contact.gaps(u, time) - contact.gaps(u, since))[chosen] / (time - since)
-        pushed = contact.derivative(u, time)[chosen]
+        now, then = (self.body.met(state.w, demand._replace(time=t)) for t in (demand.time, since))
+        closing = (now.gaps[chosen] - then.gaps[chosen]) / (demand.time - since)
+        pushed = now.derivative[chosen]
         columns = answers.to(chosen)[: len(v)]
         impulse = np.linalg.lstsq(pushed @ columns, -(closing + pushed @ v))[0]
         return np.asarray(v + columns @ impulse)
@@ -198,10 +211,10 @@ class Balance:
             return True
         return size > SLOW * before
 
-    def _factor(self, state: Balanced, demand: Demand, pushed: csr_array) -> Answers:
+    def _factor(self, state: Balanced, demand: Demand, met: Configuration) -> Answers:
         self.factored += 1
-        matrix = self.body.tangent(state, demand)
-        return Answers(matrix, self.body.free, pushed, demand.inertia)
+        matrix = self.body.tangent(state, demand, met)
+        return Answers(matrix, self.body.free, met.derivative, demand.inertia)
 
     def _size(
         self, off: Floats, state: Balanced, pushed: csr_array, gaps: Floats, scale: float
@@ -209,25 +222,25 @@ class Balance:
         """Of what is off, over what may be."""
         at_work = max(scale, float(np.linalg.norm(pushed.T @ state.force)), self._least)
         unbalanced = float(np.linalg.norm(self._volume * off)) / (TOLERANCE * at_work)
-        held = self.body.contact.held | (state.force > 0.0)
-        wrong = np.where(held, np.abs(gaps), np.maximum(-gaps, 0.0)).max(initial=0.0)
-        return max(unbalanced, float(wrong) / (CLOSED * self.body.solid.length))
+        length = self.body.solid.length
+        stiffness = self.body.solid.typical_shear * length
+        wrong = self.body.contact.off_law(gaps, state.force, stiffness)
+        return max(unbalanced, wrong / (CLOSED * length))
 
     def _next(self, state: Balanced, off: Floats, gaps: Floats, pushed: csr_array) -> Balanced:
         """One iteration on."""
-        answers, n, held = self._answers, self.body.solid.size, self.body.contact.held
+        answers, n, contact = self._answers, self.body.solid.size, self.body.contact
         assert answers is not None  # noqa: S101 - made before
         step = answers.solve(off)
         gaps = gaps + pushed @ step[:n]
-        near = gaps < SLACK * self.body.solid.length
-        chosen = np.flatnonzero(held | (state.force > 0.0) | near)
+        near = (state.force > 0.0) | (gaps < SLACK * self.body.solid.length)
+        chosen = np.flatnonzero(contact.held | near[contact.firsts])
         columns = answers.to(chosen)
         compliance = answers.pushed[chosen] @ columns[:n]
         compliance = 0.5 * (compliance + compliance.T)
         old = state.force[chosen]
-        areas = Areas(compliance, gaps[chosen] - compliance @ old, held[chosen])
         try:
-            change = forces(areas, old) - old
+            change = contact.answered(compliance, gaps[chosen], chosen, old) - old
         except (np.linalg.LinAlgError, RuntimeError) as error:
             raise UnbalancedError("the body gives way under the tools") from error
         step = step + columns @ change

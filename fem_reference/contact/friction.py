@@ -13,6 +13,9 @@ Floats = NDArray[np.float64]
 SWEEPS = 20_000
 TOLERANCE = 1e-9
 """Of the largest change of a force in a sweep, over the largest force."""
+LOOKED_AFTER, FALLEN, LEAST_PART = 100, 0.9, 1 / 16
+"""After so many sweeps that leave more than this share of the change, changes are halved, at most
+to a part: where friction is high and couples with the normal forces, whole ones need not settle."""
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -25,22 +28,27 @@ def relaxed(compliance: Floats, offset: Floats, friction: Floats, start: Floats)
     count = len(offset)
     force = start.copy()
     gap = compliance @ force.ravel() + offset.ravel()
-    for _ in range(SWEEPS):
+    part, looked = 1.0, np.inf
+    for sweep in range(SWEEPS):
         largest, changed = 0.0, 0.0
         for i in range(count):
             k = 3 * i
             own = compliance[k : k + 3, k : k + 3].copy()
             free = gap[k : k + 3] - own @ force[i]
             new = _of_area(own, free, friction[i], force[i])
-            change = new - force[i]
+            change = part * (new - force[i])
             size = np.abs(change).max()
             if size > 0.0:
                 for j in range(3):  # rows, as the compliance is symmetric
                     gap += change[j] * compliance[k + j]
-            force[i] = new
-            changed, largest = max(changed, size), max(largest, np.abs(new).max())
+            force[i] += change
+            changed, largest = max(changed, size / part), max(largest, np.abs(new).max())
         if changed <= TOLERANCE * largest:
             break
+        if sweep % LOOKED_AFTER == LOOKED_AFTER - 1:
+            if changed > FALLEN * looked:
+                part = max(0.5 * part, LEAST_PART)
+            looked = changed
     return force
 
 

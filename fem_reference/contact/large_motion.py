@@ -25,8 +25,8 @@ from fem_reference.contact.balance import (
     TouchedBody,
     UnbalancedError,
 )
-from fem_reference.contact.finite import FiniteContact
-from fem_reference.contact.patch import patch
+from fem_reference.contact.finite import Before, Configuration, FiniteContact
+from fem_reference.contact.patch import Patch, patch
 from fem_reference.direct import symmetric_factors
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import largest_log_strain
@@ -35,7 +35,7 @@ from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
 from fem_reference.unloading import unload
 from study.problem.damping import RayleighDamping
-from study.problem.rigid import PLATE, RigidTool
+from study.problem.rigid import PLATE, PUNCH, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation, Trajectory
 from study.problem.unfinished import UnfinishedError
@@ -52,6 +52,8 @@ HALVINGS = 6
 """How often a step, or an increment of a way, may be halved."""
 MARGIN = 0.5
 """Round what a tool would meet of the surface at rest, over its radius, of a plate its travel."""
+WAY = 8
+"""Stations on the way of tools with friction or an edge to a rest."""
 LOOKS, MOST_LOOKS = 32, 1000
 """Places of a tool on its way at which the surface is looked at."""
 SHORTLY = 1e-3
@@ -68,13 +70,21 @@ def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Float
     """
     mixed = on_nodes(body.nodes, tissue, body.support, body.composition)
     solid = replace(mixed, pointwise=np.minimum(POINTWISE * mixed.shear, 0.5 * mixed.lame))
-    patches = [patch(body, one, _looked(one, times), _margin(one, times)) for one in tools]
-    FiniteContact.refuse(tools)
+    patches = [_patch(body, one, times) for one in tools]
     free = np.ones(solid.size + solid.pressures, dtype=np.bool_)
     if body.fixed is not None:
         free[: solid.size] = ~body.fixed
     contact = FiniteContact(tuple(patches), solid.size)
     return TouchedBody(solid, contact, body.mass, free, np.zeros(solid.size))
+
+
+def _patch(body: Body, tool: RigidTool, times: Floats) -> Patch:
+    """What a tool may touch, of a punch also what is round it, which may be drawn under it."""
+    wide = tool
+    if tool.shape == PUNCH and not tool.bonded:
+        wide = replace(tool, radius=(1.0 + MARGIN) * tool.radius)
+    found = patch(body, wide, _looked(tool, times), _margin(tool, times))
+    return replace(found, tool=tool)
 
 
 def _looked(tool: RigidTool, times: Floats) -> Floats:
@@ -106,12 +116,16 @@ def linear_rest(body: Body, tissue: Tissue) -> Floats:
 
 
 class Moving(NamedTuple):
-    """State at a time [s]: w, velocity v [m/s] (n,) and forces [N] (c,) under the tools."""
+    """State at a time [s]: w, velocity v [m/s] (n,) and forces [N] (c,) under the tools.
+
+    `before`: the state from which it was found, if any.
+    """
 
     time: float
     w: Floats
     v: Floats
     force: Floats
+    before: Before | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,10 +150,17 @@ class Pressed:
         kinetic = 0.5 * float(state.v @ (self.body.mass @ state.v))
         return kinetic + self.body.solid.energy(state.w)
 
+    def met(self, state: Moving) -> Configuration:
+        """Where the body and the tools are."""
+        return self.body.contact.at(self.body.given(state.w), state.time, state.before)
+
     def on_tools(self, state: Moving) -> Floats:
         """Forces [N] (tools, 3)."""
-        u = self.body.given(state.w)
-        return self.body.contact.on_tools(u, state.time, state.force)
+        return self.met(state).on_tools(state.force)
+
+    def since(self, state: Moving) -> Before:
+        """The state, as that from which the next is found."""
+        return Before(self.body.given(state.w), state.time)
 
 
 def pressed(
@@ -214,7 +235,8 @@ class Steps:
 
         def demand(share: float) -> Demand:
             at = start.time + share * (time - start.time)
-            return Demand(at, 0.0, begun + share * (load - begun))
+            since = self.pressed.since(now)
+            return Demand(at, 0.0, begun + share * (load - begun), since)
 
         share, goal, now = 0.0, 1.0, start
         scale = float(np.linalg.norm(load))
@@ -227,21 +249,22 @@ class Steps:
                 if goal - share < 0.5**HALVINGS:
                     raise
                 continue
-            now = Moving(demand(goal).time, found.w, np.zeros_like(now.v), found.force)
+            asked = demand(goal)
+            still = np.zeros_like(now.v)
+            now = Moving(asked.time, found.w, still, found.force, asked.before)
             share, goal = goal, 1.0
         return now
 
     def _kept_out(self, guess: Balanced, demand: Demand, scale: float) -> Balanced:
         """The state that balances; an UnbalancedError if a tool has gone through the surface."""
         found, body = self.balance.found(guess, demand, scale), self.pressed.body
-        if body.contact.through(body.given(found.w), demand.time):
+        if body.met(found.w, demand).through:
             raise UnbalancedError("a tool has gone through the surface")
         return found
 
     def _pushes(self, state: Moving) -> Floats:
         """Nodal forces [N] (n,) of the tools."""
-        body = self.pressed.body
-        return np.asarray(body.contact.derivative(body.given(state.w), state.time).T @ state.force)
+        return np.asarray(self.pressed.met(state).derivative.T @ state.force)
 
     def start(self) -> Moving:
         """At rest under what acts at all times, with the tools where they start."""
@@ -252,8 +275,17 @@ class Steps:
         return self.at_rest(begun, 0.0, pressed.dead)
 
     def peak(self, time: float, load: Floats) -> Moving:
-        """At rest with the tools where they are at a time [s], under a load [N] (n,)."""
-        return self.at_rest(self.start(), time, load)
+        """At rest with the tools where they are at a time [s], under a load [N] (n,).
+
+        What rubs, or has an edge, is followed there by stations on its way.
+        """
+        now, contact = self.start(), self.pressed.body.contact
+        edged = any(one.tool.shape == PUNCH for one in contact.patches)
+        stations = WAY if contact.rubs or edged else 1
+        begun = self.pressed.dead
+        for share in np.arange(1, stations + 1) / stations:
+            now = self.at_rest(now, share * time, begun + share * (load - begun))
+        return now
 
     def march(self, start: Moving, step: float) -> Iterator[Moving]:
         """States from a start on, a step [s] apart; ends with an UnbalancedError if it must."""
@@ -286,18 +318,26 @@ class Steps:
         step = goal - now.time
         length, n = GAMMA * step, self.pressed.body.solid.size
         guess = _onward(before, now, now.time + length)
-        first = self._stage(now.time + length, length, now.w[:n], now.v, guess)
+        since = self.pressed.since(now)
+        first = self._stage(now.time + length, length, now.w[:n], now.v, guess, since)
         acceleration = (first.v - now.v) / length
         rest = step - length
         guess = _onward(now, first, goal)
         base = now.w[:n] + rest * first.v
-        last = self._stage(goal, length, base, now.v + rest * acceleration, guess)
-        since = goal - SHORTLY * length
-        v = self.balance.in_touch(Balanced(last.w, last.force), last.v, goal, since)
+        since = self.pressed.since(first)
+        last = self._stage(goal, length, base, now.v + rest * acceleration, guess, since)
+        state, demand = Balanced(last.w, last.force), Demand(goal, 0.0, base, since)
+        v = self.balance.in_touch(state, last.v, demand, goal - SHORTLY * length)
         return last._replace(v=v)
 
     def _stage(
-        self, time: float, length: float, place: Floats, speed: Floats, guess: Balanced
+        self,
+        time: float,
+        length: float,
+        place: Floats,
+        speed: Floats,
+        guess: Balanced,
+        since: Before,
     ) -> Moving:
         """The state at the end of a stage [s], from what it starts from and a guess."""
         body, n = self.pressed.body, self.pressed.body.solid.size
@@ -307,8 +347,8 @@ class Steps:
         if body.solid.volume_ratio(guess.w).min() <= 0.0:
             raise UnbalancedError("elements would turn inside out")
         scale = float(np.linalg.norm(given))
-        found = self._kept_out(guess, Demand(time, inertia, load), scale)
-        return Moving(time, found.w, (found.w[:n] - place) / length, found.force)
+        found = self._kept_out(guess, Demand(time, inertia, load, since), scale)
+        return Moving(time, found.w, (found.w[:n] - place) / length, found.force, since)
 
 
 def _onward(before: Moving, now: Moving, time: float) -> Balanced:
@@ -372,6 +412,7 @@ def run(
     kept = [states[k] for k in set(observation.frames) if k < len(states)]
     gradients = [pressed.body.solid.deformation(one.w) for one in kept]
     contact, given = pressed.body.contact, pressed.body.given
+    deepest = max((pressed.met(one).penetration for one in states), default=0.0)
     return LargeSolution(
         trajectory,
         tuple(states),
@@ -381,7 +422,7 @@ def run(
         steps.balance.factored,
         max(map(largest_log_strain, gradients), default=0.0),
         min((float(np.linalg.det(F).min()) for F in gradients), default=1.0),
-        max((contact.penetration(given(one.w), one.time) for one in states), default=0.0),
+        deepest,
         max((_beside(body, contact, given(one.w), one.time) for one in kept), default=0.0),
         sum(one.count for one in contact.patches),
         clock.perf_counter() - started,

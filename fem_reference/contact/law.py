@@ -84,3 +84,23 @@ def dragged(compliance: Floats, offset: Floats, friction: Floats, start: Floats)
     arguments = (offset[usable], friction[usable], start[usable])
     found[usable] = relaxed(among, *(np.ascontiguousarray(one) for one in arguments))
     return found
+
+
+def off_law(offset: Floats, force: Floats, friction: Floats, stiffness: float) -> float:
+    """How far [m] forces [N] (v, 3) and gaps and slips [m] (v, 3) are from meeting Coulomb's law.
+
+    Forces that meet it are their own projection on its cone once they are corrected by the gaps and
+    slips times any `stiffness` [N/m]; what is missing, over that stiffness. An infinite gap bears
+    none, and an infinite friction holds.
+    """
+    held = np.isinf(friction)
+    usable = np.isfinite(offset[:, 0])
+    shown = np.where(usable[:, None], offset, 0.0)
+    trial = force - stiffness * shown
+    normal = np.where(usable, np.maximum(trial[:, 0], 0.0), 0.0)
+    drag = np.hypot(trial[:, 1], trial[:, 2])
+    limit = np.where(held, 0.0, friction) * np.maximum(force[:, 0], 0.0)
+    share = np.minimum(1.0, limit / np.maximum(drag, 1e-300))
+    wanted = np.column_stack([normal, share[:, None] * trial[:, 1:]])
+    off = np.where(held[:, None], stiffness * shown, force - wanted)
+    return float(np.linalg.norm(off, axis=1).max(initial=0.0)) / stiffness

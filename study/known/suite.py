@@ -55,7 +55,12 @@ PROBLEMS = (
     _problem("ball in a body", "Eshelby 1957", "ball_inclusion:findings", quick=False),
     _problem("iterative solvers", "factors of the same matrix", "iterations:findings"),
     _problem("moved faces", "neo-Hooke's law; Gent and Lindley 1959", "finite_strain:findings"),
-    _problem("tools at large strain", "neo-Hooke's law; Hertz 1882", "large_contact:findings"),
+    _problem(
+        "tools at large strain",
+        "neo-Hooke's law; Hertz 1882; Boussinesq 1885; Mindlin 1949",
+        "large_contact:findings",
+        quick=False,
+    ),
 )
 """Problems with exact solutions that `verify` solves by the finite-element reference."""
 

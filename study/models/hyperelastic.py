@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from fem_reference import model as fem
 from fem_reference.contact import large_motion
-from fem_reference.contact.finite import FiniteContact
 from fem_reference.contact.large_motion import LargeSolution, Pressed, Steps, linear_rest
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.elasticity import Body, without_fixed
@@ -29,7 +28,7 @@ from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepp
 from study.organ.geometry import Level
 from study.organ.grading import resolved
 from study.problem.problem import Problem
-from study.problem.rigid import PLATE
+from study.problem.rigid import PLATE, RigidTool
 from study.problem.trajectory import Observation, Trajectory
 from study.progress import Progress
 from study.results.fields import Mesh
@@ -101,9 +100,8 @@ class PreparedHyperelastic:
         return [f"{self.model.name}: {count} tetrahedra, small under the tools"]
 
     def refuse(self) -> None:
-        """ValueError for tools, damping or a mesh that this model cannot follow or hold."""
+        """ValueError for damping or a mesh that this model cannot follow or hold."""
         problem, level = self.problem, self.level()
-        FiniteContact.refuse(problem.rigid_tools)
         large_motion.refuse(self.model.linear.damping, problem.tissue)
         refuse_too_large(level.mesh, problem.tissue, ELEMENT, stepping=True)
         self._linear.refuse()
@@ -323,10 +321,15 @@ class PreparedHyperelastic:
 def _wanted(problem: Problem, share: float, centres: Floats, longest: Floats) -> Floats:
     """Longest edge [m] (n,) of tetrahedra that have such centres (n, 3) and longest edges (n,).
 
-    A `share` of what the level 0 has: fine under the tools, and coarser away from them.
+    A `share` of what the level 0 has: fine under the tools on their way, and coarser away from it.
     """
     found = np.full(len(centres), np.inf)
-    places = [(one.tip, one.radius) for one in problem.rigid_tools if one.shape != PLATE]
+    places = [
+        (tip, one.radius)
+        for one in problem.rigid_tools
+        if one.shape != PLATE
+        for tip in _along_surface(one, problem.observation.times)
+    ]
     patches = [load.tool for load in problem.loads]
     patches += [problem.tool] if problem.tool.force else []
     places += [(patch.centre, patch.radius) for patch in patches]
@@ -334,6 +337,17 @@ def _wanted(problem: Problem, share: float, centres: Floats, longest: Floats) ->
         away = np.linalg.norm(centres - tip, axis=1) - 0.5 * longest
         edge = UNDER * radius + GROWING * np.maximum(away - WITHIN * radius, 0.0)
         found = np.minimum(found, share * edge)
+    return found
+
+
+def _along_surface(tool: RigidTool, times: Floats) -> list[Floats]:
+    """Places [m] of a tool's tip where it starts and moves aside, half a radius apart or more."""
+    travel = tool.travel(times)
+    places = tool.tip + travel - np.outer(travel @ tool.axis, tool.axis)
+    found = [tool.tip]
+    for spot in places:
+        if min(np.linalg.norm(spot - other) for other in found) >= WITHIN * tool.radius:
+            found.append(spot)
     return found
 
 

@@ -108,6 +108,11 @@ def quarter(tissue: Tissue, element: str, finest: float, *, flat: bool) -> Body:
     Its elements are finest under a sphere, or at the edge of a flat punch, and grow with the
     distance.
     """
+    return on_nothing(quarter_mesh(finest, flat=flat), tissue, element)
+
+
+def quarter_mesh(finest: float, *, flat: bool) -> TetrahedralMesh:
+    """Its elements, `finest` [m] long at most where they have to be short."""
     mesh = block_mesh((SIZE, SIZE, SIZE), SIZE / COARSEST)
     mesh = TetrahedralMesh(mesh.points * [1.0, 1.0, -1.0], mesh.tetrahedra[:, [0, 2, 1, 3]])
     for _ in range(HALVINGS):
@@ -116,6 +121,11 @@ def quarter(tissue: Tissue, element: str, finest: float, *, flat: bool) -> Body:
         if (size <= wanted).all():
             break
         mesh = cut_into(mesh, np.where(size > wanted, 2.0, 1.0)).mesh
+    return mesh
+
+
+def on_nothing(mesh: TetrahedralMesh, tissue: Tissue, element: str) -> Body:
+    """The body on a mesh, with a support that does not count."""
     blunt = ToolPatch(np.zeros(3), DOWN, TOUCHED, 0.0)
     return discretise(mesh, tissue, Foundation(DOWN, SIZE, 1e-3, 1.0), blunt, element)
 

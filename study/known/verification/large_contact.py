@@ -1,13 +1,18 @@
-"""Rigid tools pressed on neo-Hookean elements: a plate at large strain, a sphere at small.
+"""Rigid tools on neo-Hookean elements: a plate at large strain, a sphere and a punch at small.
 
 A plate that a block meets in contact alone squeezes it as sliding plates that hold it do: by the
 two equations of `finite_strain.uniaxial`. A sphere that goes in little is Hertz's, as in
-`indentation`, the far faces of the block being moved as those of the half space are by that force.
+`indentation`, the far faces of the block being moved as those of the half space are by that force;
+and so is a smooth punch Boussinesq's. A sphere that is then dragged by d sticks in the middle of
+the contact and slips round it, until all of it slides: with the normal force N, friction m and the
+tangential stiffness k, the tangential force is m N (1 - (1 - 2 k d / (3 m N))^(3/2)) where no
+volume changes (Cattaneo 1938; Mindlin 1949, J. Appl. Mech. 16:259; Johnson 1985, eq. 7.42). That
+leaves out what slips across the way of the tool, which is worth a per cent or two of the force.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,30 +20,37 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from fem_reference.contact.balance import Balance, Balanced, Demand
+from fem_reference.contact.finite import Before
 from fem_reference.contact.large_motion import Steps, pressed, touched
-from fem_reference.elasticity import discretise
+from fem_reference.elasticity import Body, discretise
 from study.known.finding import Finding, number_of
 from study.known.verification import indentation
 from study.known.verification.finite_strain import EDGE, STRETCH, uniaxial
-from study.known.verification.half_space import DOWN
+from study.known.verification.half_space import DOWN, point_force
+from study.known.verification.moduli import shear_modulus
+from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
-from study.problem.rigid import PLATE, SPHERE, RigidTool
+from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 
 SQUEEZED, PRESSED = (0.3, 0.499), (0.45, 0.4999)
 """Poisson ratios under the plate and under the sphere."""
-EXACT, HERTZ = 1e-4, 1e-2
+EXACT, HERTZ, EDGED, MINDLIN = 1e-4, 1e-2, 1e-2, 2e-2
 """Limits of the errors: the plate's is that of the balance of forces alone."""
-FINEST = 0.5
-"""Longest edge of the elements under the sphere over the radius of contact."""
+FINEST, AT_EDGE = 0.5, 1 / 8
+"""Longest edge of the elements under the sphere over the radius of contact, and at the edge of a
+punch, where the pressure is singular."""
+FRICTION, DRAGGED, DRAGGED_NU = 0.3, (0.5, 1.0), 0.4999
+"""Of the sphere that is dragged, and to what shares of the force at which it slides."""
+ALONG, TOUCHING = np.array([1.0, 0.0, 0.0]), 1e-9
 
 
 def findings() -> Iterator[Finding]:
-    """Forces of a plate and of a sphere."""
+    """Forces of a plate, of spheres and of a punch."""
     for nu in SQUEEZED:
         tissue = Tissue(poisson_ratio=nu)
         stress = uniaxial(tissue, STRETCH)[1]
@@ -48,7 +60,16 @@ def findings() -> Iterator[Finding]:
         tissue = Tissue(poisson_ratio=nu)
         exact = indentation.exact_force(SPHERE, tissue, bonded=False)
         label = f"force of a sliding sphere [N], neo-Hookean, nu {nu:g}"
-        yield number_of(label, exact, sphere(tissue, FINEST), HERTZ)
+        yield number_of(label, exact, small(SPHERE, tissue, FINEST), HERTZ)
+    tissue = Tissue(poisson_ratio=PRESSED[0])
+    exact = indentation.exact_force(PUNCH, tissue, bonded=False)
+    label = f"force of a sliding punch [N], neo-Hookean, nu {PRESSED[0]:g}"
+    yield number_of(label, exact, small(PUNCH, tissue, AT_EDGE), EDGED)
+    for exact, found in drags(FINEST):
+        label = (
+            f"tangential over normal force of a dragged sphere, {exact / FRICTION:.0%} of sliding"
+        )
+        yield number_of(label, exact, found, MINDLIN)
 
 
 def squeezed(tissue: Tissue) -> float:
@@ -69,20 +90,99 @@ def squeezed(tissue: Tissue) -> float:
     return float(given.on_tools(state)[0] @ DOWN)
 
 
-def sphere(tissue: Tissue, finest: float) -> float:
-    """Force [N] that presses a sphere in, elements being `finest` times the contact's radius."""
-    tool = indentation.tool_of(SPHERE, bonded=False)
+def small(shape: int, tissue: Tissue, finest: float) -> float:
+    """Force [N] that presses a smooth sphere or punch in by little.
+
+    Elements are `finest` times the radius of contact, near the sphere or at the punch's edge.
+    """
+    tool = indentation.tool_of(shape, bonded=False)
     size = finest * indentation.TOUCHED
-    bare = indentation.quarter(tissue, "taylor-hood", size, flat=False)
-    held = indentation.held(bare)
-    fixed = (bare.points < 1e-9) & [True, True, False]
-    fixed[indentation.is_far(bare.points)] = True
-    body = replace(bare, support=csc_array(bare.support.shape), fixed=fixed.ravel())
-    given = touched(body, tissue, (tool,), np.array([0.0, 1.0]))
+    bare = indentation.quarter(tissue, "taylor-hood", size, flat=shape == PUNCH)
+    given = touched(_framed(bare, [True, True, False]), tissue, (tool,), np.array([0.0, 1.0]))
+    exact = indentation.exact_force(shape, tissue, bonded=False)
     start = np.zeros(len(given.free))
-    exact = indentation.exact_force(SPHERE, tissue, bonded=False)
-    start[: given.solid.size] = 0.25 * exact * indentation.far_field(held, tissue)
+    far = indentation.far_field(indentation.held(bare), tissue)
+    start[: given.solid.size] = 0.25 * exact * far
     guess = Balanced(start, np.zeros(len(given.contact.held)))
-    state = Balance(given).found(guess, Demand(1.0, 0.0, np.zeros(given.solid.size)))
-    forces = given.contact.on_tools(given.given(state.w), 1.0, state.force)
-    return float(4.0 * forces[0] @ -DOWN)
+    demand = Demand(1.0, 0.0, np.zeros(given.solid.size))
+    state = Balance(given).found(guess, demand)
+    return float(4.0 * given.met(state.w, demand).on_tools(state.force)[0] @ -DOWN)
+
+
+def _framed(bare: Body, planes: Sequence[bool]) -> Body:
+    """A part of a half space that nothing but its planes of symmetry and far faces hold."""
+    fixed = (np.abs(bare.points) < TOUCHING) & planes
+    fixed[indentation.is_far(bare.points)] = True
+    return replace(bare, support=csc_array(bare.support.shape), fixed=fixed.ravel())
+
+
+def drags(finest: float) -> list[tuple[float, float]]:
+    """Tangential over normal force of a sphere that is dragged, as it should be and as found.
+
+    A half of a half space without change of volume, elements `finest` times the radius of contact;
+    the far faces are moved as those of the half space are by the exact forces.
+    """
+    tissue = Tissue(poisson_ratio=DRAGGED_NU)
+    bare = _half(tissue, finest * indentation.TOUCHED)
+    normal = indentation.exact_force(SPHERE, tissue, bonded=False)
+    shear = shear_modulus(tissue)
+    # Mindlin's tangential stiffness 8 G* a, with G* = G / (2 - nu) beside a rigid sphere.
+    stiffness = 8.0 * shear / (2.0 - tissue.poisson_ratio) * indentation.TOUCHED
+    shares = np.array([0.0, *DRAGGED])
+    slides = 1.5 * FRICTION * normal / stiffness
+    aside = slides * (1.0 - (1.0 - shares) ** (2.0 / 3.0))
+
+    def travel(times: Floats) -> Floats:
+        down = np.outer(np.minimum(times, 1.0), indentation.DEPTH * DOWN)
+        return down + np.outer(np.interp(times, 1.0 + np.arange(len(shares)), aside), ALONG)
+
+    radius = indentation.TOUCHED**2 / indentation.DEPTH
+    tool = RigidTool("tool", SPHERE, radius, np.zeros(3), DOWN, travel, friction=FRICTION)
+    times = 1.0 + np.arange(len(shares))
+    given = touched(_framed(bare, [False, True, False]), tissue, (tool,), np.append(0.0, times))
+    far, balance, n = indentation.is_far(bare.points), Balance(given), given.solid.size
+    down, sideways = (
+        kind(bare.points[far], tissue) * normal for kind in (point_force, tangential_force)
+    )
+    state, before, found = (
+        Balanced(np.zeros(len(given.free)), np.zeros(len(given.contact.held))),
+        None,
+        [],
+    )
+    for time, share in zip(times, shares, strict=True):
+        w = state.w.copy()
+        moved = w[:n].reshape(-1, 3)
+        moved[far] = down + FRICTION * share * sideways
+        moved[np.abs(bare.points[:, 1]) < TOUCHING, 1] = 0.0
+        demand = Demand(float(time), 0.0, np.zeros(n), before)
+        state = balance.found(Balanced(w, state.force), demand)
+        force = given.met(state.w, demand).on_tools(state.force)[0]
+        before = Before(given.given(state.w), float(time))
+        found.append(float(-(force @ ALONG) / (force @ -DOWN)))
+    return list(zip(FRICTION * shares[1:], found[1:], strict=True))
+
+
+def _half(tissue: Tissue, finest: float) -> Body:
+    """Two quarters, one the other's image."""
+    mesh = indentation.quarter_mesh(finest, flat=False)
+    image = mesh.points * [-1.0, 1.0, 1.0]
+    points, place = np.unique(
+        np.round(np.concatenate([mesh.points, image]), 12), axis=0, return_inverse=True
+    )
+    own, other = place.ravel().reshape(2, -1)
+    cells = np.concatenate([own[mesh.tetrahedra], other[mesh.tetrahedra][:, [0, 2, 1, 3]]])
+    return indentation.on_nothing(TetrahedralMesh(points, cells), tissue, "taylor-hood")
+
+
+def tangential_force(off: Floats, tissue: Tissue) -> Floats:
+    """Displacement per newton [m/N] (..., 3) at places relative to a force along x.
+
+    Of a half space below z = 0: Cerruti (1882); Johnson (1985), eq. 3.75.
+    """
+    nu, scale = tissue.poisson_ratio, 1.0 / (4.0 * np.pi * shear_modulus(tissue))
+    R, x, y, z = np.linalg.norm(off, axis=-1), off[..., 0], off[..., 1], -off[..., 2]
+    loose = 1.0 - 2.0 * nu
+    along = 1.0 / R + x**2 / R**3 + loose * (1.0 / (R + z) - x**2 / (R * (R + z) ** 2))
+    across = x * y / R**3 - loose * x * y / (R * (R + z) ** 2)
+    down = x * z / R**3 + loose * x / (R * (R + z))
+    return np.asarray(scale * np.stack([along, across, -down], axis=-1))
