@@ -148,6 +148,20 @@ def test_a_plate_on_a_column_is_uniaxial_compression():
     assert found == pytest.approx(exact, rel=1e-6)
 
 
+def test_a_column_damped_by_its_stiffness_resists_as_kelvin_and_voigt_have_it():
+    """Pressed evenly, by E A / L (d + beta v) with its support, once what was set off is over."""
+    beta, speed, stiff = 0.05, 1e-3, 1e9
+    tissue, top = Tissue(poisson_ratio=0.0), np.array([0.02, 0.02, 0.06])
+    mesh, blunt = block_mesh((0.04, 0.04, 0.06), 0.02), ToolPatch(top, DOWN, 0.03, 0.0)
+    body = discretise(mesh, tissue, Foundation(DOWN, 0.0, 1e-3, stiff), blunt, "p2")
+    plate = RigidTool("tool", PLATE, 1.0, top, DOWN, lambda t: np.outer(speed * t, DOWN))
+    seen = observed(1.0, 41, 40)
+    moved = run(body, (plate,), RayleighDamping(0.0, beta), np.zeros_like, seen, fem.Method())
+    found = moved.trajectory.tool_force[20:, 0] @ DOWN
+    stiffness = 0.04**2 / (0.06 / tissue.youngs_modulus + 1.0 / stiff)
+    assert found == pytest.approx(-stiffness * speed * (seen.times[20:] + beta), rel=5e-3)
+
+
 def test_a_bonded_tool_pulls_as_it_pushes():
     body, seen = block(), observed(0.1, 3, 2)
     push, pull = (

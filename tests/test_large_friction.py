@@ -14,12 +14,16 @@ from fem_reference.contact.law import dragged, off_law
 from fem_reference.contact.motion import at_peak
 from fem_reference.elasticity import discretise
 from study.models import hyperelastic
+from study.models.model import SILENT
+from study.models.table import models_of
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 from study.problem.tissue import Tissue
 from study.problem.trajectory import Observation
+from study.scene.file import read_scene
+from study.scene.problem import problem_of
 
 DOWN, ALONG = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])
 SIZE = (0.06, 0.06, 0.03)
@@ -417,3 +421,51 @@ def test_the_mesh_is_fine_along_the_way_of_a_tool_and_not_in_its_depth():
     assert len(aside) == 4  # of a way of four halves of a radius, at samples
     assert aside[:, 2] == pytest.approx(0.03)
     assert np.diff(np.sort(aside[:, 0])).min() >= 0.5 * RADIUS
+
+
+SCENE = """
+title = "A punch that rubs"
+models = ["hyperelastic"]
+[organ]
+shape = "block"
+size = ["60 mm", "60 mm", "40 mm"]
+[support]
+side = "inferior"
+[tool]
+shape = "punch"
+radius = "20 mm"
+friction = 0.3
+place = { side = "superior", at = [0.5, 0.5] }
+path = [
+  { time = "0 s", travel = "0 mm" },
+  { time = "0.2 s", travel = "2 mm" },
+  { time = "0.4 s", offset = ["8 mm", "0 mm", "-2 mm"] },
+]
+[reference]
+element_size = "30 mm"
+steps_per_sample = 1
+[time]
+duration = "0.4 s"
+samples = 17
+"""
+
+
+@pytest.mark.slow
+def test_a_scene_with_a_punch_that_rubs_is_followed_with_errors_of_its_force(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    scene = read_scene(str(path))
+    (model,) = models_of(scene, {})
+    prepared = model.prepare(problem_of(scene))
+    prepared.refuse()
+    found = prepared.run(SILENT)
+    force = found.record.elements.contact.forces["tool"]
+    assert found.trajectory.status == "finished"
+    assert 0.0 < force.by_mesh < 0.5
+    assert 0.0 < force.by_steps < 0.3
+    on_tool = found.trajectory.tool_force[:, 0]
+    normal, drag = on_tool[:, 2], -on_tool[:, 0]
+    assert normal[1:].min() > 0.1
+    assert (drag <= 0.3 * normal * (1.0 + 1e-6)).all()
+    assert drag[-3:] == pytest.approx(0.3 * normal[-3:], rel=0.02)
+    assert np.abs(drag[:9]).max() < 0.02 * normal.max()

@@ -8,8 +8,8 @@ frictionless punch is likewise Boussinesq's.
 A sphere that is then dragged by d sticks in the middle of the contact and slips around it, until
 all of it slides. With the normal force N, the coefficient m and the tangential stiffness k, the
 tangential force is m N (1 - (1 - 2 k d / (3 m N))^(3/2)) for an incompressible body (Cattaneo 1938;
-Mindlin 1949, J. Appl. Mech. 16:259; Johnson 1985, eq. 7.42). This neglects slip across the
-direction of the tool, which is a per cent or two of the force.
+Mindlin 1949, J. Appl. Mech. 16:259; Johnson 1985, eq. 7.42). The formula neglects slip across the
+direction of the tool, so that elements need not converge to it; the limit leaves room for that.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def cases() -> Iterator[Case]:
         yield _case(name, {"shape": shape, "friction": 1.0, "aside": 3e-3})
     yield _case("a smooth punch that is dragged", {"shape": "punch", "aside": 6e-3})
     yield _case("a smooth punch 0.6 of its radius deep", {"shape": "punch", "depth": 0.6 * RADIUS})
-    # On elements as wide as the punch, those at its edge invert before.
+    # Elements are as wide as the punch here; the outcome was observed, and its cause not examined.
     yield _case(
         "a smooth punch as deep as its radius", {"shape": "punch", "depth": RADIUS}, lost=True
     )
