@@ -50,10 +50,10 @@ def kernel(
 ) -> Callable[[F], F]:
     """Compile a function as a kernel, cached on disk if it belongs to this package.
 
-    With `makes_arrays` false neither it nor any kernel that it calls makes one, by array arithmetic
-    either: then nobody counts who holds the many arrays of a network, which is a sixth of the time
-    that it takes to compile. An array made all the same would never be freed. `nogil` and `inline`
-    are numba's. Division by zero follows IEEE.
+    `makes_arrays=False` promises that neither the kernel nor any that it calls allocates an array,
+    also not by array arithmetic. Reference counting of the many arrays of a network is then left
+    out, which saves a sixth of the compilation; an array allocated nevertheless would never be
+    freed. `nogil` and `inline` are those of numba. Division by zero follows IEEE 754.
     """
     return _compiled(nogil=nogil, inline=inline, _nrt=makes_arrays)
 
@@ -68,7 +68,7 @@ def inner_kernel(*, inline: Literal["never", "always"] = "never") -> Callable[[F
 
 def _compiled(**options: Any) -> Callable[[F], F]:
     def compiled(function: F) -> F:
-        # The way in from C is left out: no kernel is handed on as a value.
+        # No kernel is passed as a value, so none needs a C wrapper.
         made = numba.njit(error_model="numpy", no_cfunc_wrapper=True, **options)(function)
         if _stands_here(function):
             made._cache = _OwnTypes(function)  # what cache=True sets

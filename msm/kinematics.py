@@ -12,7 +12,7 @@ from msm.kernel import inner_kernel, kernel
 Floats = NDArray[np.float64]
 
 X, Y, Z = (cast("int", axis) for axis in np.arange(3))
-"""Components. Of a plain number numba would compile what it is given to once for each."""
+"""Components. For literal integers numba would compile the callee once per value."""
 
 
 @inner_kernel()

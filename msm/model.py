@@ -339,10 +339,12 @@ def _result(
 
 
 @lru_cache(maxsize=1)
-def _seen(lattice: LatticeMesh, observation: Observation) -> tuple[csr_array, csr_array, csr_array]:
+def _interpolation_weights(
+    lattice: LatticeMesh, observation: Observation
+) -> tuple[csr_array, csr_array, csr_array]:
     """Weights (q, n) of probes, points in the volume and points of the surface.
 
-    Those of the last lattice are kept: one is run with springs of several kinds, and at half steps.
+    Those of the last lattice are cached, since it is run with several spring laws and time steps.
     """
     points = observation.probes, observation.volume_points, observation.surface_points
     probes, volume, surface = (lattice.interpolation(some)[0] for some in points)
@@ -362,7 +364,9 @@ class _Recorder:
         self.overlap = np.zeros(len(observation.times))
         self.strain = np.zeros(len(observation.times))
         self.inverted = np.zeros(len(observation.times), dtype=np.int64)
-        self.at_probes, self.in_volume, self.on_surface = _seen(lattice, observation)
+        self.at_probes, self.in_volume, self.on_surface = _interpolation_weights(
+            lattice, observation
+        )
 
     def record(self, sample: int, stepper: LatticeStepper) -> None:
         """Record the motion at one sample."""
