@@ -92,8 +92,19 @@ def test_so_it_is_by_the_commands_with_exit_code_2(command, typed, tmp_path):
 
 
 @pytest.fixture(scope="module", params=UNTUNED)
-def prepared(request, small_scene, small_posed):
-    return model(small_scene, request.param).prepare(small_posed)
+def one(request, small_scene):
+    return model(small_scene, request.param)
+
+
+@pytest.fixture(scope="module")
+def prepared(one, small_posed):
+    return one.prepare(small_posed)
+
+
+@pytest.fixture(scope="module")
+def motion(prepared):
+    """Its own, simulated once for all who look at it."""
+    return prepared.simulate()
 
 
 def test_a_model_tells_what_it_would_run(prepared):
@@ -103,8 +114,8 @@ def test_a_model_tells_what_it_would_run(prepared):
     assert prepared.critical_time_step > 0.0
 
 
-def test_a_motion_is_whole_starts_from_rest_and_comes_out_again(prepared, small_posed):
-    found, again = (prepared.simulate() for _ in range(2))
+def test_a_motion_is_whole_starts_from_rest_and_comes_out_again(prepared, motion, small_posed):
+    found, again = motion, prepared.simulate()
     run, seen = found.trajectory, small_posed.observation
     assert run.status == "finished"
     assert run.displacement.shape == run.velocity.shape == (len(seen.times), len(seen.probes), 3)
@@ -119,14 +130,14 @@ def test_a_motion_is_whole_starts_from_rest_and_comes_out_again(prepared, small_
     assert found.margin > 1.0
 
 
-def test_equal_steps_divide_a_sample_and_are_no_longer_than_asked(prepared, small_posed):
+def test_equal_steps_divide_a_sample_and_are_no_longer_than_asked(prepared, motion, small_posed):
     interval = float(small_posed.observation.times[1])
     longest = 0.37 * min(prepared.critical_time_step, interval)
     found = prepared.simulate(longest)
     count = interval / found.step
     assert found.step <= longest * (1 + 1e-9)
     assert count == pytest.approx(round(count), rel=1e-9)
-    own = prepared.simulate().trajectory.displacement
+    own = motion.trajectory.displacement
     apart = np.abs(found.trajectory.displacement - own).max() / np.abs(own).max()
     assert apart < 0.02
 
@@ -167,9 +178,7 @@ def test_a_stepper_starts_at_rest_and_steps_the_same_again(prepared):
         np.testing.assert_allclose(ready.displacement(), found, rtol=0.0, atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize("name", UNTUNED)
-def test_a_run_is_the_simulation_with_its_record(name, small_scene, small_posed):
-    one = model(small_scene, name)
+def test_a_run_is_the_simulation_with_its_record(one, motion, small_posed):
     found = one.prepare(small_posed).run(SILENT)
     record = found.record
     assert (record.name, record.label, record.status) == (one.name, one.label, "finished")
@@ -178,8 +187,7 @@ def test_a_run_is_the_simulation_with_its_record(name, small_scene, small_posed)
     assert record.time_step_error.displacement < 0.01
     assert found.checks
     assert all(check.passed for check in found.checks)
-    simulated = one.prepare(small_posed).simulate().trajectory
-    np.testing.assert_array_equal(found.trajectory.displacement, simulated.displacement)
+    np.testing.assert_array_equal(found.trajectory.displacement, motion.trajectory.displacement)
 
 
 # --- models in a study ----------------------------------------------------------------------------
