@@ -158,7 +158,8 @@ def printed(content: dict[str, Any], name: str = report.TEMPLATE) -> list[str]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(typst, "compile", query)
         text = report.compile_pdf(content, {"motion": []}, name).decode()
-    return [json.loads(piece) for piece in TEXT.findall(text)]
+    # A number and its unit are kept on one line by a space that does not break.
+    return [json.loads(piece).replace("\u00a0", " ") for piece in TEXT.findall(text)]
 
 
 def printed_beforehand() -> list[str]:

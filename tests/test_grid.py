@@ -101,7 +101,7 @@ def compare(assembly, made, width, integrator="symplectic-euler", *, linear=Fals
     method = INTEGRATORS[integrator]
     dt = 0.3 * critical_time_step(assembly, made)
     grids = grids_of(assembly.lattice, net, width)
-    assert {len(grid.job_pool) for grid in grids.grids} == {width}
+    assert {len(grid.lanes) for grid in grids.grids} == {width}
     if change is not None:
         change(grids)
     found = moved(method, made.law, net, dt, method.on_grid, grids)
@@ -261,7 +261,7 @@ def test_steppers_of_cubic_lattices_are_on_a_grid_and_others_are_not(bodies):
     assembly = bodies("block")
     made = material(assembly)
     on = {name: LatticeStepper(assembly, made, np.ones_like, name).grids for name in EXPLICIT}
-    assert all(len(grids.grids[0].job_pool) == widest() for grids in on.values())
+    assert all(len(grids.grids[0].lanes) == widest() for grids in on.values())
     assert LatticeStepper(assembly, made, np.ones_like, "split-volume").grids is None
 
 

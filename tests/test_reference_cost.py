@@ -195,7 +195,7 @@ def prepared(small_scene):
 
 @pytest.fixture(scope="module")
 def solved(prepared):
-    found, _ = prepared._solve(prepared._paced(SILENT.progress)[0], SILENT.progress)
+    found, _ = prepared._solve(prepared._solve_coarsest(SILENT.progress)[0], SILENT.progress)
     return found
 
 

@@ -279,7 +279,7 @@ def test_a_series_that_breaks_elsewhere_is_told_apart(folder):
 @pytest.mark.usefixtures("folder")
 def test_the_document_prints_them_and_says_that_they_are_of_no_run():
     texts = printed_beforehand()
-    assert "None of these figures are of a run." in texts
+    assert "None of these figures is of a run of yours." in texts
     assert {"springs and volume term, 10 mm", "4.0 ± 0.3 %", "60.0 %"} <= set(texts)
     measured = robustness()["tradeoff"]["measured"]
     assert measured == (

@@ -68,9 +68,7 @@ def findings() -> Iterator[Finding]:
     label = f"force of a sliding punch [N], neo-Hookean, nu {PRESSED[0]:g}"
     yield number_of(label, exact, small(PUNCH, tissue, AT_EDGE), EDGED)
     for exact, found in drags(FINEST):
-        label = (
-            f"tangential over normal force of a dragged sphere, {exact / FRICTION:.0%} of sliding"
-        )
+        label = f"T/N of a dragged sphere at {exact / FRICTION:.0%} of sliding"
         yield number_of(label, exact, found, MINDLIN)
 
 
