@@ -588,7 +588,7 @@ TOOLS_HEAD = (
 
 
 def planned_tools() -> Iterator[tuple[str, str]]:
-    """What a plan foretells under moved tools, and what two lattices without a factor would."""
+    """What a plan predicts under moved tools, and what two lattices would."""
     every, rows = measured("planned_tools"), []
     lines = [one for one in every if float(one["found"]) > 1e-3]  # else a bonded tool holds it
     yield "planned-tools-scenes", str(len({one["scene"] for one in lines}))
@@ -601,6 +601,11 @@ def planned_tools() -> Iterator[tuple[str, str]]:
         spread = f"{median(ratios):.2g}, {max(ratios):.2g}"
         other = [str(sum(one <= 1.0 for one in by_two)), f"{max(by_two):.2g}"]
         rows.append([quantity, str(len(ratios)), *within, spread, *other])
+        if quantity == "at all points":
+            continue
+        for name, factor in (("index", 3.0), ("bare", 1.0)):
+            covered = f"{sum(one <= factor for one in by_two)} of {len(by_two)}"
+            yield f"spacing-{name}-{quantity.replace(' ', '-')}", covered
     yield "planned-tools", table(TOOLS_HEAD, rows)
 
 

@@ -78,14 +78,14 @@ def test_the_estimate_covers_the_error(problem, moved):
 
 
 def test_the_index_covers_most_errors_of_lattices_under_moved_tools():
-    """Two lattices of a plan stand for those of a run: 124 of 128 forces, 106 of 128 points."""
+    """Two lattices of a plan stand for those of a run; a bonded tool holds what does not err."""
     rows = list(csv.DictReader(TABLE.read_text(encoding="utf-8").splitlines()))
     shares = {
         quantity: np.mean(
             [
                 float(one["found"]) <= INDEX * float(one["by_two"])
                 for one in rows
-                if one["quantity"] == quantity
+                if one["quantity"] == quantity and float(one["found"]) > 1e-3
             ]
         )
         for quantity in ("force", "at the tool")

@@ -205,7 +205,7 @@ def test_a_bonded_tool_holds_and_pulls():
 
 def test_what_is_bonded_is_met_at_no_more_points_than_a_flat_tool():
     def points(*overrides):
-        return len(posed(*overrides)[1].assembly.burden.surface.points)
+        return len(posed(*overrides)[1].assembly.external_loads.surface.points)
 
     flat, bonded = points("tool.shape=punch"), points("tool.contact=bonded")
     assert points() > 2 * bonded == 2 * flat

@@ -22,10 +22,12 @@ COARSER = 2.0
 """Spacing of the coarser lattice over that of the lattice whose error is estimated."""
 ORDER = 1.0
 """Assumed order of convergence."""
+CHANGE = 1.0 / (COARSER**ORDER - 1.0)
+"""Richardson's estimate of the error over the change from the coarser lattice."""
 SAFETY = 3.0
-INDEX = SAFETY / (COARSER**ORDER - 1.0)
-"""Grid convergence index over the change from the coarser lattice. How often it covers the error is
-in `reports/data/planned_tools.csv`."""
+INDEX = SAFETY * CHANGE
+"""Grid convergence index over that change. `reports/data/planned_tools.csv` shows how often it
+covers the error."""
 TINY = 1e-300
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.models.lattice import LatticeModel
-from study.models.spacing_error import COARSER, INDEX, force_differences
+from study.models.spacing_error import CHANGE, COARSER, force_differences
 from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.similarity.fields import relative_l2, relative_l2_of_curves
@@ -112,7 +112,8 @@ def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
 def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolution:
     """The finest lattice of a family as reference solution, from both runs of `lattices`.
 
-    Its own errors are the changes due to halving the spacing, as grid convergence indices.
+    Its own errors are Richardson's estimates from the changes due to halving the spacing, without
+    the safety factor of a run's: with it, lattices of a few spacings could not be told from it.
     ValueError where one of the two did not finish.
     """
     finest, coarser = (_whole(one, given) for one in outcomes)
@@ -123,11 +124,11 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
         )
     volumes = given.problem.volume_rule.weights
     curves = relative_l2_of_curves(coarser.curves - finest.curves, finest.curves)
-    over_time, peak = INDEX * force_differences(given.problem, coarser.force, finest.force)
+    over_time, peak = CHANGE * force_differences(given.problem, coarser.force, finest.force)
     return replace(
         finest,
-        field_error=INDEX * relative_l2(coarser.field, finest.field, volumes),
-        curve_errors=INDEX * curves,
+        field_error=CHANGE * relative_l2(coarser.field, finest.field, volumes),
+        curve_errors=CHANGE * curves,
         force_errors=over_time,
         peak_errors=np.maximum(over_time, peak),  # single numbers may coincide
     )
