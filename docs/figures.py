@@ -830,7 +830,7 @@ def validation() -> Iterator[tuple[str, str]]:
     yield "validated-cylinders", table(("model, faces", "10 %", "20 %", "30 %"), rows)
     alone, free = (
         [line for line in lines if (line["quantity"], line["case"]) == (name, "weight alone")]
-        for name in ("tip down, mean of markers", "frequency of free motion")
+        for name in ("tip deflection, mean of markers", "frequency of free vibration")
     )
     tip, frequency = (
         f"{float(own[0]['measured']):.2f} ± {float(own[0]['uncertainty']):.2f}"
@@ -877,7 +877,7 @@ def _beads(lines: list[Line], models: list[str]) -> Iterator[list[str]]:
     left = {
         (line["model"], line["case"], line["faces"]): f"{float(line['found']):.2f}"
         for line in lines
-        if line["quantity"] == "residual of beads, rms" and line["found"]
+        if line["quantity"] == "rms residual of the beads" and line["found"]
     }
     for model in models:
         pairs = (

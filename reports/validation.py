@@ -17,16 +17,16 @@ NAME = "validation"
 CYLINDERS, CANTILEVER, CUBE = "cylinders", "cantilever", "cube"
 ROUNDING = 1e-9
 """An own error that is only this, relative."""
-ONE_AXIS = "residual along"
+ONE_AXIS = "rms residual along"
 """How quantities begin that the table has of each axis beside the whole."""
-WITHIN = {"True": "within", "False": "beyond", "": DASH}
+AGREES = "agrees"
 
 
 class Median(NamedTuple):
-    """Of many cases: median, least and largest relative difference, and how many lie within.
+    """Of many cases: median, least and largest relative difference, and how many agree.
 
-    `uncertainty` and `own`: medians of the measurement's and of the model's own, relative; nothing
-    is said of cases without an answer, of `cases` in all.
+    `uncertainty` and `own`: medians of the measurement's and of the model's numerical error,
+    relative. Only the `answered` of all `cases` count.
     """
 
     difference: float
@@ -34,7 +34,7 @@ class Median(NamedTuple):
     largest: float
     uncertainty: float
     own: float | None
-    within: int
+    agreeing: int
     answered: int
     cases: int
 
@@ -51,12 +51,13 @@ def validation() -> dict[str, object] | None:
             for problem in (CANTILEVER, CUBE)
             for faces, rows in _by_faces(lines, problem)
         ],
-        "within": _within(lines),
+        "agreeing": _agreeing(lines),
+        "unresolved": sum(line["verdict"] == "not resolved" for line in lines),
     }
 
 
 def cylinder_rows(lines: list[Line]) -> list[Group]:
-    """By what the plates do: model, quantity, median and range, uncertainty, own error, within."""
+    """By what the plates do: model, quantity, median and range, uncertainty, error, agreeing."""
     groups: list[Group] = []
     for faces in _faces(lines, CYLINDERS):
         rows: Table = []
@@ -91,14 +92,14 @@ def summed(lines: list[Line]) -> Median | None:
         for line in answered
         if line["numerical"]
     ]
-    within = sum(line["within"] == "True" for line in answered)
+    agreeing = sum(line["verdict"] == AGREES for line in answered)
     return Median(
         median(off),
         min(off),
         max(off),
         median(spread),
         median(own) if own else None,
-        within,
+        agreeing,
         len(answered),
         len(lines),
     )
@@ -110,19 +111,19 @@ def of_body(lines: list[Line], problem: str, quantity: str) -> list[Line]:
 
 
 def _median_cells(found: Median) -> list[str]:
-    answered = f"{found.within} of {found.answered}"
+    answered = f"{found.agreeing} of {found.answered}"
     lacking = found.cases - found.answered
     return [
         _signed(found.difference),
         f"{_signed(found.least)} to {_signed(found.largest)}",
         percent(found.uncertainty),
         DASH if found.own is None else percent(found.own if found.own > ROUNDING else 0.0),
-        answered + (f", {lacking} without an answer" if lacking else ""),
+        answered + (f", {lacking} without a result" if lacking else ""),
     ]
 
 
 def _none(lines: list[Line]) -> list[str]:
-    return [words(lines[0]["note"]), DASH, DASH, DASH, "no answer"]
+    return [words(lines[0]["note"]), DASH, DASH, DASH, "no result"]
 
 
 def _by_faces(lines: list[Line], problem: str) -> Iterator[tuple[str, Table]]:
@@ -147,7 +148,7 @@ def _body_row(line: Line) -> list[str]:
         off,
         significant(_number(line, "uncertainty"), 2),
         significant(float(line["numerical"]), 2) if line["numerical"] else DASH,
-        WITHIN[line["within"]] if found else words(line["note"]),
+        line["verdict"] or DASH if found else words(line["note"]),
     ]
 
 
@@ -155,10 +156,9 @@ def _faces(lines: list[Line], problem: str) -> list[str]:
     return list(dict.fromkeys(line["faces"] for line in lines if line["problem"] == problem))
 
 
-def _within(lines: list[Line]) -> str:
-    answered = [line for line in lines if line["found"]]
-    within = sum(line["within"] == "True" for line in answered)
-    return f"{within} of {len(answered)}"
+def _agreeing(lines: list[Line]) -> str:
+    predicted = [line for line in lines if line["verdict"] not in {"", "fitted"}]
+    return f"{sum(line['verdict'] == AGREES for line in predicted)} of {len(predicted)}"
 
 
 def _signed(share: float) -> str:

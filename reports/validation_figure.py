@@ -19,7 +19,7 @@ COLOURS = ("#777777", "#000000", "#E69F00", "#0072B2", "#D55E00")
 BAND = "#dddddd"
 LOWEST, HIGHEST = -60.0, 60.0
 """[%] of the force that is shown; what lies beyond is marked at the edge."""
-TIP, BEADS = "tip down, mean of markers", "residual of beads, rms"
+TIP, BEADS = "tip deflection, mean of markers", "rms residual of the beads"
 
 
 def validation_figure() -> bytes | None:
@@ -81,7 +81,7 @@ def _beam(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
     axes.axhspan(-spread, spread, color=BAND, zorder=0)
     axes.set_xticks([])
     axes.set_xlabel("beam under its weight")
-    axes.set_ylabel("tip down, model − measured [mm]")
+    axes.set_ylabel("tip deflection, model − measured [mm]")
 
 
 def _cube(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:

@@ -30,9 +30,9 @@ FACTORS = ((0.92, 1.06), (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.6, 3.2))
 """Load factors, which equal the start modulus over the modulus sought: near, then far."""
 INWARDS = 2e-3
 """[m] over which the rotation of the surface is evaluated."""
-FITTED = "modulus, to the tip's way with 101 g"
+FITTED = "modulus, to the tip deflection with 101 g"
 NOTHING_FITTED = "nothing: the modulus is that of 101 g"
-TIP, EACH = "tip down, mean of markers", "markers, rms of the difference"
+TIP, EACH = "tip deflection, mean of markers", "rms error of the markers"
 VIBRATION, VIBRATION_SPREAD = 7.76, 0.03
 """[Hz], of free motion about the rest under its weight, after the beam was let go: of marker
 tip_top at 100 Hz by a decaying cosine, in parts of half a second of two repeats 7.72 to 7.80. Its
@@ -178,12 +178,14 @@ def _rows(
             numerical=1e3 * own_error([one.down[i] for one in seen], sizes),
             modulus=seen[-1].modulus,
             fitted=FITTED if i else NOTHING_FITTED,
+            calibrated=i == 1,
             note=seen[-1].failure,
         )
         yield row
         yield replace(
             row,
             quantity=EACH,
+            calibrated=False,
             measured=0.0,
             uncertainty=1e3 * each,
             found=1e3 * seen[-1].apart[i],
@@ -198,7 +200,7 @@ def _frequency_row(kind: Kind, seen: list[_Seen], sizes: list[float]) -> Compari
         case="weight alone",
         faces="clamped",
         model=kind.label,
-        quantity="frequency of free motion",
+        quantity="frequency of free vibration",
         unit="Hz",
         measured=VIBRATION,
         uncertainty=VIBRATION_SPREAD,

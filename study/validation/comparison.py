@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,7 @@ COVERAGE = 2.0
 """Coverage factor: standard uncertainties within which a difference counts as explained."""
 ORDER = 2.0
 """Largest accepted order of convergence: edges of held faces are singular."""
+Verdict = Literal["agrees", "differs", "not resolved", "fitted"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +25,8 @@ class Comparison:
     `numerical`: the model's own error by its meshes or spacings, nan for a single one. `coverage`:
     the coverage factor, 1 where the residual of many readings is compared with their noise.
     `modulus`: the Young's modulus [Pa] used, nan where it has no effect. `fitted`: what was fitted
-    to the measurement. `note`: why a number is missing, or a further remark.
+    to the measurement, and `calibrated` whether this quantity is what it was fitted to, so that the
+    difference is no prediction. `note`: why a number is missing, or a further remark.
     """
 
     problem: str
@@ -39,6 +42,7 @@ class Comparison:
     coverage: float = COVERAGE
     modulus: float = math.nan
     fitted: str = ""
+    calibrated: bool = False
     note: str = ""
 
     @property
@@ -47,15 +51,23 @@ class Comparison:
         return self.found - self.measured
 
     @property
-    def judged(self) -> bool:
-        """Whether there is a number, and an uncertainty to compare its difference with."""
-        return self.answered and math.isfinite(self.uncertainty)
+    def verdict(self) -> Verdict | None:
+        """Whether the prediction agrees with the measurement; None without an uncertainty.
 
-    @property
-    def within(self) -> bool:
-        """Whether the difference is explained by both uncertainties."""
+        It agrees if the difference is at most the expanded uncertainty plus the numerical error.
+        Where it does and the numerical error is the larger of the two, nothing is resolved.
+        """
+        if not self.answered:
+            return None
+        if self.calibrated:
+            return "fitted"
+        if not math.isfinite(self.uncertainty):
+            return None
+        expanded = self.coverage * self.uncertainty
         own = 0.0 if math.isnan(self.numerical) else self.numerical
-        return abs(self.difference) <= self.coverage * self.uncertainty + own
+        if abs(self.difference) > expanded + own:
+            return "differs"
+        return "agrees" if own <= expanded else "not resolved"
 
     @property
     def answered(self) -> bool:

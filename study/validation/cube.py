@@ -29,7 +29,7 @@ WAYS = {"5": (3.5e-3, 7.5e-3), "18.25": (13e-3, 23e-3)}
 """[m], interval in which the plate's displacement is sought, by the nominal state in %."""
 SOLVED = (0.003, 0.0045, 0.006, 0.0075, 0.013, 0.0155, 0.018, 0.0205, 0.023)
 MODULUS = 15.3e3
-FITTED = "way of the plate, rigid motion"
+FITTED = "displacement of the plate, rigid motion"
 SLICE = 1.25e-3
 RESOLUTION = 0.2e-3
 """[m]: of the scanner within slices, 0.1 to 0.3 mm."""
@@ -106,7 +106,7 @@ def _rows(
             case=f"{state} %",
             faces=faces,
             model=kind.label,
-            quantity="residual of beads, rms" if part == "all" else f"residual along {part}",
+            quantity="rms residual of the beads" if part == "all" else f"rms residual along {part}",
             unit="mm",
             measured=0.0,
             uncertainty=1e3 * float(noise),

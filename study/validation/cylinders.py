@@ -29,7 +29,7 @@ MODULUS = 1e4
 """[Pa], of the one solution."""
 LOAD_ZERO = 0.1
 """[N], zero error of the testing machine."""
-FITTED = "modulus, to the rise of the force from 1 to 5 %"
+FITTED = "modulus, to the increase of the force from 1 to 5 %"
 
 
 def comparisons(kinds: tuple[str, ...], levels: int, progress: Progress) -> Iterator[Comparison]:

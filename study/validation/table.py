@@ -1,10 +1,9 @@
 """Comparisons as tables: a CSV file, JSON, and lines for a terminal.
 
 The CSV has a row per comparison: problem, case, faces, model, quantity, unit; measured and its
-standard uncertainty; found and its own numerical error, empty where it is not known; modulus_pa,
-empty where none matters; fitted, what of the model was fitted to the measurement; within, whether
-the difference is explained by twice the uncertainty, once where it is what noise leaves of many
-beads, and the numerical error; note.
+standard uncertainty; found and its numerical error, empty where it is not known; modulus_pa, empty
+where none matters; fitted, what of the model was fitted to the measurement; verdict of
+`Comparison`; note.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import csv
 import io
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -24,13 +24,18 @@ from study.validation.comparison import Comparison
 
 COLUMNS = (
     *("problem", "case", "faces", "model", "quantity", "unit", "measured", "uncertainty"),
-    *("found", "numerical", "modulus_pa", "fitted", "within", "note"),
+    *("found", "numerical", "modulus_pa", "fitted", "verdict", "note"),
 )
 MANY = 5
 """Number of cases from which the terminal shows their median and range."""
 NOTHING = 1e-6
-"""An own error that is only rounding."""
-WIDTHS = (26, 33, 22, 16, 9)
+"""A numerical error that is only rounding."""
+HEAD = (
+    *("model", "quantity", "measured", "model - measured"),
+    *("standard uncertainty", "numerical error", ""),
+)
+
+Row = tuple[str, ...]
 
 
 def write(found: Iterable[Comparison], path: Path) -> None:
@@ -51,53 +56,68 @@ def as_json(found: Sequence[Comparison]) -> str:
 
 
 def lines(found: Sequence[Comparison]) -> Iterator[str]:
-    """A block per problem and condition of the faces, and what was fitted."""
-    yield _aligned(("model", "quantity", "model minus measured", "uncertainty", "own error"))
+    """A table per problem and condition of the faces, and how many predictions agree."""
     by_faces = groupby(found, key=lambda one: (one.problem, one.faces))
     for (problem, faces), block in ((key, list(group)) for key, group in by_faces):
         yield f"{problem}, {faces} (fitted: {_fitted(block)})"
         cases = {one.case for one in block}
-        yield from _medians(block) if len(cases) >= MANY else map(_line, block)
-    judged = [one for one in found if one.judged]
-    within, lacking = sum(one.within for one in judged), sum(not one.answered for one in found)
+        rows = list(_medians(block)) if len(cases) >= MANY else list(map(_row, block))
+        yield from _aligned([HEAD, *rows])
+        yield ""
+    count = Counter(one.verdict for one in found)
+    predictions = count["agrees"] + count["differs"] + count["not resolved"]
     yield (
-        f"{within} of {len(judged)} differences within twice the measurement's uncertainty and "
-        f"the model's own error; {lacking} without an answer"
+        f"{count['agrees']} of {predictions} predictions agree with the measurement within its "
+        "expanded uncertainty plus the numerical error"
     )
+    if count["not resolved"]:
+        yield (
+            f"{count['not resolved']} are not resolved: their numerical error exceeds the "
+            "expanded uncertainty"
+        )
+    if lacking := sum(not one.answered for one in found):
+        yield f"{lacking} have no result"
 
 
 def _fitted(block: list[Comparison]) -> str:
     return "; ".join(dict.fromkeys(one.fitted for one in block if one.fitted)) or "nothing"
 
 
-def _line(one: Comparison) -> str:
+def _row(one: Comparison) -> Row:
     quantity = f"{one.case}: {one.quantity} [{one.unit}]"
     if not one.answered:
-        return _aligned((f"  {one.model}", quantity, f"none: {one.note}", "", ""))
-    beside = f"{one.difference:+.3g}" + (f" of {one.measured:.3g}" if one.measured else "")
-    known = f"{one.uncertainty:.2g}" if one.judged else "not given"
-    cells = (f"  {one.model}", quantity, beside, known, _own(one.numerical))
-    return f"{_aligned(cells)}{'  beyond' if one.judged and not one.within else ''}".rstrip()
+        return one.model, quantity, "", "", "", "", f"no result: {one.note}"
+    measured = f"{one.measured:.3g}" if one.measured else ""
+    known = f"{one.uncertainty:.2g}" if math.isfinite(one.uncertainty) else "not given"
+    off = "0" if one.calibrated else f"{one.difference:+.3g}"
+    return one.model, quantity, measured, off, known, _own(one.numerical), one.verdict or ""
 
 
-def _medians(block: list[Comparison]) -> Iterator[str]:
-    """Of many cases: median and range of relative differences, and how many lie within."""
+def _medians(block: list[Comparison]) -> Iterator[Row]:
+    """Of many cases: median and range of relative differences, and how many agree."""
     groups: dict[tuple[str, str], list[Comparison]] = {}
     for one in block:
         groups.setdefault((one.model, one.quantity), []).append(one)
     for (model, quantity), group in groups.items():
         answered = [one for one in group if one.answered]
         if not answered:
-            yield _aligned((f"  {model}", quantity, f"none: {group[0].note}", "", ""))
+            yield model, quantity, "", "", "", "", f"no result: {group[0].note}"
             continue
         size = np.array([one.measured for one in answered])
         off = 100.0 * np.array([one.difference for one in answered]) / size
         spread = 100.0 * np.array([one.uncertainty for one in answered]) / size
         own = 100.0 * np.array([one.numerical for one in answered]) / size
+        measured = f"{size.min():.3g} to {size.max():.3g} {group[0].unit}"
         beside = f"{np.median(off):+.1f} % ({off.min():+.0f} to {off.max():+.0f})"
-        cells = (f"  {model}", quantity, beside, f"{np.median(spread):.1f} %")
-        within = f"  {sum(one.within for one in answered)} of {len(answered)} within"
-        yield f"{_aligned((*cells, _own(float(np.median(own)), ' %')))}{within}"
+        known, numerical = f"{np.median(spread):.1f} %", _own(float(np.median(own)), " %")
+        yield model, quantity, measured, beside, known, numerical, _counts(answered)
+
+
+def _counts(found: list[Comparison]) -> str:
+    count = Counter(one.verdict for one in found)
+    text = f"{count['agrees']} of {len(found)} agree"
+    unresolved = count["not resolved"]
+    return f"{text}, {unresolved} not resolved" if unresolved else text
 
 
 def _own(error: float, unit: str = "") -> str:
@@ -106,11 +126,18 @@ def _own(error: float, unit: str = "") -> str:
     return f"{error:.2g}{unit}" if error > NOTHING else "0"
 
 
+def _aligned(rows: Sequence[Row]) -> Iterator[str]:
+    """Rows with columns as wide as their widest cell; the last one runs on."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
+    for *cells, last in rows:
+        padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield "  ".join(["", *padded, last]).rstrip()
+
+
 def _values(one: Comparison) -> tuple[str | float | bool, ...]:
-    within = one.within if one.judged else ""
     numbers = (one.measured, one.uncertainty, one.found, one.numerical, one.modulus)
     words = (one.problem, one.case, one.faces, one.model, one.quantity, one.unit)
-    return (*words, *numbers, one.fitted, within, one.note)
+    return (*words, *numbers, one.fitted, one.verdict or "", one.note)
 
 
 def _plain(value: str | float | bool) -> str | float | bool | None:
@@ -123,7 +150,3 @@ def _cell(value: str | float | bool) -> str:
     if isinstance(value, float):
         return f"{value:.6g}" if math.isfinite(value) else ""
     return str(value)
-
-
-def _aligned(cells: Iterable[str]) -> str:
-    return "  ".join(f"{cell:<{width}}" for cell, width in zip(cells, WIDTHS, strict=True)).rstrip()
