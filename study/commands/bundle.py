@@ -6,10 +6,9 @@ from pathlib import Path
 
 
 def bundle(folder: Path, *, out: Path | None = None) -> None:
-    """Pack results, inputs, versions and a summary of their credibility into one archive.
+    """Pack results, inputs, versions and a credibility summary into one archive.
 
-    `liver-study report ARCHIVE` makes the reports again, elsewhere, and says whether they have the
-    same bytes.
+    `liver-study report ARCHIVE` rebuilds the reports elsewhere and compares them byte by byte.
 
     Parameters
     ----------

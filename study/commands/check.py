@@ -17,16 +17,16 @@ def check(
     axes: str | None = None,
     pieces: Literal["one", "largest"] = "one",
 ) -> None:
-    """Check a scene or a mesh file and say what would be run, without running it.
+    """Check a scene or a mesh file and show what would be run, without running it.
 
-    What `run` refuses is refused here, in the same words.
+    What `run` refuses is refused here, with the same message.
 
     Parameters
     ----------
     target
         A built-in scene, a TOML file, or a mesh file.
     set_
-        Override of a scene, table.key=value. May be repeated.
+        Override of a scene value, table.key=value. May be repeated.
     out
         Results folder that `run` is to write a scene to; results/NAME by default.
     unit

@@ -11,16 +11,16 @@ SEED = 1
 
 
 def cohort(*, patients: Whole = PATIENTS, seed: Whole = SEED, out: Path | None = None) -> None:
-    """Judge every fuzzy system on virtual patients whose stiffness is known, beside baselines.
+    """Assess every fuzzy system on virtual patients of known stiffness, beside baselines.
 
     Parameters
     ----------
     patients
-        How many are drawn; 100000 take some twenty seconds.
+        Number of patients; 100000 take some twenty seconds.
     seed
-        Of the random numbers; the same seed draws the same patients.
+        Seed of the random numbers; the same seed gives the same patients.
     out
-        Table to write too (CSV), by contender, aetiology and stage.
+        Table to write as well (CSV), by estimator, aetiology and stage.
     """
     from study.cohort import cohort_lines, judged, write_cohort
 

@@ -25,12 +25,12 @@ def compare(
     errors: Switch = False,
     out: Path | None = None,
 ) -> None:
-    """Say which numbers differ between two results folders, and what may have changed them.
+    """List which numbers differ between results folders, and what may explain it.
 
-    Exit code 1 if any number differs by more than the tolerance. Wall times are left out; what
-    differs in scene, versions or platform is told and does not count. Of more than two folders, or
-    with --errors, one table says which displacements, differences and estimates are apart by more
-    than their numerical errors; exit code 0.
+    Exit code 1 if any number differs by more than the tolerance. Wall times are
+    ignored; differences in scene, versions or platform are listed and do not count. With more than
+    two folders, or with --errors, one table lists which displacements, differences and estimates
+    differ by more than their numerical errors; exit code 0.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ def compare(
     others
         Results folders of further runs.
     tolerance
-        Relative difference that counts as none, of the largest value of a curve or array, or of a
-        single number. 0 by default: all numbers are the same.
+        Tolerated difference, relative to the largest value of a curve or array, or to a single
+        number; 0 by default, so that all numbers must be equal.
     errors
-        Compare by the errors of the numbers, and not by a tolerance.
+        Compare by the errors of the numbers instead of a tolerance.
     out
-        File to write the table to as well, all of it as .csv, or with the curves over each other as
-        .pdf or as a page, .html.
+        File to write as well: the whole table (.csv), or the table with overlaid curves (.pdf,
+        .html).
     """
     if others or errors:
         _by_errors([first, second, *others], out)

@@ -14,19 +14,20 @@ def export(
     out: Path | None = None,
     set_: Overrides = None,
 ) -> None:
-    """Write the finite-element problem or the lattices of a scene or of results for another code.
+    """Export the finite-element problem or the lattices of a scene or of results to other codes.
 
     Parameters
     ----------
     target
         A built-in scene, a TOML file, or a results folder.
     to
-        calculix (input decks, and our displacement to compare with), vtu (for ParaView), lattice
-        (arrays, a stepper in NumPy, scenes for SOFA), or for the mesh alone gmsh, medit or nastran.
+        calculix (input decks, and this study's displacement to compare with), vtu (for ParaView),
+        lattice (arrays, a stepper in NumPy, scenes for SOFA), or for the mesh alone gmsh, medit or
+        nastran.
     out
         Folder to write; export in the results folder, or NAME-export here, by default.
     set_
-        Override of a scene, table.key=value. May be repeated.
+        Override of a scene value, table.key=value. May be repeated.
     """
     from study.export import ExportRequest
     from study.export import export as write

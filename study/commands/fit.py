@@ -18,10 +18,10 @@ def fit(
     overrides: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fit quantities of a scene to a measured curve, and say how well it determines them.
+    """Identify parameters of a scene from a measured curve, with confidence intervals.
 
-    Least squares by a model's motion. Refused, with exit code 2, if the curve leaves a quantity
-    open.
+    Nonlinear least squares on the motion of a model. Exit code 2 if the curve does not determine
+    a parameter.
 
     Parameters
     ----------
@@ -30,15 +30,15 @@ def fit(
     curve
         Measured curve (CSV): time_s and displacement_m or force_N, and uncertainty if it is known.
     free
-        Quantity to fit, for example tissue.youngs_modulus. May be repeated.
+        Parameter to fit, for example tissue.youngs_modulus. May be repeated.
     model
-        Model of the scene that the curve is fitted with: fem, tissue or another of its models.
+        Model used for the fit: fem, tissue or another model of the scene.
     probe
-        Control point that a curve of displacement is of; by default the one nearest to the tool.
+        Control point of a displacement curve; by default the one nearest to the tool.
     out
-        Folder to write the fitted curve (fit.csv) and its picture (fit.svg, fit.pdf) into.
+        Folder for the fitted curve (fit.csv) and its plot (fit.svg, fit.pdf).
     overrides
-        Override of the scene, for example tool.force="2 N". May be repeated.
+        Override of a scene value, for example tool.force="2 N". May be repeated.
     as_json
         Print JSON instead of lines.
     """

@@ -8,19 +8,19 @@ from study.commands.flags import Overrides
 
 
 def plan(scene: str = "liver", *, set_: Overrides = None, out: Path | None = None) -> None:
-    """Say what of a scene is modelled for what it requires, what is left out, and why.
+    """Select the cheapest model that meets the requirements of a scene, with the reasons.
 
-    A few seconds are spent on coarse lattices and coarse finite elements at rest. What a scene
-    requires stands in its table `require`; `run` follows the same plan.
+    The requirements are the table `require` of the scene. The plan also lists what is left out; it
+    takes a few seconds for coarse lattices and coarse finite elements at rest. `run` follows it.
 
     Parameters
     ----------
     scene
         A built-in scene or a TOML file.
     set_
-        Override of the scene, table.key=value, for example require.error="2 %".
+        Override of a scene value, table.key=value, for example require.error="2 %".
     out
-        Scene file to write, with the models and settings that were chosen.
+        Scene file to write, with the selected models and settings.
     """
     from study.folders import check_file, write_text
     from study.plan import plan as planning

@@ -18,22 +18,22 @@ def recommend(
     out: Path | None = None,
     where: Workers = HERE,
 ) -> None:
-    """Write the scene of the lattice that meets a rate or an error on this machine.
+    """Find the lattice that meets a rate or an error on this machine, and write its scene.
 
     Parameters
     ----------
     scene
         A built-in scene or a TOML file.
     rate
-        States per second that must be ready in real time, for example "60 Hz", "60 fps" or 60.
+        Frames per second to reach in real time, for example "60 Hz", "60 fps" or 60.
     error
-        Error of the displacement over the organ to stay below, for example "5 %"; a length such as
-        "0.5 mm" is taken as a share of the largest displacement at rest.
+        Largest error of the displacement over the organ, for example "5 %"; a length such as
+        "0.5 mm" is divided by the largest displacement at rest.
     known_place
-        The load stays where the scene has it: corrected lattices, which follow it only there, are
-        chosen from too.
+        The load stays at the place given in the scene, so that corrected lattices, which need it in
+        advance, can be selected too.
     set_
-        Override of the scene, table.key=value. May be repeated.
+        Override of a scene value, table.key=value. May be repeated.
     out
         Scene file to write; NAME-60Hz.toml or NAME-5percent.toml by default.
     """

@@ -18,10 +18,10 @@ def report(
     reference: Switch = False,
     fresh: Switch = False,
 ) -> None:
-    """Make report.pdf and report.html of a results folder or a bundle again, without simulating.
+    """Rebuild report.pdf and report.html from a results folder or a bundle, without simulating.
 
-    Figures that were drawn of the same results before are taken from the user's store. Those of a
-    bundle never are: exit code 1 if its reports have other bytes than those in it.
+    Figures drawn before from the same results are taken from the user's store, except for a
+    bundle: its figures are drawn again, and the exit code is 1 if its reports change by a byte.
 
     Parameters
     ----------
@@ -30,13 +30,13 @@ def report(
     html
         Whether to make report.html.
     out
-        Folder to unpack a bundle into; its name without the ending, here, by default. Of
-        --reference the file to write, liver-study-reference.pdf by default.
+        Folder to unpack a bundle into, by default its name without the ending, in the current
+        folder; with --reference the file to write, by default liver-study-reference.pdf.
     reference
-        Make a document of what was measured beforehand instead, of no run: benchmarks,
-        verification, validation, trade-off, stability and ranking.
+        Make the document of all measurements beforehand instead: benchmarks, verification,
+        validation, trade-off, stability and ranking.
     fresh
-        Draw all figures anew.
+        Draw all figures again.
     """
     if reference:
         _reference(target, out)
@@ -100,9 +100,9 @@ def _of_bundle(archive: Path, folder: Path, *, html: bool) -> None:
 
 
 def make(folder: Path, *, report: bool, page: bool) -> list[Path]:
-    """Make the reports that are wanted of a results folder; their files.
+    """Make the requested reports of a results folder and return their paths.
 
-    Without plotly there is no page, which is told. ResultsError for a folder that does not do.
+    Without plotly there is no HTML page, which a message says. ResultsError for an unusable folder.
     """
     made = []
     if report:

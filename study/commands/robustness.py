@@ -27,31 +27,31 @@ def robustness(
     dry_run: Switch = False,
     where: Workers = HERE,
 ) -> None:
-    """Draw all that is open, and rank the fuzzy systems in each draw.
+    """Sample everything that the paper leaves open and rank the fuzzy systems in each sample.
 
-    Without a scene, all that the paper leaves open of its control point; with one, what is open of
-    its organ, on lattices that are coarse.
+    Without a scene, the paper's single mass point; with a scene, variations of its organ on coarse
+    lattices.
 
     Parameters
     ----------
     scene
         A built-in scene or a TOML file, with an organ.
     set_
-        Override of the scene, table.key=value. May be repeated.
+        Override of a scene value, table.key=value. May be repeated.
     size
-        Rows of the design, a power of two; each has two draws of all unknowns and one more for
-        every unknown, or group of them. 4096 of the control point, 64 of an organ.
+        Rows of the Sobol' design, a power of two; each has two samples of all unknowns and one more
+        for every unknown or group of unknowns. By default 4096 for the mass point, 64 for an organ.
     seed
-        Of the points, which are scrambled.
+        Seed of the scrambled points.
     spacing
-        Of an organ's lattices, which vary about it; by default a fifth of the organ's size.
+        Mean spacing of an organ's lattices; by default a fifth of the organ's size.
     again
-        How many draws of an organ are repeated on lattices twice as fine, 32 by default.
+        Number of an organ's samples repeated on lattices twice as fine, 32 by default.
     out
         Folder to write; results/robustness or results/NAME-robustness by default. Finished blocks
         are kept beside it.
     dry_run
-        Say what would be run, and stop.
+        Print what would be run, and stop.
     """
     from study.robustness import organ_request, request
 

@@ -20,11 +20,12 @@ def rules(
     Parameters
     ----------
     rule_base
-        A .fis or .json file instead of the liver's rule base.
+        A .fis or .json file; by default the liver's rule base.
     out
-        File to write the rule base to instead, .fis (type-1, MATLAB and Octave) or .json.
+        File to write the rule base to instead of the audit: .fis (type-1, MATLAB and Octave) or
+        .json.
     sugeno
-        Write it with constants in place of the output sets.
+        Write a Sugeno system: constants in place of the output sets.
     """
     from study.estimation import rule_base_lines
 

@@ -9,7 +9,7 @@ def scenes(show: str | None = None) -> None:
     Parameters
     ----------
     show
-        Name of a scene whose TOML is to be printed, with every value in use.
+        Name of a scene to print as TOML, with every value in use.
     """
     from study.scene.file import BUILT_IN, built_in_title, read_scene, write_scene
 

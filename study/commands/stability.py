@@ -16,18 +16,18 @@ def stability(
     dry_run: Switch = False,
     where: Workers = HERE,
 ) -> None:
-    """Try every model at its extremes, and hold what comes out to what is known beforehand.
+    """Run every model at its extremes and check each case against a known outcome.
 
     Parameters
     ----------
     scene
-        A built-in scene or a TOML file, whose own lattice is tried too.
+        A built-in scene or a TOML file, whose models are tested too.
     out
         Folder to write; results/NAME-stability by default. Finished cases are kept beside it.
     quick
-        Only a part of the cases, half a minute.
+        A subset of the cases, half a minute.
     dry_run
-        Say what would be run, and stop.
+        Print what would be run, and stop.
     """
     from study.known import request as asked
     from study.known import table

@@ -17,24 +17,24 @@ def tradeoff(
     dry_run: Switch = False,
     where: Workers = HERE,
 ) -> None:
-    """Measure error and cost of every model of a scene in many settings.
+    """Measure error and cost of every model of a scene in many configurations.
 
-    Costs are always timed in this process, one configuration after another.
+    Costs are timed in this process, one configuration after another.
 
     Parameters
     ----------
     scene
         A built-in scene or a TOML file.
     set_
-        Override of the scene, table.key=value. May be repeated.
+        Override of a scene value, table.key=value. May be repeated.
     contender
-        Only this one, for example volume-springs. May be repeated.
+        Only this model, for example volume-springs. May be repeated.
     out
         Folder to write; results/NAME-tradeoff by default. Finished runs are kept beside it.
     quick
-        Time three turns instead of five.
+        Time three rounds instead of five.
     dry_run
-        Say what would be run, and stop.
+        Print what would be run, and stop.
     """
     from study.progress import on_stderr
     from study.tradeoff import request as asked

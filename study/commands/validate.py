@@ -19,32 +19,31 @@ def validate(
     out: Path | None = None,
     as_json: AsJson = False,
 ) -> None:
-    """Hold models to measurements on bodies of silicone, each number beside its uncertainty.
+    """Compare models with measurements on silicone bodies, each with its uncertainty.
 
-    Exit code 1 if the finite elements gave no number for something that was measured.
+    Exit code 1 if the finite elements have no result for a measured quantity.
 
     Parameters
     ----------
     name
-        What was measured: cylinders, cantilever or cube, all by default; with --data a scene, by
-        name or TOML file.
+        Body: cylinders, cantilever or cube, all by default; with --data a scene, by name or TOML
+        file.
     models
-        Kinds of models: linear and neo-hookean finite elements, springs, volume (springs with the
-        volume term), basafa. All by default.
+        Models: linear, neo-hookean (finite elements), springs, volume (springs with the volume
+        term), basafa. All by default.
     data
         Folder with your own measurements of the scene (CSV): curves with the columns time_s and
-        displacement_m or force_N; markers.csv with x_m, y_m, z_m, ux_m, uy_m, uz_m; each with the
-        column uncertainty if it is known.
+        displacement_m or force_N; markers.csv with x_m, y_m, z_m, ux_m, uy_m, uz_m; with a column
+        uncertainty if it is known.
     probe
-        With --data: control point that curves of displacement are of; by default the one nearest
-        to the tool.
+        With --data: control point of displacement curves; by default the one nearest to the tool.
     overrides
-        With --data: override of the scene, for example tissue.youngs_modulus="4 kPa". May be
+        With --data: override of a scene value, for example tissue.youngs_modulus="4 kPa". May be
         repeated.
     quick
-        Two meshes or spacings of each model instead of three, a minute or two.
+        Two meshes or spacings of each model instead of three, less than a minute.
     out
-        Table to write too (CSV).
+        Table to write as well (CSV).
     as_json
         Print JSON instead of a table.
     """

@@ -14,14 +14,14 @@ def verify(
     out: Path | None = None,
     as_json: AsJson = False,
 ) -> None:
-    """Solve problems with known answers by the finite-element reference and judge its errors.
+    """Verify the finite-element reference on problems with exact solutions.
 
     Parameters
     ----------
     quick
         Only the problems that take about a second each.
     out
-        Table to write too (CSV).
+        Table to write as well (CSV).
     as_json
         Print JSON instead of a table.
     """

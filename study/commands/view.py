@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def view(folder: Path) -> None:
-    """Open report.html of a results folder in the browser, and make it if it is missing.
+    """Open report.html of a results folder in the browser; build it if it is missing.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def view(folder: Path) -> None:
 
 
 def show(page: Path) -> None:
-    """Open a page in the browser and print where it is, for there may be no browser."""
+    """Open a page in the browser and print its path, since there may be no browser."""
     import webbrowser
 
     if page.is_file() and not webbrowser.open(page.resolve().as_uri()):
