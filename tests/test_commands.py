@@ -369,3 +369,15 @@ def test_a_study_of_a_single_load_refuses_more(typed, command, said):
     assert ended.returncode == 2
     assert said in " ".join(ended.stderr.split())
     assert not list(Path().iterdir())
+
+
+def test_help_wraps_its_paragraphs_to_the_terminal():
+    done = subprocess.run(
+        [sys.executable, "-m", "study", "fit", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"COLUMNS": "300"},
+    )
+    text = "Exit code 2 if the curve does not determine a parameter."
+    assert any(line.endswith(text) for line in done.stdout.splitlines())

@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib.metadata import version
+from inspect import getdoc
 from pathlib import Path
 
 from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
@@ -132,8 +133,14 @@ def _say(message: str) -> None:
         print(f"liver-study: {message}", file=sys.stderr, flush=True)
 
 
+def _description(command: Callable[..., None]) -> str:
+    """Text of a docstring before its parameters, each paragraph on one line to be wrapped anew."""
+    text = (getdoc(command) or "").partition("\n\nParameters\n")[0]
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+
+
 for command in (
     *(run, scenes, check, report, view, compare, bundle, export, verify, validate, fit),
     *(plan, tradeoff, recommend, stability, robustness, estimate, rules, cohort),
 ):
-    app.command(command)
+    app.command(command, help=_description(command))
