@@ -113,13 +113,13 @@ def _aligned(cells: Iterable[str]) -> str:
 
 def _sentence(found: Comparison) -> str:
     low, change, high = (100 * x for x in (found.low, found.difference, found.high))
-    return (
-        f"readings {found.readings}: {found.fuzzy}, the best fuzzy system, is {found.verdict} than "
-        f"{found.baseline}: its rms error {change:+.2f} points ({low:+.2f} to {high:+.2f})"
-        if found.verdict != "undecided"
-        else f"readings {found.readings}: {found.fuzzy}, the best fuzzy system, and "
-        f"{found.baseline} are not told apart: {change:+.2f} points ({low:+.2f} to {high:+.2f})"
-    )
+    points = f"{change:+.2f} points ({low:+.2f} to {high:+.2f})"
+    best = f"{found.fuzzy}, the best fuzzy system,"
+    if found.verdict == "undecided":
+        said = f"{best} does not differ resolvably from {found.baseline}"
+    else:
+        said = f"{best} is {found.verdict} than {found.baseline}"
+    return f"readings {found.readings}: {said}: difference of the rms errors {points}"
 
 
 def _bands(rows: Iterable[CohortRow]) -> Iterator[str]:
@@ -128,13 +128,13 @@ def _bands(rows: Iterable[CohortRow]) -> Iterator[str]:
         whole = (row.aetiology, row.readings) == ("all", "all")
         if whole and row.contender.startswith(following) and math.isfinite(row.coverage):
             yield (
-                f"{row.contender}: its interval, nominally of {100 * NOMINAL:.0f} %, holds "
-                f"{100 * row.coverage:.1f} % of the patients"
+                f"{row.contender}: its interval covers {100 * row.coverage:.1f} % of the patients, "
+                f"nominally {100 * NOMINAL:.0f} %"
             )
 
 
 def _with_several(knowledge: str) -> str:
-    """How far estimates of a base fall where one of several readings rises, by their number."""
+    """Largest decrease of estimates as one of several readings increases, by their number."""
     settings = LiverSettings(knowledge=knowledge)
     by_number = zip(*(falls(kind, settings) for kind in SYSTEMS), strict=True)
     parts = [
@@ -143,8 +143,8 @@ def _with_several(knowledge: str) -> str:
         for found in by_number
     ]
     return (
-        f"{knowledge}: largest fall of any system where one of so many readings rises, over the "
-        f"whole scale (of one liver): {', '.join(parts)}"
+        f"{knowledge}: largest decrease of any system as one reading increases, by the number of "
+        f"readings, over the whole scale (of one liver): {', '.join(parts)}"
     )
 
 
@@ -153,10 +153,10 @@ def _fall(shares: Iterable[float]) -> str:
 
 
 def _falls(rows: Iterable[CohortRow]) -> Iterator[str]:
-    """What falls where it should rise, with one reading alone."""
+    """Estimators that decrease where they should increase, with a single reading."""
     falling: dict[str, float] = {}
     for row in rows:
         if row.largest_fall > 0:  # false for NaN too
             falling[row.contender] = max(row.largest_fall, falling.get(row.contender, 0.0))
     for name, fall in falling.items():
-        yield f"{name}: falls by up to {100 * fall:.2g} % where one reading rises"
+        yield f"{name}: decreases by up to {100 * fall:.2g} % as its one reading increases"

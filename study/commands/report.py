@@ -63,7 +63,7 @@ def _reference(target: Path | None, out: Path | None) -> None:
     from study.folders import check_file
 
     if target is not None:
-        raise ValueError(f"--reference: is of no run; leave {target} out")
+        raise ValueError(f"--reference: describes no run; omit {target}")
     path = out or Path(NAME)
     check_file(path)
     make_measured(path)

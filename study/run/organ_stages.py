@@ -33,7 +33,7 @@ Work = Callable[[Progress], Any]
 
 ORGAN, AT_REST, BUDGET = "organ", "lattice at rest", "error budget against {}"
 SINGLE_LOAD_ONLY = (
-    "What the lattice cannot do at rest, and the parts of its error, are told for one load on a "
+    "The limits of the lattice at rest and its error budget are computed for a single load on a "
     "weightless body only."
 )
 LIMITS_REFERENCE = "fem"
