@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import KDTree
 
-from msm.hanging import hanging_nodes
 from msm.kinematics import inverted_cells
 from msm.lattice import CORNERS, CellLattice, at_nodes, interpolation
 from msm.octree import Grading, Leaves, leaves
 from msm.springs import Springs, connect
+from msm.ties import hanging_nodes
 from study.organ.occupancy import SolidShape
 
 Floats = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from msm.kinematics import inverted_cells
 from study.organ.occupancy import SolidShape
 from study.problem.heterogeneous import Composition, composition
 from study.problem.tissue import Tissue
-
-if TYPE_CHECKING:
-    from msm.graded import GradedLattice
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,6 +53,22 @@ class LatticeMesh(Protocol):
 
     def inverted_cells(self, displacement: Floats) -> int:
         """Number of cells that a displacement [m] (n, 3) inverts."""
+
+
+class CubicCells(Protocol):
+    """Cubic cells of one or several sizes, placed on a grid of their own edge."""
+
+    @property
+    def origin(self) -> Floats:
+        """Lower corner [m] (3,) of the box of the cells."""
+
+    @property
+    def index(self) -> Ints:
+        """Position of each cell (c, 3) from the origin, in units of its own edge."""
+
+    @property
+    def edges(self) -> Floats:
+        """Edge [m] of each cell (c,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +154,7 @@ def at_nodes(lattice: CellLattice, density: Floats) -> Floats:
     return volumes.astype(np.float64)
 
 
-def composed(lattice: CellLattice | GradedLattice, tissue: Tissue | None) -> Composition | None:
+def composed(lattice: CubicCells, tissue: Tissue | None) -> Composition | None:
     """Tissue of each cell; None for a homogeneous body.
 
     It is sampled at the same points as the fill fraction, including those outside the body.
@@ -153,7 +166,7 @@ def composed(lattice: CellLattice | GradedLattice, tissue: Tissue | None) -> Com
         corners, edges = lattice.index[cells][:, None, :], lattice.edges[cells][:, None, None]
         return np.asarray(lattice.origin + edges * (corners + inside.reshape(-1, 3)))
 
-    return composition(tissue, len(lattice.cells), points)
+    return composition(tissue, len(lattice.index), points)
 
 
 def interpolation(lattice: CellLattice, points: Floats) -> tuple[csr_array, int]:

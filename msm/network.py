@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from msm.hanging import tied
+from msm.ties import tied
 
 if TYPE_CHECKING:
     from msm.damping import NodalDamping

@@ -9,9 +9,9 @@ from scipy.sparse.linalg import cg
 
 from msm import volume as volumes
 from msm.assembly import Assembly, Material
-from msm.hanging import hanging_nodes
 from msm.laws import initial_stiffness
 from msm.springs import stiffness_matrix
+from msm.ties import hanging_nodes
 
 Floats = NDArray[np.float64]
 

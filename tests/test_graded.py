@@ -12,7 +12,7 @@ from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
 from msm.forces import internal_forces
 from msm.grid import grids_of
-from msm.hanging import hanging_nodes, interpolate
+from msm.hanging import interpolate
 from msm.integrators import INTEGRATORS
 from msm.laws import Basafa, Hooke
 from msm.octree import Grading
@@ -20,6 +20,7 @@ from msm.relaxation import relax
 from msm.springs import Springs, connect
 from msm.stability import critical_time_step, largest_frequency
 from msm.statics import static_displacement, stiffness_at_rest
+from msm.ties import hanging_nodes
 from msm.volume import volume_term
 from study.scene.file import read_scene
 from study.scene.problem import problem_of

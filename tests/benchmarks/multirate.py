@@ -24,10 +24,10 @@ from scipy.sparse import csr_array, eye_array, kron
 from msm.assembly import Assembly, Material, arrays
 from msm.grid import Grids, grids_of
 from msm.grid_explicit import symplectic_euler
-from msm.hanging import hanging_nodes
 from msm.laws import initial_stiffness
 from msm.springs import Springs, stiffness_matrix
 from msm.stability import critical_time_step
+from msm.ties import hanging_nodes
 from msm.volume import VolumeTerm
 from msm.volume import stiffness_matrix as volume_stiffness
 from study.models.lattice import PreparedLattice
