@@ -23,7 +23,6 @@ from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
 from study.problem.trajectory import Trajectory
-from study.progress import Silent
 from study.results.folder import read
 from study.results.records import CorrectionRecord, CurveErrors, SpacingErrors
 from study.run.requirement import requirement_checks
@@ -31,6 +30,7 @@ from study.run.rest import rest_of
 from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from tests.benchmarks import planned_places
 from tests.conftest import SMALL
 

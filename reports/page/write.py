@@ -19,9 +19,9 @@ from reports.digits import Table, symbols, unbroken, words
 from reports.page.answer import Answer, answer, question
 from reports.page.data import page
 from reports.tables import provenance_rows
-from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
 from study.scene.file import write_scene
+from study.system.folders import FolderError, check_file, write_bytes
 
 NAME = "report.html"
 MISSING = "plotly is not installed, which draws report.html: pip install 'plotly>=6'"

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch, WholeOrNone
-from study.folders import tell
+from study.system.folders import tell
 
 if TYPE_CHECKING:
-    from study.progress import Progress
     from study.results import Results
     from study.scene import Scene
     from study.stages.store import Store
+    from study.system.progress import Progress
 
 REPORT, PAGE = "report.pdf", "report.html"
 
@@ -117,8 +117,8 @@ def _refuse_any(flags: Mapping[str, bool], why: str) -> None:
 def _planned(scene: Scene) -> Scene:
     """The scene that keeps what is required, once a person is told of the plan."""
     from study.plan.plan import lines
-    from study.progress import on_stderr
     from study.run import planned
+    from study.system.progress import on_stderr
 
     with on_stderr() as progress:
         found = planned.planned(scene, progress)
@@ -129,8 +129,8 @@ def _planned(scene: Scene) -> Scene:
 def _at_rest(scene: Scene, folder: Path) -> None:
     """Plan a scene of which the rest alone is wanted, and write a folder of that."""
     from study.plan.plan import lines
-    from study.progress import on_stderr
     from study.run import planned
+    from study.system.progress import on_stderr
 
     with on_stderr() as progress:
         found = planned.planned(scene, progress)
@@ -155,8 +155,8 @@ class _How:
 
 def _results(scene: Scene, how: _How, store: Store | None) -> Results:
     """Results that the folder has, or that are written into it, once a person is told of them."""
-    from study.progress import on_stderr
     from study.run import up_to_date
+    from study.system.progress import on_stderr
 
     key = (
         ""
@@ -228,10 +228,10 @@ def _report_failure(
     wanted: _Wanted, how: _How, store: Store | None, progress: Progress
 ) -> Exception | KeyboardInterrupt | None:
     """Make the reports; neither a fault in them nor a signal must cost a finished run."""
-    from study.folders import claimed
     from study.stages.cached_arrays import using_store
     from study.stages.job_pool import available
     from study.stages.threads import threads
+    from study.system.folders import claimed
 
     if not (wanted.report or wanted.page):
         return None

@@ -48,7 +48,6 @@ from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import (
     Check,
@@ -58,6 +57,7 @@ from study.results.records import (
     LargeStrain,
 )
 from study.scene import Reference, Scene
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 

@@ -36,10 +36,10 @@ from study.organ.grading import resolved
 from study.problem.problem import Problem
 from study.problem.rigid import PLATE, RigidTool
 from study.problem.trajectory import Observation, Trajectory
-from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import CurveErrors, ElementsRecord, ModelRecord
 from study.scene import Reference, Scene
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 

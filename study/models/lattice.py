@@ -38,7 +38,6 @@ from study.models.touching import touchable
 from study.problem.heterogeneous import of_tetrahedra
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import (
     Check,
@@ -48,6 +47,7 @@ from study.results.records import (
     SpacingErrors,
 )
 from study.scene import Lattice, Scene, graded
+from study.system.progress import Advance
 
 Floats = NDArray[np.float64]
 

@@ -17,11 +17,11 @@ from study.mesh.kinds import SurfaceMesh
 from study.mesh.load import load_mesh
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.organ.geometry import Geometry
-from study.progress import Progress, Silent
 from study.scene import Organ, Scene, Side
 from study.scene.file import read_scene
 from study.scene.place import OUTWARD
 from study.scene.problem import geometry_of, problem_of
+from study.system.progress import Progress, Silent
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from study import lock
+from study.system import lock
 
 Foreign = Callable[[set[str]], str | None]
 """Given the names in a folder, one that must not be lost, or None."""

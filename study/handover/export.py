@@ -23,8 +23,7 @@ from fem_reference.external_loads import external_loads
 from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.model import Method
 from fem_reference.solvers import solve_static
-from study.folders import replacing
-from study.handover import write as handover
+from study.handover import lattice_files
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.save import save
 from study.models.finite_elements import PreparedElements, reference_of
@@ -33,11 +32,12 @@ from study.problem.contact import Load
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
 from study.problem.tool_travel import StationFactor
-from study.progress import Progress
 from study.results import folder as results
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.scene.problem import problem_of
+from study.system.folders import replacing
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
 FILES |= {calculix.WEIGHTS, calculix.HISTORIES}
-FILES |= {file for file, _ in MESHES.values()} | handover.FILES
+FILES |= {file for file, _ in MESHES.values()} | lattice_files.FILES
 FURTHER_LOAD = re.compile(r"load\.\d+\.inp")
 FRAMES = 4
 """Number of equally spaced times at which the motion of all nodes is compared."""
@@ -193,8 +193,8 @@ def _write_lattice(target: _Target, folder: Path, progress: Progress) -> None:
     found = lattices(target.scene, progress)
     if target.curves is not None:
         check_curves(found, target.curves)
-    handover.write(found, folder)
-    _write(folder, {MARK: handover.about(found)})
+    lattice_files.write(found, folder)
+    _write(folder, {MARK: lattice_files.about(found)})
 
 
 WRITERS = {"vtu": _write_vtu, "calculix": _write_calculix, LATTICE: _write_lattice}
@@ -432,6 +432,6 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _foreign(present: set[str]) -> str | None:
-    own = (handover.OF_A_MODEL, FURTHER_LOAD)
+    own = (lattice_files.OF_A_MODEL, FURTHER_LOAD)
     others = (name for name in present - FILES if not any(one.fullmatch(name) for one in own))
     return min(others, default=None)
