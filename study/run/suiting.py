@@ -42,9 +42,9 @@ UNITS = {"support.stiffness": (1e-6, "MPa/m"), "tool.force": (1.0, "N")}
 MILLIMETRES = (1e3, "mm")
 
 
-def read_suited(name: str, overrides: Sequence[str], progress: Progress | None = None) -> Scene:
+def read_suited(name: str, overrides: Sequence[str]) -> Scene:
     """The scene of `read_scene`, adapted to its organ. ValueError as there, or for a bad mesh."""
-    return suited(read_scene(name, overrides), progress or Silent())
+    return suited(read_scene(name, overrides), Silent())
 
 
 def suited(scene: Scene, progress: Progress) -> Scene:
