@@ -14,7 +14,7 @@ from study.mesh.tetrahedra import edges, mean_edge
 from study.models import table
 from study.models.damping import nodal_damping, reference_damping
 from study.models.estimates import estimates
-from study.models.lattice import assembled
+from study.models.lattice_assembly import assembled
 from study.models.model import SILENT
 from study.models.tissue import elastic, of_modulus
 from study.problem.damping import RayleighDamping
