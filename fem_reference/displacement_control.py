@@ -20,7 +20,7 @@ from scipy.sparse import csc_array
 from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
-from study.continuation import Increments, follow
+from study.problem.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

@@ -224,13 +224,13 @@ class MixedSolid:
         return np.outer(density * share, acceleration).ravel()
 
 
-def mixed_solid(grid: Any, tissue: Tissue, support: csc_array | None = None) -> MixedSolid:
+def mixed_solid(grid: Any, tissue: Tissue) -> MixedSolid:
     """The body on a mesh of scikit-fem's, straight or curved (`fem_reference.grid`).
 
     ValueError for a Poisson ratio without a mixed formulation: 0 and below, or 1/2.
     """
     nodes = skfem.Basis(grid, skfem.ElementTetP2(), mapping(grid), intorder=MASS_ORDER)
-    return on_nodes(nodes, tissue, support)
+    return on_nodes(nodes, tissue)
 
 
 def on_nodes(

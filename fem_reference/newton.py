@@ -21,7 +21,7 @@ from fem_reference.elements import ELEMENTS
 from fem_reference.hyperelasticity import HyperelasticSolid, largest_log_strain, solid
 from fem_reference.laws import DEFAULT, Law
 from fem_reference.mixed_strain import on_nodes
-from study.continuation import Increments, follow
+from study.problem.continuation import Increments, follow
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]

@@ -24,7 +24,7 @@ from scipy.sparse import csc_array
 from fem_reference.direct import symmetric_factors
 from fem_reference.laws import IDENTITY
 from fem_reference.mixed_strain import MixedSolid, kinematics
-from study.continuation import Increments, follow
+from study.problem.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

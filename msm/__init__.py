@@ -23,7 +23,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.compiled import drop_outdated
+from study.system.compiled import drop_outdated
 
 if TYPE_CHECKING:
     from msm import calibration, control_point

@@ -21,7 +21,7 @@ from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
 from msm.network import Network
 from msm.tangent import SIGNS, Tangent, empty_tangent, linearise
-from study.continuation import Increments, follow
+from study.problem.continuation import Increments, follow
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -3,8 +3,8 @@
 The index of numba's cache refers to the argument types of a kernel, a named tuple by its class. A
 spring law from outside the package would make the index unreadable for a process that cannot import
 the law, and edits of the law would not be noticed. Kernels with such arguments are therefore
-compiled anew in each process. So are integrators from outside the package, since `study.compiled`
-invalidates the cache in the folders of this package only.
+compiled anew in each process. So are integrators from outside the package, since
+`study.system.compiled` invalidates the cache in the folders of this package only.
 """
 
 from __future__ import annotations

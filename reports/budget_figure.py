@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from study.results.records import ErrorBudget
 
 HEIGHT, MOST = 1.9, 4
-BETTER, WORSE, WHOLE, LEFT = "#56B4E9", "#D55E00", "#444444", "#bbbbbb"
+BETTER, WORSE, WHOLE = "#56B4E9", "#D55E00", "#444444"
 
 
 def budget_figure(results: Results) -> bytes | None:

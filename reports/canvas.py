@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from reports.letters import extra_files
-from study.folders import write_bytes
+from study.system.folders import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,7 @@ from reports.robustness import robustness, robustness_figures
 from reports.validation import validation
 from reports.validation_figure import validation_figure
 from reports.verification import verification
-from study.folders import write_bytes
+from study.system.folders import write_bytes
 
 NAME = "liver-study-reference.pdf"
 TEMPLATE = "measured.typ"

@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reports import canvas
-from reports.appearance import LOOKS, SYSTEM_NAMES, system_colour
+from reports.appearance import LOOKS
 from reports.benchmarks import read
 from reports.organ_ranking import INDICES, NAMES, NEAREST
-from reports.ranking_study import CLAIM, column
-from reports.ranking_study_figure import HEIGHT, draw_indices, draw_shares
+from reports.ranking_study_figure import FUZZY, ranking_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "organ_ranking"
-COLOURS = {system: system_colour(system) for system in SYSTEM_NAMES} | {
-    "reading": LOOKS["reading"].colour
-}
+SYSTEMS = FUZZY | {"reading": (NAMES["reading"], LOOKS["reading"].colour)}
 
 
 def write_figures(folder: Path) -> list[Path]:
@@ -34,15 +31,4 @@ def organ_figures() -> dict[str, bytes]:
 
 
 def _figure(folder: Traversable | None) -> Figure | None:
-    nearest, indices = read(NEAREST, folder), read(INDICES, folder)
-    if not nearest:
-        return None
-    figure = canvas.sheet(HEIGHT)
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.5))
-    names = list(dict.fromkeys(map(column, nearest)))
-    left.set_yticks(range(len(names)), names)
-    left.set_ylim(len(names) - 0.5, -0.5)
-    draw_shares(left, nearest, names, {s: (NAMES[s], COLOURS[s]) for s in NAMES})
-    draw_indices(right, [i for i in indices if i["output"] == f"mamdani - {CLAIM}"], names)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=5)
-    return figure
+    return ranking_figure(read(NEAREST, folder), read(INDICES, folder), SYSTEMS)

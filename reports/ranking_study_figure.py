@@ -33,6 +33,8 @@ HEIGHT = 2.5
 DRAWN = ("displacement", "relative-l2"), ("phase-plane", "pcm")
 """Curve and measure of the scores drawn over the spacing: one of a time history, one of a loop."""
 TIED = "#dddddd"
+Look = tuple[str, str]
+"""Label and colour of a system."""
 FUZZY = {system: (system_name(system), system_colour(system)) for system in SYSTEM_NAMES}
 
 
@@ -53,7 +55,16 @@ def ranking_figures() -> dict[str, bytes]:
 
 
 def _ranking(folder: Traversable | None) -> Figure | None:
-    nearest, indices = read(NEAREST, folder), read(INDICES, folder)
+    return ranking_figure(read(NEAREST, folder), read(INDICES, folder), FUZZY)
+
+
+def ranking_figure(
+    nearest: Sequence[Line], indices: Sequence[Line], systems: Mapping[str, Look]
+) -> Figure | None:
+    """Who is nearest to the benchmark by measure, and what decides it; None without draws.
+
+    `systems`: those that may be nearest, by name.
+    """
     if not nearest:
         return None
     figure = canvas.sheet(HEIGHT)
@@ -61,9 +72,10 @@ def _ranking(folder: Traversable | None) -> Figure | None:
     names = list(dict.fromkeys(map(column, nearest)))
     left.set_yticks(range(len(names)), names)
     left.set_ylim(len(names) - 0.5, -0.5)
-    draw_shares(left, nearest, names)
+    draw_shares(left, nearest, names, systems)
     draw_indices(right, [line for line in indices if line["output"] == f"mamdani - {CLAIM}"], names)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=4)
+    entries = left.get_legend_handles_labels()
+    figure.legend(*entries, loc="outside lower left", ncols=len(systems) + 1)
     return figure
 
 
@@ -71,14 +83,14 @@ def draw_shares(
     axes: Axes,
     lines: Sequence[Line],
     names: Sequence[str],
-    systems: Mapping[str, tuple[str, str]] | None = None,
+    systems: Mapping[str, Look],
 ) -> None:
-    """Stacked shares of draws by the nearest of systems, by name with label and colour.
+    """Stacked shares of draws by the nearest of systems, which are given by name.
 
-    A tie is nobody's. Without systems, the fuzzy ones.
+    The draws in which no system is nearest are stacked last.
     """
     start = np.zeros(len(names))
-    for system, (label, colour) in (systems or FUZZY).items():
+    for system, (label, colour) in systems.items():
         width = np.array([float(line["share"]) for line in lines if line["system"] == system])
         axes.barh(range(len(names)), width, left=start, height=0.8, color=colour, label=label)
         start += width

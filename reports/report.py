@@ -31,8 +31,6 @@ from reports.renders import Pictures, render
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
-from study.folders import FolderError, check_file, tell, write_bytes
-from study.progress import Progress, Silent
 from study.results.folder import Results, ResultsError, read
 from study.results.records import Provenance
 from study.stages.cached_arrays import cached_arrays, kept
@@ -40,6 +38,8 @@ from study.stages.job_pool import Job, available, job_pool
 from study.stages.serialisation import Arrays
 from study.stages.threads import allowed
 from study.sweep.program import everything
+from study.system.folders import FolderError, check_file, tell, write_bytes
+from study.system.progress import Progress, Silent
 
 NAME = "report.pdf"
 TEMPLATE = "template.typ"

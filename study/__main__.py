@@ -4,7 +4,7 @@ import gc
 import os
 import sys
 
-from study import signals, streams
+from study.system import signals, streams
 
 # Linear algebra here is sparse or small. OpenBLAS would start threads that mostly wait, at a cost
 # of a fifth of the processor time of a quick command. It reads this when numpy is imported.

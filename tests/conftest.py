@@ -14,13 +14,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
-from study import signals
 from study.__main__ import main
 from study.problem.problem import Problem
 from study.run.study import run_study
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from study.system import signals
 from tests.kept_results import ROOT, as_good_as_now
 
 SMALL = (

@@ -9,10 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from reports import report
+from reports import bundle, report
+from reports.bundle import bundle as pack
 from reports.credibility import credibility
-from study import bundle
-from study.bundle import bundle as pack
 from study.commands.bundle import bundle as bundle_command
 from study.commands.report import report as report_command
 from study.results import folder as results_folder

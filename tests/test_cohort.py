@@ -29,7 +29,7 @@ from fuzzy.liver.settings import LiverSettings
 from fuzzy.liver.stiffness import estimate
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
-from study.cohort import cohort_lines, compliance, write_cohort
+from study.estimation.cohort import cohort_lines, compliance, write_cohort
 
 SEED = 7
 

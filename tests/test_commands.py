@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from study import progress, signals
 from study.commands import EXIT_MACHINE
 from study.results import tables
 from study.scene.file import read_scene
+from study.system import progress, signals
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLES = {

@@ -13,7 +13,7 @@ import pytest
 
 from reports import canvas, several, several_pdf
 from study.commands.compare import compare as command
-from study.compare import differences, other_words
+from study.results.comparison import differences, other_words
 from study.results.folder import Results, write
 from study.similarity.time_history import relative_l2_distance
 from tests.report_samples import results_of, whole, with_model, with_record

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import pytest
 
-from study.continuation import Increments, follow
+from study.problem.continuation import Increments, follow
 
 BY = Increments(easy=2, smallest=1 / 8, unit="the load")
 

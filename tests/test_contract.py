@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from msm.integrators import INTEGRATORS
-from study.folders import FolderError
 from study.results.folder import Results, ResultsError, read, replacing
 from study.results.folder import write as write_files
 from study.run.study import run_study
 from study.similarity.fields import best_factor, relative_l2
+from study.system.folders import FolderError
 
 MODELS = ["fem", "basafa", "msm-mamdani", "msm-sugeno", "msm-interval-type-2", "reading"]
 

@@ -19,10 +19,10 @@ from study.models.table import kind, model
 from study.problem.contact import Load
 from study.problem.damping import RayleighDamping
 from study.problem.trajectory import Trajectory
-from study.progress import Silent
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from study.tradeoff.contenders import configurations
 from tests.conftest import SMALL
 

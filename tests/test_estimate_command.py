@@ -14,7 +14,8 @@ from fuzzy.systems.inference import infer
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Footprint, FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
-from study.estimation import EstimationRequest, answer
+from study.estimation.answer import answer
+from study.estimation.request import EstimationRequest
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -14,15 +14,15 @@ from fem_reference.elasticity import discretise
 from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import NodalProblem, nodal_problem
 from fem_reference.solvers import solve_static
-from study import export as exporting
 from study.commands import app
-from study.export import MESHES, ExportRequest, export
+from study.handover import export as exporting
+from study.handover.export import MESHES, ExportRequest, export
 from study.models.finite_elements import reference_of
-from study.progress import Silent
 from study.results.folder import write
 from study.results.records import ElementsRecord
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from tests.oracles.cases import build, ramp
 from tests.report_samples import with_model
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from study import signals
-from study.folders import claimed
+from study.system import signals
+from study.system.folders import claimed
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = f"{shlex.quote(sys.executable)} -m study"

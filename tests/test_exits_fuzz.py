@@ -22,10 +22,10 @@ from pathlib import Path
 import pytest
 
 from reports import report
-from study import progress, signals
 from study.commands.application import main
 from study.results.folder import write
 from study.scene.file import read_scene, write_scene
+from study.system import progress, signals
 from tests import mesh_samples
 from tests.report_samples import results_of
 

@@ -23,7 +23,6 @@ from study.known import suite
 from study.known.request import tried
 from study.known.stability.cases import user_scene
 from study.models.table import MODELS
-from study.progress import Silent
 from study.results import Results, ResultsError, manifest, tables
 from study.results.folder import write
 from study.run.study import run_study
@@ -31,6 +30,7 @@ from study.scene.file import read_scene, write_scene
 from study.similarity.score import MEASURES
 from study.sweep.runner import Backend
 from study.sweep.store import Store
+from study.system.progress import Silent
 from study.tradeoff import study as tradeoff
 from study.tradeoff.contenders import configurations
 from study.tradeoff.problem import sampled

@@ -9,7 +9,7 @@ import pytest
 import pyvista
 
 from msm import model
-from study.models.lattice import assembled
+from study.models.lattice_assembly import assembled
 from study.models.tissue import elastic
 from study.organ.block import block_mesh
 from study.results import vtkhdf

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from study import folders, lock
-from study.folders import FolderError, claimed, replacing, write_text
 from study.results.folder import ResultsError, continuing
 from study.scene import Scene
+from study.system import folders, lock
+from study.system.folders import FolderError, claimed, replacing, write_text
 
 SCENE = Scene()
 ROOT = Path(__file__).resolve().parent.parent

@@ -10,7 +10,8 @@ from fuzzy.liver.stiffness import PA_PER_KPA, estimate
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.files import write_rule_base
-from study.estimation import EstimationRequest, answer
+from study.estimation.answer import answer
+from study.estimation.request import EstimationRequest
 
 PATIENTS = (
     {"hcv": 9.5, "hbv": 7.0},

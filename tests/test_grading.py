@@ -20,9 +20,9 @@ from study.models.model import SILENT
 from study.organ.block import block_mesh
 from study.organ.geometry import Level
 from study.organ.grading import equidistributed
-from study.progress import Silent
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from tests.mesh_samples import cube, write_tetrahedra
 
 BLOCK = block_mesh((0.08, 0.06, 0.04), 0.02)

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 
 from msm.assembly import arrays
-from study.export import ExportRequest, export
 from study.handover import step_lattice
+from study.handover.export import ExportRequest, export
 from study.handover.lattice import check_forces, lattices
+from study.handover.lattice_files import ARRAYS
 from study.handover.sofa import PLUGINS
-from study.handover.write import ARRAYS
-from study.progress import Silent
 from study.results.folder import write
 from study.run.preparation import prepare_scene
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
+from study.system.progress import Silent
 
 SMALL = (
     *('organ.size=["60 mm", "40 mm", "30 mm"]', "tool.radius=15 mm", "tool.force=0.2 N"),

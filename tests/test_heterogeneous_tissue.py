@@ -244,7 +244,7 @@ def test_a_mean_of_stiffness_would_make_a_stiff_ball_larger(monkeypatch):
 
 
 def scene_assembly(tissue, lattice="lattice"):
-    from study.models.lattice import assembled
+    from study.models.lattice_assembly import assembled
     from study.scene.file import read_scene
     from study.scene.problem import problem_of
 

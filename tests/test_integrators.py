@@ -20,7 +20,7 @@ from msm.model import Material, critical_time_step, run
 from msm.network import network
 from msm.relaxation import relax
 from msm.tangent import add_diagonal, add_product, empty_tangent, linearise, make_definite
-from study.models.lattice import assembled
+from study.models.lattice_assembly import assembled
 from study.organ.block import block_mesh
 from study.organ.occupancy import MeshBody
 from study.scene.file import SceneError, read_scene

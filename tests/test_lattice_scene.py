@@ -10,16 +10,16 @@ from msm.checkpoint import Checkpoint
 from msm.damping import NodalDamping
 from msm.laws import Hooke, Piecewise, initial_stiffness
 from msm.model import Automatic, Fixed, Material, critical_time_step, static_displacement
-from study.check import describe_scene
 from study.mesh.tetrahedra import edges, mean_edge
 from study.models import table
 from study.models.damping import nodal_damping, reference_damping
 from study.models.estimates import estimates
-from study.models.lattice import assembled
+from study.models.lattice_assembly import assembled
 from study.models.model import SILENT
 from study.models.tissue import elastic, of_modulus
 from study.problem.damping import RayleighDamping
 from study.run.assumptions import assumptions
+from study.run.check import describe_scene
 from study.run.dimensionless import dimensionless
 from study.scene.file import read_scene, write_scene
 from study.scene.problem import problem_of

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.check import describe_mesh
 from study.mesh.axes import AXES, MODELLING, is_mirrored, letters_of, to_scene
 from study.mesh.kinds import MeshError
 from study.mesh.load import load_mesh
 from study.mesh.surface import enclosed_volume
 from study.mesh.tetrahedra import boundary, volumes
+from study.run.check import describe_mesh
 from study.run.study import run_study
 from study.scene import Place
 from study.scene.file import SceneError, read_scene

@@ -11,7 +11,7 @@ import pytest
 
 from fem_reference.exchange.calculix_rule import integrated
 from fem_reference.solvers import solve_static
-from study.export import frames
+from study.handover.export import frames
 from study.problem.damping import RayleighDamping
 from tests.oracles import calculix, matrices
 from tests.oracles.cases import CASES, DYNAMIC, build, difference, kept, ramp

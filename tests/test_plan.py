@@ -13,7 +13,7 @@ from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solve_static
 from msm.stepper import LatticeStepper
 from study.commands.plan import plan as plan_command
-from study.commands.run import run
+from study.commands.run import RunFlags, run
 from study.models.finite_elements import PreparedElements, reference_of
 from study.models.model import ModelRun
 from study.plan import moved as moved_plan
@@ -23,7 +23,6 @@ from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
 from study.problem.trajectory import Trajectory
-from study.progress import Silent
 from study.results.folder import read
 from study.results.records import CorrectionRecord, CurveErrors, SpacingErrors
 from study.run.requirement import requirement_checks
@@ -31,6 +30,7 @@ from study.run.rest import rest_of
 from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from tests.benchmarks import planned_places
 from tests.conftest import SMALL
 
@@ -200,7 +200,7 @@ def test_scene_that_wants_rest_takes_no_step_and_tells_its_errors(tmp_path, monk
 def test_flags_of_a_motion_are_refused_where_the_rest_alone_is_wanted(tmp_path, flag):
     overrides = [*SMALL, 'require.quantities=["rest"]', "require.error=60 %"]
     with pytest.raises(ValueError, match=rf"--{flag.strip('_').replace('_', '-')}: .*rest alone"):
-        run("block", set_=overrides, out=tmp_path / "rest", **{flag: True})
+        run("block", set_=overrides, out=tmp_path / "rest", flags=RunFlags(**{flag: True}))
     assert not (tmp_path / "rest").exists()
 
 
@@ -219,7 +219,12 @@ def test_scene_that_knows_its_error_needs_no_reference(tmp_path, monkeypatch):
     monkeypatch.setattr(LatticeStepper, "take_step", no_step)
     monkeypatch.setattr("msm.model.run", refuse)
     out = tmp_path / "results"
-    run("block", set_=[*SMALL, "require.error=30 %", *AT_TOOL], out=out, report=False)
+    run(
+        "block",
+        set_=[*SMALL, "require.error=30 %", *AT_TOOL],
+        out=out,
+        flags=RunFlags(report=False),
+    )
     results = read(out)
     assert [one.name for one in results.record.models] == ["superposition"]
     assert any("Planned: model" in note for note in results.record.notes)

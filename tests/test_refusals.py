@@ -5,8 +5,8 @@ from functools import partial
 
 import pytest
 
-from study.check import describe_scene
 from study.commands import EXIT_BAD_INPUT
+from study.run.check import describe_scene
 from study.run.study import run_study
 from study.scene.file import read_scene, write_scene
 

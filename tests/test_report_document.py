@@ -22,12 +22,12 @@ from reports.content import document
 from reports.field_figures import views
 from reports.ranking import leads
 from reports.tables import lead_rows
-from study import folders
 from study.commands.report import report as report_command
 from study.results.folder import Results, ResultsError, write
 from study.results.records import SCHEMA_VERSION
 from study.stages.job_pool import available, job_pool
 from study.stages.threads import threads
+from study.system import folders
 from tests.report_samples import (
     FUZZY,
     LABELS,

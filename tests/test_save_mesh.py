@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.commands.run import run
+from study.commands.run import RunFlags, run
 from study.mesh.load import load_mesh
 from study.run import study
 from study.run.stages import RunOptions
@@ -30,7 +30,7 @@ def _own_store(tmp_path, monkeypatch):
 
 
 def test_the_mesh_of_a_run_is_kept_to_the_bit_and_read_again(tmp_path):
-    run("block", set_=SMALL, out=tmp_path / "a", report=False, save_mesh=True)
+    run("block", set_=SMALL, out=tmp_path / "a", flags=RunFlags(report=False, save_mesh=True))
     scene = read_scene("block", SMALL)
     wanted = geometry_of(scene.organ, scene.reference.element_size).mesh
     found, _ = load_mesh(tmp_path / "a" / "mesh.msh", "m")
@@ -38,7 +38,7 @@ def test_the_mesh_of_a_run_is_kept_to_the_bit_and_read_again(tmp_path):
     np.testing.assert_array_equal(found.tetrahedra, wanted.tetrahedra)
     assert "mesh.msh" in (tmp_path / "a" / "SHA256SUMS").read_text()
     # All else is kept; a run without the mesh takes its place.
-    run("block", set_=SMALL, out=tmp_path / "a", report=False)
+    run("block", set_=SMALL, out=tmp_path / "a", flags=RunFlags(report=False))
     assert not (tmp_path / "a" / "mesh.msh").exists()
 
 
@@ -54,4 +54,4 @@ def test_a_mesh_that_a_mesher_makes_otherwise_each_time_is_not_passed_off(tmp_pa
 
 def test_a_point_has_no_mesh_to_keep(tmp_path):
     with pytest.raises(ValueError, match="--save-mesh: a single point has none"):
-        run("paper", out=tmp_path / "a", save_mesh=True)
+        run("paper", out=tmp_path / "a", flags=RunFlags(save_mesh=True))

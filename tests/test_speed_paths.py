@@ -15,7 +15,7 @@ from msm.assembly import arrays
 from msm.explicit import symplectic_euler, velocity_verlet
 from msm.forces import internal_forces
 from msm.lattice import CORNERS
-from study import compiled
+from study.system import compiled
 from tests.benchmarks import bench_lattice, field_error, grid_in_c
 from tests.benchmarks.bench_lattice import FRACTION, LAW, cube, free, moved
 from tests.benchmarks.bench_order import cuthill_mckee, numbered
@@ -233,7 +233,7 @@ from kernels.called import f
 def g(x):
     return f(x)
 """
-REMEDY = "from pathlib import Path\nfrom study.compiled import drop_outdated\n{}\n"
+REMEDY = "from pathlib import Path\nfrom study.system.compiled import drop_outdated\n{}\n"
 ASK = "from kernels.calling import g; print(g(1))"
 
 

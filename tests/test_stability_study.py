@@ -23,9 +23,9 @@ from study.mesh.kinds import TetrahedralMesh
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.tissue import Tissue
-from study.progress import Silent
 from study.scene.file import read_scene
 from study.sweep.runner import Outcome
+from study.system.progress import Silent
 
 COMMITTED = Path(__file__).resolve().parent.parent / "reports/data/stability.csv"
 HERE = "tests.test_stability_study"

@@ -23,12 +23,10 @@ import pytest
 from msm.laws import Hooke
 from study.annotation.choice import Choice
 from study.annotation.quantity import Quantity
-from study.folders import FolderError
 from study.models.estimates import estimates
 from study.models.model import SILENT, ModelRun
 from study.models.tissue import of_modulus
 from study.problem.trajectory import Trajectory
-from study.progress import Silent
 from study.results.records import Check, ModelRecord
 from study.run.organ_stages import AT_REST, ORGAN, OrganStages
 from study.run.stages import SERIAL, RunOptions, Stages
@@ -41,6 +39,8 @@ from study.stages.fingerprint import key
 from study.stages.job_pool import Job, job_pool
 from study.stages.serialisation import flattened, restored
 from study.stages.store import Store, shown_size, user_store
+from study.system.folders import FolderError
+from study.system.progress import Silent
 
 ROOT = Path(__file__).resolve().parent.parent
 TINY = (
@@ -715,7 +715,7 @@ def test_stages_of_several_processes_are_told_to_one(monkeypatch):
 
 PARENT = """
 import os, sys, time
-from study.progress import Silent
+from study.system.progress import Silent
 from study.stages.job_pool import Job, job_pool
 def work(_):
     print(os.getpid(), flush=True)

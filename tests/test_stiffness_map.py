@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference import model as fem
 from fem_reference.solvers import solve_static
-from study.check import describe_scene
 from study.mesh.axes import to_scene
 from study.mesh.save import save
 from study.mesh.tetrahedra import boundary, volumes
 from study.organ.block import block_mesh
 from study.problem.heterogeneous import HeterogeneousTissue, barycentric_samples, of_tetrahedra
 from study.results.provenance import organ_sha256
+from study.run.check import describe_scene
 from study.scene.file import read_scene, resolved, validate, write_scene
 from study.scene.nifti import read_image
 from study.scene.problem import problem_of

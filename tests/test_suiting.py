@@ -9,15 +9,15 @@ import pytest
 
 from fem_reference.observation import largest_rotation, largest_strain
 from fem_reference.solvers import solve_static
-from study.check import describe_scene
-from study.export import ExportRequest, export
+from study.handover.export import ExportRequest, export
 from study.models.finite_elements import reference_of
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.organ.geometry import built_in_liver
-from study.progress import Silent
+from study.run.check import describe_scene
 from study.run.suiting import MARGIN, POWERS, read_suited
 from study.scene.file import SceneError, read_scene, resolved, validate, write_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from tests.mesh_samples import write_tetrahedra
 
 COARSE = ("reference.element_size=30 mm", 'models=["fem"]')

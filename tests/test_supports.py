@@ -14,7 +14,7 @@ from fem_reference.subspace import modal_subspace
 from msm import model as msm
 from msm.integrators import INTEGRATORS
 from msm.statics import static_displacement
-from study.models.lattice import assembled
+from study.models.lattice_assembly import assembled
 from study.models.tissue import of_modulus
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch

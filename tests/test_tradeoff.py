@@ -14,13 +14,13 @@ from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
 from study.models import lattice
 from study.models.model import Stepper
 from study.problem.damping import RayleighDamping
-from study.progress import Silent
 from study.run import scene_problem as scene_problem_module
 from study.run.scene_problem import scene_arguments
 from study.scene.file import read_scene
 from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
+from study.system.progress import Silent
 from study.tradeoff import recommend as advice
 from study.tradeoff import study as study_module
 from study.tradeoff import table

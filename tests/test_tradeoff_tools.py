@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from study.commands import EXIT_BAD_INPUT
-from study.progress import Silent
 from study.run.scene_problem import scene_arguments, scene_problem
 from study.scene.file import read_scene
 from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
+from study.system.progress import Silent
 from study.tradeoff import study as study_module
 from study.tradeoff import table
 from study.tradeoff.comparison import FINEST, is_finest, lattices, truth_of

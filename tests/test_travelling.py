@@ -18,11 +18,11 @@ from study.plan import moved
 from study.plan.plan import measure, plan
 from study.problem import tool_travel
 from study.problem.tool_travel import StationFactor, station_loads, stations
-from study.progress import Silent
 from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 from study.tradeoff.contenders import contender, contenders_of
 from study.tradeoff.recommend import bound
 from study.tradeoff.request import _refuse_demand

@@ -10,9 +10,9 @@ from reports import renders, report
 from reports.content import document
 from reports.page.answer import answer
 from reports.page.write import page_of
-from study.compare import differences
 from study.models.lattice import PreparedLattice
 from study.problem.unfinished import UnfinishedError
+from study.results.comparison import differences
 from study.results.content import check
 from study.results.folder import read, write
 from study.run.stages import RunOptions

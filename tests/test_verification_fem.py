@@ -40,7 +40,7 @@ from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
-from study.progress import Silent
+from study.system.progress import Silent
 
 SIZE = (0.06, 0.05, 0.04)
 DOWN = np.array([0.0, 0.0, -1.0])

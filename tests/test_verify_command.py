@@ -12,7 +12,7 @@ from study.known import request, table
 from study.known.case import Case
 from study.known.finding import error_of, number_of
 from study.known.suite import PROBLEMS
-from study.progress import Silent
+from study.system.progress import Silent
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -16,9 +16,7 @@ VIEW_RULES = 6
 VIEW_POINTS = 301
 
 
-def drawing_arrays(
-    explanation: Explanation, unit: str = "", rules: int = VIEW_RULES
-) -> dict[str, NDArray[Any]]:
+def drawing_arrays(explanation: Explanation, unit: str = "") -> dict[str, NDArray[Any]]:
     """Arrays of a rule plot, with names that begin with view.KIND.
 
     R rules, T terms, D inputs, K output sets, P and M points:
@@ -31,7 +29,7 @@ def drawing_arrays(
     `answer` (), `interval` (2,) and `switches` (2, 2).
     Arrays that the kind of system does not have are empty.
     """
-    shown = shown_rules(explanation, rules)
+    shown = shown_rules(explanation, VIEW_RULES)
     parts: dict[str, Any] = {
         "unit": unit,
         "inputs": [variable.name for variable in explanation.system.inputs],

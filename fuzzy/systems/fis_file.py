@@ -26,7 +26,7 @@ from fuzzy.systems.fis_sections import (
 )
 from fuzzy.systems.sets import FORMS, FUNCTION_KINDS, TYPE_1, FuzzySet, Kind
 from fuzzy.systems.system import OPERATORS, Connective, FuzzySystem, Operators, Rule, Term, Variable
-from study.folders import NO_PLACE, write_text
+from study.system.folders import NO_PLACE, write_text
 
 SYSTEM_KEYS = (
     "Name",

@@ -40,7 +40,7 @@ from typing import Any, NoReturn, cast
 
 from fuzzy.systems.sets import Footprint, FuzzySet, Kind
 from fuzzy.systems.system import Connective, FuzzySystem, Operators, Rule, Term, Variable
-from study.folders import NO_PLACE, write_text
+from study.system.folders import NO_PLACE, write_text
 
 FORMAT = "fuzzy-system"
 VERSION = 1

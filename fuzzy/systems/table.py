@@ -14,7 +14,14 @@ from fuzzy.systems.kinds import check_kind
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import Array
 from fuzzy.systems.system import FuzzySystem
-from study.spreadsheet import Table, TableError, decimal_commas, number, read_table, write_table
+from study.system.spreadsheet import (
+    Table,
+    TableError,
+    decimal_commas,
+    number,
+    read_table,
+    write_table,
+)
 
 VALUE = "estimate"
 BOUNDS = ("lower", "upper")

@@ -10,7 +10,7 @@ from reports import several
 from reports.appearance import other_look
 from reports.digits import short, words
 from reports.page.data import DASHES, OTHER_DASHES
-from reports.page.write import inert, part, plotly, table
+from reports.page.write import head, inert, part, plotly, table
 from reports.ranking import tool_probe
 from reports.several import Compared
 from reports.several_pdf import LOOKS_FROM, alternative, moved, shared_models
@@ -27,9 +27,10 @@ def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[C
     """The page; the same runs and plotly give the same bytes."""
     names = [words(short(name, 24)) for name in names]
     labels = shared_models(runs)
+    title = markup.escape(f"Several runs: {', '.join(names)}")
     text = Template(part("several.html")).substitute(
-        title=markup.escape(f"Several runs: {', '.join(names)}"),
-        style=part("page.css"),
+        head=head(title),
+        title=title,
         said=markup.escape(several.said(names, runs, rows)),
         height=f"{ROW * -(-len(labels) // COLUMNS)}rem",
         words=markup.escape(alternative(names, runs), quote=True),

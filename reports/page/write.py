@@ -19,12 +19,11 @@ from reports.digits import Table, symbols, unbroken, words
 from reports.page.answer import Answer, answer, question
 from reports.page.data import page
 from reports.tables import provenance_rows
-from study.folders import FolderError, check_file, write_bytes
 from study.results.folder import Results, ResultsError, read
 from study.scene.file import write_scene
+from study.system.folders import FolderError, check_file, write_bytes
 
 NAME = "report.html"
-PARTS = ("page.html", "page.css", "organ.js", "page.js")
 MISSING = "plotly is not installed, which draws report.html: pip install 'plotly>=6'"
 
 
@@ -51,14 +50,13 @@ def make_page(folder: Path) -> None:
 
 def page_of(results: Results) -> bytes:
     """The page of results in memory; the same results and plotly give the same bytes."""
-    parts = {name: part(name) for name in PARTS}
-    title = words(results.record.title or "Untitled scene")
-    text = Template(parts["page.html"]).substitute(
+    title = markup.escape(words(results.record.title or "Untitled scene"))
+    text = Template(part("page.html")).substitute(
         _written(results),
-        title=markup.escape(title),
-        style=parts["page.css"],
-        organ=parts["organ.js"],
-        program=parts["page.js"],
+        head=head(title),
+        title=title,
+        organ=part("organ.js"),
+        program=part("page.js"),
         data=_data(results),
         plotly=plotly(),
     )
@@ -68,6 +66,11 @@ def page_of(results: Results) -> bytes:
 def part(name: str) -> str:
     """Text of a file of the page's own."""
     return resources.files("reports.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def head(title: str) -> str:
+    """The start of a page up to its body: it forbids requests. The title is escaped already."""
+    return Template(part("head.html")).substitute(title=title, style=part("page.css"))
 
 
 def plotly() -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 
-from study import signals
 from study.commands.bundle import bundle
 from study.commands.check import check
 from study.commands.cohort import cohort
@@ -33,6 +32,7 @@ from study.commands.tradeoff import tradeoff
 from study.commands.validate import validate
 from study.commands.verify import verify
 from study.commands.view import view
+from study.system import signals
 
 app = App(
     name="liver-study",

@@ -17,7 +17,7 @@ def bundle(folder: Path, *, out: Path | None = None) -> None:
     out
         Archive to write; NAME.zip beside the folder by default.
     """
-    from study.bundle import bundle as write
+    from reports.bundle import bundle as write
 
     archive = out or folder.absolute().with_name(f"{folder.absolute().name}.zip")
     write(folder, archive)

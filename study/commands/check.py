@@ -37,7 +37,7 @@ def check(
     pieces
         Of a mesh file in several pieces: largest keeps that one, one (the default) refuses them.
     """
-    from study.check import describe_mesh, describe_scene, is_scene
+    from study.run.check import describe_mesh, describe_scene, is_scene
 
     if is_scene(target):
         for name, value in (("unit", unit), ("axes", axes)):

@@ -22,7 +22,7 @@ def cohort(*, patients: Whole = PATIENTS, seed: Whole = SEED, out: Path | None =
     out
         Table to write as well (CSV), by estimator, aetiology and stage.
     """
-    from study.cohort import cohort_lines, judged, write_cohort
+    from study.estimation.cohort import cohort_lines, judged, write_cohort
 
     if out is not None and not out.parent.is_dir():
         raise ValueError(f"--out {out}: there is no folder {out.parent}; make it first")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from study.commands.flags import EXIT_FAILED_CHECK, Switch
 
 if TYPE_CHECKING:
-    from study.compare import Difference
+    from study.results.comparison import Difference
 
 
 CSV, PDF, HTML = ".csv", ".pdf", ".html"
@@ -59,8 +59,8 @@ def compare(
 
 def _by_errors(folders: list[Path], out: Path | None) -> None:
     from reports import several
-    from study.folders import check_file, write_bytes, write_text
     from study.results.folder import read
+    from study.system.folders import check_file, write_bytes, write_text
 
     if out is not None:
         if out.suffix.lower() not in (CSV, PDF, HTML):
@@ -93,7 +93,7 @@ def _by_errors(folders: list[Path], out: Path | None) -> None:
 
 
 def _two(first: Path, second: Path, tolerance: float) -> None:
-    from study.compare import differences, other_words
+    from study.results.comparison import differences, other_words
     from study.results.folder import read
 
     if not 0.0 <= tolerance < math.inf:

@@ -69,7 +69,8 @@ def estimate(
     as_json
         Print JSON in SI units instead of a table.
     """
-    from study.estimation import EstimationRequest, answer
+    from study.estimation.answer import answer
+    from study.estimation.request import EstimationRequest
 
     given = {"hcv": hcv, "hbv": hbv, "ald": ald, "cld": cld, "nafld": nafld}
     found = answer(

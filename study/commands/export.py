@@ -29,9 +29,9 @@ def export(
     set_
         Override of a scene value, table.key=value. May be repeated.
     """
-    from study.export import ExportRequest
-    from study.export import export as write
-    from study.progress import on_stderr
+    from study.handover.export import ExportRequest
+    from study.handover.export import export as write
+    from study.system.progress import on_stderr
 
     with on_stderr() as progress:
         folder = write(ExportRequest(target=target, to=to, out=out, overrides=set_ or ()), progress)

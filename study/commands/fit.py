@@ -42,9 +42,9 @@ def fit(
     as_json
         Print JSON instead of lines.
     """
-    from study.folders import refuse_unwritable
-    from study.progress import on_stderr
     from study.scene.file import read_scene
+    from study.system.folders import refuse_unwritable
+    from study.system.progress import on_stderr
     from study.validation import fit_table, fitting
     from study.validation.user_data import read_curve
 

@@ -22,10 +22,10 @@ def plan(scene: str = "liver", *, set_: Overrides = None, out: Path | None = Non
     out
         Scene file to write, with the selected models and settings.
     """
-    from study.folders import check_file, write_text
     from study.plan import plan as planning
     from study.run.suiting import read_suited
     from study.scene.file import write_scene
+    from study.system.folders import check_file, write_text
 
     given = read_suited(scene, set_ or ())
     if out is not None:

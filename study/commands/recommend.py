@@ -37,7 +37,7 @@ def recommend(
     out
         Scene file to write; NAME-60Hz.toml or NAME-5percent.toml by default.
     """
-    from study.progress import on_stderr
+    from study.system.progress import on_stderr
     from study.tradeoff import request as asked
 
     request = asked.TradeoffRequest(

@@ -43,7 +43,7 @@ def report(
         return
     if target is None:
         raise ValueError("report: give a results folder or a bundle, or --reference")
-    from study.bundle import is_archive
+    from reports.bundle import is_archive
 
     if is_archive(target):
         _of_bundle(target, out or Path(target.stem), html=html)
@@ -60,7 +60,7 @@ def report(
 
 def _reference(target: Path | None, out: Path | None) -> None:
     from reports.measured import NAME, make_measured
-    from study.folders import check_file
+    from study.system.folders import check_file
 
     if target is not None:
         raise ValueError(f"--reference: describes no run; omit {target}")
@@ -71,7 +71,7 @@ def _reference(target: Path | None, out: Path | None) -> None:
 
 
 def _of_folder(folder: Path, *, html: bool) -> list[Path]:
-    from study.folders import claimed
+    from study.system.folders import claimed
 
     # Where its parent may not be written the folder cannot be replaced meanwhile, nor locked.
     free = os.access(folder.absolute().parent, os.W_OK)
@@ -81,7 +81,7 @@ def _of_folder(folder: Path, *, html: bool) -> list[Path]:
 
 def _of_bundle(archive: Path, folder: Path, *, html: bool) -> None:
     """Unpack, make, and say whether the bytes are those of the archive."""
-    from study.bundle import changed, unpack
+    from reports.bundle import changed, unpack
 
     unpacked = unpack(archive, folder)
     made = _of_folder(folder, html=html)
@@ -112,7 +112,7 @@ def make(folder: Path, *, report: bool, page: bool) -> list[Path]:
         made.append(folder / NAME)
     if page:
         from reports.page import write
-        from study.folders import tell
+        from study.system.folders import tell
 
         if write.is_drawable():
             write.make_page(folder)

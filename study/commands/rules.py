@@ -27,7 +27,7 @@ def rules(
     sugeno
         Write a Sugeno system: constants in place of the output sets.
     """
-    from study.estimation import rule_base_lines
+    from study.estimation.rule_base import rule_base_lines
 
     lines = rule_base_lines(rule_base, given_flags(liver), out, sugeno=sugeno)
     print("\n".join(lines))

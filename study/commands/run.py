@@ -6,49 +6,28 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 from cyclopts import Parameter
 
 from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch, WholeOrNone
-from study.folders import tell
+from study.system.folders import tell
 
 if TYPE_CHECKING:
-    from study.progress import Progress
     from study.results import Results
     from study.scene import Scene
     from study.stages.store import Store
+    from study.system.progress import Progress
 
 REPORT, PAGE = "report.pdf", "report.html"
 
 
-def run(
-    scene: str = "liver",
-    *,
-    set_: Overrides = None,
-    out: Path | None = None,
-    report: bool = True,
-    html: bool = True,
-    open_: Annotated[bool, Parameter(name="--open", negative=())] = False,
-    fields: Switch = False,
-    save_mesh: Switch = False,
-    resume: Switch = False,
-    fresh: Switch = False,
-    workers: WholeOrNone = None,
-    minutes: float | None = None,
-) -> None:
-    """Run a scene through every model it names and write a results folder with its report.
-
-    What an earlier run has computed, and this one would again, is taken from the user's store.
+@dataclass(frozen=True, kw_only=True)
+class RunFlags:
+    """What a run makes and keeps, and what it may take.
 
     Parameters
     ----------
-    scene
-        A built-in scene (see `liver-study scenes`) or a TOML file.
-    set_
-        Override of the scene, table.key=value, for example tool.force="1 N". May be repeated.
-    out
-        Results folder; results/NAME by default. Earlier results in it are replaced.
     report
         Whether to make report.pdf and report.html.
     html
@@ -70,26 +49,82 @@ def run(
         Most that a model may take; one that needs longer is told as not finished, and the others
         go on.
     """
+
+    report: bool = True
+    html: bool = True
+    open_: Annotated[bool, Parameter(name="--open", negative=())] = False
+    fields: Switch = False
+    save_mesh: Switch = False
+    resume: Switch = False
+    fresh: Switch = False
+    workers: WholeOrNone = None
+    minutes: float | None = None
+
+    @property
+    def page(self) -> bool:
+        """Whether to make report.html: --no-report leaves out both reports."""
+        return self.report and self.html
+
+    @property
+    def of_a_body(self) -> dict[str, bool]:
+        """Flags that mean nothing for a single point, and whether they are given."""
+        return {"--fields": self.fields, "--save-mesh": self.save_mesh}
+
+    @property
+    def of_a_motion(self) -> dict[str, bool]:
+        """Flags that mean nothing where the rest alone is asked for, and whether they are given."""
+        timed = self.minutes is not None
+        others = {"--resume": self.resume, "--open": self.open_, "--minutes": timed}
+        return self.of_a_body | others
+
+    def refuse(self) -> None:
+        """Raise ValueError for values out of range, or flags that contradict each other."""
+        if self.resume and self.fresh:
+            raise ValueError("--resume and --fresh: give one; --fresh takes nothing from before")
+        if self.workers is not None and self.workers < 1:
+            raise ValueError(f"--workers {self.workers}: give 1 or more")
+        if self.minutes is not None and not self.minutes > 0.0:
+            raise ValueError(
+                f"--minutes {self.minutes:g}: give more than 0, or leave it out for no end"
+            )
+        if self.open_ and not self.page:
+            raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
+
+
+AS_DEFAULT = RunFlags()
+
+
+def run(
+    scene: str = "liver",
+    *,
+    set_: Overrides = None,
+    out: Path | None = None,
+    flags: Annotated[RunFlags, Parameter(name="*")] = AS_DEFAULT,
+) -> None:
+    """Run a scene through every model it names and write a results folder with its report.
+
+    What an earlier run has computed, and this one would again, is taken from the user's store.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene (see `liver-study scenes`) or a TOML file.
+    set_
+        Override of the scene, table.key=value, for example tool.force="1 N". May be repeated.
+    out
+        Results folder; results/NAME by default. Earlier results in it are replaced.
+    """
     from study.results.folder import default_folder
     from study.scene.file import read_scene
-    from study.stages.store import user_store
 
-    if resume and fresh:
-        raise ValueError("--resume and --fresh: give one; --fresh takes nothing from before")
-    if workers is not None and workers < 1:
-        raise ValueError(f"--workers {workers}: give 1 or more")
-    if minutes is not None and not minutes > 0.0:
-        raise ValueError(f"--minutes {minutes:g}: give more than 0, or leave it out for no end")
-    if open_ and not (report and html):
-        raise ValueError("--open: opens report.html; leave out --no-report and --no-html")
+    flags.refuse()
     chosen = read_scene(scene, set_ or ())
-    of_a_body = {"--fields": fields, "--save-mesh": save_mesh}
     if chosen.is_point:
-        _refuse_any(of_a_body, "a single point has none; leave it out")
+        _refuse_any(flags.of_a_body, "a single point has none; leave it out")
     folder = out or default_folder(scene)
     if chosen.require is not None and not chosen.require.moves:
         _refuse_any(
-            of_a_body | {"--resume": resume, "--open": open_, "--minutes": minutes is not None},
+            flags.of_a_motion,
             "require.quantities asks for the rest alone, whose folder has no motion and no report; "
             "leave it out, or ask for history too",
         )
@@ -97,9 +132,8 @@ def run(
         return
     if chosen.require is not None:
         chosen = _planned(chosen)
-    how = _How(folder, report, report and html, fields, save_mesh, resume, fresh, workers, minutes)
-    results = _results(chosen, how, user_store())
-    if open_:
+    results = _results(chosen, folder, flags)
+    if flags.open_:
         from study.commands.view import show
 
         show(folder / PAGE)
@@ -117,8 +151,8 @@ def _refuse_any(flags: Mapping[str, bool], why: str) -> None:
 def _planned(scene: Scene) -> Scene:
     """The scene that keeps what is required, once a person is told of the plan."""
     from study.plan.plan import lines
-    from study.progress import on_stderr
     from study.run import planned
+    from study.system.progress import on_stderr
 
     with on_stderr() as progress:
         found = planned.planned(scene, progress)
@@ -129,8 +163,8 @@ def _planned(scene: Scene) -> Scene:
 def _at_rest(scene: Scene, folder: Path) -> None:
     """Plan a scene of which the rest alone is wanted, and write a folder of that."""
     from study.plan.plan import lines
-    from study.progress import on_stderr
     from study.run import planned
+    from study.system.progress import on_stderr
 
     with on_stderr() as progress:
         found = planned.planned(scene, progress)
@@ -138,68 +172,46 @@ def _at_rest(scene: Scene, folder: Path) -> None:
         print("\n".join(planned.at_rest(found, folder, progress)))
 
 
-@dataclass(frozen=True)
-class _How:
-    """Flags of a run."""
-
-    folder: Path
-    report: bool
-    page: bool
-    fields: bool
-    mesh: bool
-    resume: bool
-    fresh: bool
-    workers: int | None
-    minutes: float | None
-
-
-def _results(scene: Scene, how: _How, store: Store | None) -> Results:
+def _results(scene: Scene, folder: Path, flags: RunFlags) -> Results:
     """Results that the folder has, or that are written into it, once a person is told of them."""
-    from study.progress import on_stderr
     from study.run import up_to_date
+    from study.stages.store import user_store
+    from study.system.progress import on_stderr
 
-    key = (
-        ""
-        if store is None
-        else up_to_date.run_key(scene, how.folder, fields=how.fields, mesh=how.mesh)
-    )
-    earlier = (
-        None
-        if store is None or how.fresh
-        else up_to_date.up_to_date_run(store, key, how.folder, scene)
-    )
+    store, key, earlier = user_store(), "", None
+    if store is not None:
+        key = up_to_date.run_key(scene, folder, fields=flags.fields, mesh=flags.save_mesh)
+    if store is not None and not flags.fresh:
+        earlier = up_to_date.up_to_date_run(store, key, folder, scene)
     if earlier is not None:
-        tell(f"nothing to compute: {how.folder} holds this run, of {earlier.at}; or give --fresh")
+        tell(f"nothing to compute: {folder} holds this run, of {earlier.at}; or give --fresh")
     with on_stderr() as progress:
-        results = _computed(scene, how, store, progress) if earlier is None else earlier.results
-        report = how.report and not (earlier and earlier.has_report)
-        page = how.page and not (earlier and earlier.has_page)
-        failure = _report_failure(_Wanted(report, page), how, store, progress)
+        results = earlier.results if earlier else _computed(scene, folder, flags, store, progress)
+        report = flags.report and not (earlier and earlier.has_report)
+        page = flags.page and not (earlier and earlier.has_page)
+        failure = _report_failure(folder, flags, store, progress, report=report, page=page)
     # What is not finished is sought anew by the next run.
     whole = all(model.status != "not finished" for model in results.record.models)
     if store is not None and whole and (earlier is None or report or page):
-        up_to_date.record_run(store, key, how.folder)
-    _print_summary(results, how.folder)
+        up_to_date.record_run(store, key, folder)
+    _print_summary(results, folder)
     if failure is not None:
-        reason = str(failure) or type(failure).__name__
-        print(
-            f"liver-study: results kept, but no report: {reason}; liver-study report {how.folder} "
-            "makes it",
-            file=sys.stderr,
-        )
-        sys.exit(EXIT_MACHINE)
+        _end_without_report(failure, folder)
     return results
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """Which reports are to be made."""
+def _end_without_report(failure: BaseException, folder: Path) -> NoReturn:
+    reason = str(failure) or type(failure).__name__
+    print(
+        f"liver-study: results kept, but no report: {reason}; liver-study report {folder} makes it",
+        file=sys.stderr,
+    )
+    sys.exit(EXIT_MACHINE)
 
-    report: bool
-    page: bool
 
-
-def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) -> Results:
+def _computed(
+    scene: Scene, folder: Path, flags: RunFlags, store: Store | None, progress: Progress
+) -> Results:
     from study.models.model import Watch
     from study.models.persistence import Persistence
     from study.results import manifest
@@ -210,12 +222,12 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
 
     with (
         told_to_start_again(),
-        replacing(how.folder) as partial,
-        continuing(how.folder, scene, resume=how.resume) as state,
+        replacing(folder) as partial,
+        continuing(folder, scene, resume=flags.resume) as state,
     ):
-        mesh = partial / manifest.MESH if how.mesh else None
-        options = RunOptions(store, how.fresh, how.workers or available(), mesh, how.minutes)
-        persistence = Persistence(state, how.resume, partial if how.fields else None)
+        mesh = partial / manifest.MESH if flags.save_mesh else None
+        options = RunOptions(store, flags.fresh, flags.workers or available(), mesh, flags.minutes)
+        persistence = Persistence(state, flags.resume, partial if flags.fields else None)
         results = run_study(scene, Watch(progress, persistence), options)
         with progress.stage("results"):
             write(results, partial)
@@ -225,26 +237,32 @@ def _computed(scene: Scene, how: _How, store: Store | None, progress: Progress) 
 
 
 def _report_failure(
-    wanted: _Wanted, how: _How, store: Store | None, progress: Progress
+    folder: Path,
+    flags: RunFlags,
+    store: Store | None,
+    progress: Progress,
+    *,
+    report: bool,
+    page: bool,
 ) -> Exception | KeyboardInterrupt | None:
     """Make the reports; neither a fault in them nor a signal must cost a finished run."""
-    from study.folders import claimed
     from study.stages.cached_arrays import using_store
     from study.stages.job_pool import available
     from study.stages.threads import threads
+    from study.system.folders import claimed
 
-    if not (wanted.report or wanted.page):
+    if not (report or page):
         return None
     try:
         with (
             progress.stage("report"),
-            claimed(how.folder),
-            using_store(store, readable=not how.fresh),
-            threads(how.workers or available()),
+            claimed(folder),
+            using_store(store, readable=not flags.fresh),
+            threads(flags.workers or available()),
         ):
             from study.commands.report import make
 
-            make(how.folder, report=wanted.report, page=wanted.page)
+            make(folder, report=report, page=page)
     except (Exception, KeyboardInterrupt) as error:  # whatever it is, the results stay
         return error
     return None

@@ -36,7 +36,7 @@ def tradeoff(
     dry_run
         Print what would be run, and stop.
     """
-    from study.progress import on_stderr
+    from study.system.progress import on_stderr
     from study.tradeoff import request as asked
 
     request = asked.TradeoffRequest(

@@ -47,8 +47,8 @@ def validate(
     as_json
         Print JSON instead of a table.
     """
-    from study.folders import check_file
-    from study.progress import on_stderr
+    from study.system.folders import check_file
+    from study.system.progress import on_stderr
     from study.validation import request, table
 
     if out is not None:

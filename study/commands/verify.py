@@ -25,9 +25,9 @@ def verify(
     as_json
         Print JSON instead of a table.
     """
-    from study.folders import check_file
     from study.known import request, table
-    from study.progress import on_stderr
+    from study.system.folders import check_file
+    from study.system.progress import on_stderr
 
     if out is not None:
         check_file(out)

@@ -1,1 +1,1 @@
-"""A scene's lattices for the user's own program: arrays, a stepper in NumPy, scenes for SOFA."""
+"""A scene for other programs: its finite elements for other codes, its lattices for a user."""

@@ -15,11 +15,11 @@ from msm.network import Network
 from study.handover import step_lattice
 from study.models.lattice import PreparedLattice
 from study.problem.problem import Problem
-from study.progress import Progress
 from study.results import Results
 from study.results.arrays import Arrays
 from study.run.preparation import PreparedPointScene, prepare_scene
 from study.scene import Scene
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 

@@ -7,18 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.folders import claimed, naming, refuse_unwritable
 from study.known import table
 from study.known.case import Case, CaseVerdict
 from study.known.finding import Finding
 from study.known.suite import PROBLEMS, stability_cases
 from study.known.trial import attempted
-from study.progress import Progress
 from study.run.suiting import read_suited
 from study.sweep.plan import plan
 from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import ReportStatus, silent
 from study.sweep.store import Store
+from study.system.folders import claimed, naming, refuse_unwritable
+from study.system.progress import Progress
 
 
 def verify(progress: Progress, *, quick: bool = False) -> list[CaseVerdict]:

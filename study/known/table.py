@@ -20,9 +20,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from study.folders import write_text
 from study.known.case import CaseVerdict
 from study.known.finding import Finding
+from study.system.folders import write_text
 
 NAME = "stability.csv"
 STABILITY = (

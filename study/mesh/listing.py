@@ -7,18 +7,20 @@ from collections.abc import Iterable, Sequence
 
 from study.mesh.kinds import IndexArray
 
+MOST = 5
+"""Items that a line of text shows."""
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
-def listing(numbers: IndexArray, most: int = 5) -> str:
+def listing(numbers: IndexArray) -> str:
     """The first few numbers as text."""
-    return some(numbers[: most + 1].tolist(), most)
+    return some(numbers[: MOST + 1].tolist())
 
 
-def some(things: Sequence[object], most: int = 5) -> str:
+def some(things: Sequence[object]) -> str:
     """The first few items as text."""
-    shown = ", ".join(str(thing) for thing in things[:most])
-    return shown + (", ..." if len(things) > most else "")
+    shown = ", ".join(str(thing) for thing in things[:MOST])
+    return shown + (", ..." if len(things) > MOST else "")
 
 
 def one_per_kind(notes: Iterable[str]) -> tuple[str, ...]:

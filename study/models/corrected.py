@@ -43,10 +43,10 @@ from study.models.tissue import of_modulus
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Progress, Silent
 from study.results.fields import Mesh
 from study.results.records import ModelRecord
 from study.scene import Scene
+from study.system.progress import Progress, Silent
 
 Floats = NDArray[np.float64]
 

@@ -21,10 +21,10 @@ from fem_reference.solvers import solve_static
 from fem_reference.time_steps import TimeSteps
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
+from study.models.elements_record import mesh_levels, model_record
 from study.models.errors import (
     DISPLACEMENT_LIMIT,
     VELOCITY_LIMIT,
-    place,
     step_checks,
     time_step_errors,
 )
@@ -41,14 +41,13 @@ from study.models.mesh_error import (
     why_unknown,
 )
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
-from study.models.persistence import record_fields
+from study.models.persistence import write_motion
 from study.organ.geometry import Level
 from study.problem.contact import ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.problem import Problem
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
-from study.progress import Progress
 from study.results.fields import Mesh
 from study.results.records import (
     Check,
@@ -56,10 +55,9 @@ from study.results.records import (
     DiscretisationError,
     ElementsRecord,
     LargeStrain,
-    MeshLevel,
-    ModelRecord,
 )
 from study.scene import Reference, Scene
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 
@@ -228,7 +226,10 @@ class PreparedElements:
         solved, error = self._solve(coarsest, watch.progress)
         best = self.best = solved[-1]
         strained, note = self._at_large_strain(solved, watch.progress)
-        record = self._record(best, steps, self._elements(solved, error, strained))
+        model, elements = self.model, self._elements(solved, error, strained)
+        record = model_record(
+            model.name, model.label, self.problem, model.damping, best, steps, elements
+        )
         checks = (*step_checks(self.model.name, steps), *_subspace_checks(best))
         notes = [self._keep_fields(best, watch), note]
         if error is None:
@@ -432,36 +433,14 @@ class PreparedElements:
         moving, mesh = best.found.moving, best.level.mesh
         if moving is None:
             return "Fields of fem are kept of a superposition only, not of steps in time."
-        shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(persistence, resume=False)
-        with record_fields(afresh, self.model.name, shown, times) as on_sample:
-            for sample in range(len(times)):
-                u, v = (x.reshape(-1, 3)[: len(mesh.points)] for x in moving(sample))
-                on_sample(sample, u, v)
-        return ""
-
-    def _record(
-        self, best: MeshSolution, errors: dict[str, CurveErrors], elements: ElementsRecord
-    ) -> ModelRecord:
-        found, damping = best.found, self.model.damping
-        return ModelRecord(
-            name=self.model.name,
-            label=self.model.label,
-            simulated_s=float(self.problem.observation.times[-1]),
-            status=found.trajectory.status,
-            ended_at_s=found.trajectory.ended_at,
-            ended_near_m=place(found.trajectory),
-            nodes=found.nodes,
-            time_step_s=found.time_step,
-            steps=found.steps,
-            wall_s=found.wall,
-            small_strain_modulus_pa=self.problem.tissue.youngs_modulus,
-            damping_rate_per_s=damping.mass,
-            stiffness_damping_s=damping.stiffness,
-            largest_strain=found.largest_strain,
-            time_step_errors=errors,
-            elements=elements,
+        times, vertices = self.problem.observation.times, len(mesh.points)
+        states = (
+            [x.reshape(-1, 3)[:vertices] for x in moving(sample)] for sample in range(len(times))
         )
+        write_motion(
+            persistence, self.model.name, Mesh(mesh.points, mesh.tetrahedra), times, states
+        )
+        return ""
 
     def _elements(
         self,
@@ -481,21 +460,12 @@ class PreparedElements:
             truncation_error=None if truncation is None else max(truncation),
             truncation=None if truncation is None else CurveErrors(**truncation._asdict()),
             largest_rotation_rad=best.found.largest_rotation,
-            levels=tuple(_level(one, best) for one in solved),
+            levels=mesh_levels(solved),
             mesh_error=error,
             accuracy_missed=accuracy if missed else None,
             large_strain=strained,
             contact=contact_record(self.problem, solved, self._force_steps, graded=self._graded),
         )
-
-
-def _level(one: MeshSolution, best: MeshSolution) -> MeshLevel:
-    return MeshLevel(
-        size=one.level.size / best.level.size,
-        elements=one.found.elements,
-        unknowns=one.body.unknowns,
-        wall_s=one.found.wall,
-    )
 
 
 def _subspace_checks(solved: MeshSolution) -> Iterator[Check]:

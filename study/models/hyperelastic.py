@@ -19,7 +19,8 @@ from fem_reference.memory import refuse_too_large
 from fem_reference.observation import at_points, evaluation
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
-from study.models.errors import place, step_checks, time_step_errors, tool_force_errors
+from study.models.elements_record import mesh_levels, model_record
+from study.models.errors import step_checks, time_step_errors, tool_force_errors
 from study.models.finite_elements import (
     FRAME_RATE,
     SUPPORTED_FEATURES,
@@ -29,16 +30,16 @@ from study.models.finite_elements import (
 from study.models.in_contact import contact_record, rest_in_contact
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.models.model import Estimates, ModelKind, ModelRun, Simulation, Stepper, Watch
-from study.models.persistence import record_fields
+from study.models.persistence import write_motion
 from study.organ.geometry import Level
 from study.organ.grading import resolved
 from study.problem.problem import Problem
 from study.problem.rigid import PLATE, RigidTool
 from study.problem.trajectory import Observation, Trajectory
-from study.progress import Progress
 from study.results.fields import Mesh
-from study.results.records import CurveErrors, ElementsRecord, MeshLevel, ModelRecord
+from study.results.records import CurveErrors, ElementsRecord, ModelRecord
 from study.scene import Reference, Scene
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 
@@ -190,10 +191,10 @@ class PreparedHyperelastic:
                 errors, force_steps = self._by_steps(body, pressed, found.trajectory, progress)
             solved = [*(one.outlined for one in solved), self._solution(level, body, found)]
         self.best = solved[-1]
-        record = self._record(solved, found, errors, force_steps)
+        record = self._record(solved, errors, force_steps)
         checks = tuple(step_checks(name, errors)) if errors else ()
-        notes = (self._keep_fields(body, pressed, found, watch), self._of_overlooked(found))
-        return ModelRun(found.trajectory, record, checks, tuple(filter(None, notes)))
+        self._keep_fields(body, pressed, found, watch)
+        return ModelRun(found.trajectory, record, checks, tuple(self._of_overlooked(found)))
 
     def _moved(
         self, body: Body, pressed: Pressed, seen: Observation, progress: Progress
@@ -253,74 +254,46 @@ class PreparedHyperelastic:
         return MeshSolution(level, body, seen)
 
     def _record(
-        self,
-        solved: list[MeshSolution],
-        found: LargeSolution,
-        errors: dict[str, CurveErrors],
-        force_steps: Floats,
+        self, solved: list[MeshSolution], errors: dict[str, CurveErrors], force_steps: Floats
     ) -> ModelRecord:
-        best, damping = solved[-1], self.model.linear.damping
-        levels = tuple(
-            MeshLevel(
-                size=one.level.size / best.level.size,
-                elements=one.found.elements,
-                unknowns=one.body.unknowns,
-                wall_s=one.found.wall,
-            )
-            for one in solved
+        best, model = solved[-1], self.model
+        elements = ElementsRecord(
+            element=ELEMENT,
+            elements=best.found.elements,
+            unknowns=best.body.unknowns,
+            method=METHOD,
+            levels=mesh_levels(solved),
+            mesh_error=mesh_error(self.problem, solved, graded=True),
+            contact=contact_record(self.problem, solved, force_steps, graded=True),
+            law=LAW,
         )
-        return ModelRecord(
-            name=self.model.name,
-            label=self.model.label,
-            simulated_s=float(self.problem.observation.times[-1]),
-            status=found.trajectory.status,
-            ended_at_s=found.trajectory.ended_at,
-            ended_near_m=place(found.trajectory),
-            nodes=best.found.nodes,
-            time_step_s=found.step,
-            steps=found.steps,
-            wall_s=found.wall,
-            small_strain_modulus_pa=self.problem.tissue.youngs_modulus,
-            damping_rate_per_s=damping.mass,
-            stiffness_damping_s=damping.stiffness,
-            largest_strain=found.largest_strain,
-            time_step_errors=errors,
-            elements=ElementsRecord(
-                element=ELEMENT,
-                elements=best.found.elements,
-                unknowns=best.body.unknowns,
-                method=METHOD,
-                levels=levels,
-                mesh_error=mesh_error(self.problem, solved, graded=True),
-                contact=contact_record(self.problem, solved, force_steps, graded=True),
-                law=LAW,
-            ),
+        damping = model.linear.damping
+        return model_record(model.name, model.label, self.problem, damping, best, errors, elements)
+
+    def _keep_fields(
+        self, body: Body, pressed: Pressed, found: LargeSolution, watch: Watch
+    ) -> None:
+        """Write the motion of the vertices if requested."""
+        mesh, times = body.mesh, self.problem.observation.times
+        states = (
+            [x.reshape(-1, 3)[: len(mesh.points)] for x in (pressed.body.given(state.w), state.v)]
+            for state in found.states
         )
+        shown = Mesh(mesh.points, mesh.tetrahedra)
+        write_motion(watch.persistence, self.model.name, shown, times, states)
 
-    def _keep_fields(self, body: Body, pressed: Pressed, found: LargeSolution, watch: Watch) -> str:
-        """Keep the motion of the vertices, if it is wanted."""
-        persistence, mesh = watch.persistence, body.mesh
-        if persistence is None or persistence.fields is None:
-            return ""
-        shown, times = Mesh(mesh.points, mesh.tetrahedra), self.problem.observation.times
-        afresh = replace(persistence, resume=False)
-        with record_fields(afresh, self.model.name, shown, times) as on_sample:
-            for sample, state in enumerate(found.states):
-                pair = pressed.body.given(state.w), state.v
-                on_sample(sample, *(x.reshape(-1, 3)[: len(mesh.points)] for x in pair))
-        return ""
-
-    def _of_overlooked(self, found: LargeSolution) -> str:
+    def _of_overlooked(self, found: LargeSolution) -> Iterator[str]:
+        """A note where a tool is inside the organ that no contact was sought with."""
         times, tools = self.problem.observation.times, self.problem.rigid_tools
         travel = max(
             (float(np.linalg.norm(one.travel(times), axis=1).max()) for one in tools), default=0.0
         )
-        if found.overlooked <= OVERLOOKED * travel:
-            return ""
-        return (
-            f"In {self.model.name} {1e3 * found.overlooked:.2g} mm of a tool are inside the organ "
-            "where no contact is sought, beside what it would meet of the undeformed surface."
-        )
+        if found.overlooked > OVERLOOKED * travel:
+            yield (
+                f"In {self.model.name} {1e3 * found.overlooked:.2g} mm of a tool are inside the "
+                "organ where no contact is sought, beside what it would meet of the undeformed "
+                "surface."
+            )
 
 
 def _wanted(problem: Problem, share: float, centres: Floats, longest: Floats) -> Floats:

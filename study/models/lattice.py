@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from msm import model as msm
-from msm import tetrahedra
-from msm.assembly import with_external_loads
 from msm.graded import GradedLattice
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
@@ -30,15 +28,14 @@ from study.models.errors import (
     tool_force_errors,
 )
 from study.models.indented_stepper import IndentedStepper
+from study.models.lattice_assembly import assembled, loaded
 from study.models.model import SILENT, ModelRun, Simulation, Stepper, Watch
 from study.models.persistence import OnSample, checkpoint, record_fields
 from study.models.region_size import RegionRequest, SizedRegion, sized_region
 from study.models.spacing_error import COARSER, spacing_errors
-from study.models.touching import touchable
 from study.problem.heterogeneous import of_tetrahedra
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Advance
 from study.results.fields import Mesh
 from study.results.records import (
     Check,
@@ -48,6 +45,7 @@ from study.results.records import (
     SpacingErrors,
 )
 from study.scene import Lattice, Scene, graded
+from study.system.progress import Advance
 
 Floats = NDArray[np.float64]
 
@@ -134,7 +132,7 @@ class LatticeModel:
             found = sized_region(problem, self._region_request(), self._of_tissue)
             plain = found.assembly
             if problem.has_further_loads:
-                plain = _loaded(problem, plain)
+                plain = loaded(problem, plain)
             made = self.make(self.scene, plain.lattice)
             return replace(on_lattice(self, problem, plain, made), region=found)
         plain = assembled(problem, self.lattice)
@@ -149,67 +147,6 @@ class LatticeModel:
     def _of_tissue(self, plain: Assembly) -> tuple[Assembly, Material]:
         made = self.make(self.scene, plain.lattice)
         return msm.of_tissue(plain, made.material, made.modulus)
-
-
-def assembled(problem: Problem, lattice: Lattice) -> Assembly:
-    """The lattice of homogeneous tissue that all models of a scene share."""
-    on_mesh = lattice.springs == "tetrahedra"
-    mix = () if on_mesh else (lattice.spacing, lattice.flexion, lattice.body_diagonals)
-    if problem.has_further_loads:
-        return _with_further_loads(problem, *mix)
-    return _cubic(problem, *mix) if mix else _on_mesh(problem)
-
-
-@lru_cache(maxsize=1)
-def _with_further_loads(problem: Problem, *mix: float) -> Assembly:
-    """The lattice with everything that acts on it beside the first load.
-
-    On a cubic lattice of a spacing, flexion and body diagonals, or on the mesh if none are given.
-    """
-    return _loaded(problem, _cubic(problem, *mix) if mix else _on_mesh(problem))
-
-
-def _loaded(problem: Problem, bare: Assembly) -> Assembly:
-    """Add gravity, weights, further loads and rigid tools to a lattice."""
-    surface, times = problem.geometry.surface, problem.observation.times
-    points = touchable(problem.rigid_tools, surface, bare.lattice.spacing, times)
-    return with_external_loads(
-        bare,
-        problem.surface_rule,
-        problem.gravity,
-        problem.loads,
-        problem.weights,
-        problem.rigid_tools,
-        touched=points,
-        given_loaded=problem.given_loaded,
-    )
-
-
-@lru_cache(maxsize=1)
-def _on_mesh(problem: Problem) -> Assembly:
-    where = (problem.foundation, problem.tool)
-    return tetrahedra.assemble(
-        problem.geometry.mesh,
-        problem.surface_rule,
-        problem.tissue.density,
-        *where,
-        problem.tissue,
-    )
-
-
-@lru_cache(maxsize=1)
-def _cubic(problem: Problem, spacing: float, flexion: float, body_diagonals: float) -> Assembly:
-    return msm.assemble(
-        problem.geometry.body,
-        problem.surface_rule,
-        problem.tissue.density,
-        spacing,
-        problem.foundation,
-        problem.tool,
-        flexion,
-        body_diagonals,
-        problem.tissue,
-    )
 
 
 def on_lattice(

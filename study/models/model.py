@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from study.problem.problem import PointProblem, Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Progress, Silent
 from study.results.records import Check, ModelRecord
 from study.scene import Scene
 from study.scene.part import without
+from study.system.progress import Progress, Silent
 
 if TYPE_CHECKING:
     from fuzzy.liver.stiffness import StiffnessEstimate

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +49,23 @@ def record_fields(
     path = persistence.fields / f"{name}.vtkhdf"
     with recording(path, mesh, times, raw, resume=persistence.resume) as frames:
         yield frames.write
+
+
+def write_motion(
+    persistence: Persistence | None,
+    name: str,
+    mesh: Mesh,
+    times: Floats,
+    states: Iterable[Iterable[Floats]],
+) -> None:
+    """Write a finished motion, if fields are wanted.
+
+    `states`: displacement [m] and velocity [m/s], each (n, 3), of every sample; evaluated only if
+    they are written.
+    """
+    if persistence is None or persistence.fields is None:
+        return
+    afresh = replace(persistence, resume=False)
+    with record_fields(afresh, name, mesh, times) as on_sample:
+        for sample, (u, v) in enumerate(states):
+            on_sample(sample, u, v)

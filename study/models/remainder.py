@@ -26,9 +26,9 @@ from msm.reduction import ReducedLattice, ReducedMotion, reduced, ritz_vectors
 from msm.statics import sag
 from study.models.lattice import PreparedLattice
 from study.problem.trajectory import Trajectory
-from study.progress import Advance
 from study.results.records import CurveErrors
 from study.similarity.fields import relative_l2_of_curves
+from study.system.progress import Advance
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from study import folders
 from study.problem.response import Motion, ToolCurve
 from study.results import arrays as npz
 from study.results import manifest
@@ -55,6 +54,7 @@ from study.results.tables import (
 )
 from study.scene.file import validate, write_scene
 from study.scene.schema import Scene
+from study.system import folders
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

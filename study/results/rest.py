@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from study import folders
 from study.mesh.kinds import TetrahedralMesh
 from study.results.tables import write_table
+from study.system import folders
 
 TABLE, FIELD, SCENE = "rest.csv", "rest.vtu", "scene.toml"
 FILES = {TABLE, FIELD, SCENE}

@@ -204,29 +204,31 @@ def paired(keys: Sequence[Key]) -> Iterator[tuple[Key, Key]]:
 class TableFile(NamedTuple):
     """A CSV table of a results folder: its file, the attribute of `Results`, and the kind of row.
 
-    `of_tools`: whether only scenes with rigid tools have it.
+    `keys`: number of first columns that name a row, or the curve that a sample is of; `of_tools`:
+    whether only scenes with rigid tools have it.
     """
 
     file: str
     attribute: str
     kind: type[Any]
+    keys: int
     of_tools: bool = False
 
 
 TABLES = (
-    TableFile("curves.csv", "curves", CurveSample),
-    TableFile("bands.csv", "bands", BandSample),
-    TableFile("certified.csv", "certified", CertifiedSample),
-    TableFile("tool_force.csv", "tool_forces", ToolForceSample, of_tools=True),
-    TableFile("tool_similarity.csv", "tool_scores", ToolForceScore, of_tools=True),
-    TableFile("similarity.csv", "scores", SimilarityScore),
-    TableFile("iso_18571.csv", "ratings", Iso18571Rating),
-    TableFile("score_errors.csv", "score_errors", ScoreError),
-    TableFile("score_differences.csv", "score_differences", ScoreDifference),
-    TableFile("errors.csv", "field_differences", FieldDifference),
-    TableFile("sensitivity.csv", "sensitivity", SensitivityEntry),
+    TableFile("curves.csv", "curves", CurveSample, 2),
+    TableFile("bands.csv", "bands", BandSample, 2),
+    TableFile("certified.csv", "certified", CertifiedSample, 2),
+    TableFile("tool_force.csv", "tool_forces", ToolForceSample, 2, of_tools=True),
+    TableFile("tool_similarity.csv", "tool_scores", ToolForceScore, 5, of_tools=True),
+    TableFile("similarity.csv", "scores", SimilarityScore, 5),
+    TableFile("iso_18571.csv", "ratings", Iso18571Rating, 4),
+    TableFile("score_errors.csv", "score_errors", ScoreError, 5),
+    TableFile("score_differences.csv", "score_differences", ScoreDifference, 6),
+    TableFile("errors.csv", "field_differences", FieldDifference, 3),
+    TableFile("sensitivity.csv", "sensitivity", SensitivityEntry, 4),
 )
-"""All CSV tables; a table is written, read and summed up by its line here."""
+"""All CSV tables; a table is written, read, compared and summed up by its line here."""
 
 Entry = TypeVar("Entry", bound=NamedTuple)
 

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from study.models.lattice import LatticeModel, PreparedLattice
 from study.models.model import Estimates, Model, ModelRun, Prepared, Watch
 from study.models.table import kind, models_of, references
-from study.progress import Progress
 from study.results.records import ErrorBudget, LatticeLimits
 from study.run.budget import Attribution, attribution, error_budgets
 from study.run.limits import (
@@ -28,6 +27,7 @@ from study.run.visual_output import with_end_fields_only
 from study.scene import Scene
 from study.similarity.batch import compile_measures
 from study.stages.fingerprint import key
+from study.system.progress import Progress
 
 Work = Callable[[Progress], Any]
 

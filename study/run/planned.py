@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from study.plan.plan import FIELD, Plan, lines, plan
-from study.progress import Progress
 from study.results import rest as results
 from study.results.rest import RestRow
 from study.run.rest import rest_of
 from study.run.suiting import suited
 from study.scene import Scene
 from study.scene.file import write_scene
+from study.system.progress import Progress
 
 
 def planned(scene: Scene, progress: Progress) -> Plan:

@@ -14,9 +14,9 @@ from study.models.estimates import estimates
 from study.models.model import Estimates, Model, PointModel, Prepared
 from study.models.table import is_tuned, models_of, point_models_of
 from study.problem.problem import PointProblem, Problem
-from study.progress import Progress, Silent
 from study.scene import Scene
 from study.scene.problem import point_problem_of, problem_of
+from study.system.progress import Progress, Silent
 
 QUIET = Silent()
 """Reports no progress."""

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from study.problem.problem import Problem
 from study.problem.response import Response
-from study.progress import Progress
 from study.results.records import Dimensionless
 from study.run.dimensionless import dimensionless
 from study.run.visual_output import VisualOutput, visual_output, with_visual_output
@@ -18,6 +17,7 @@ from study.scene import Scene
 from study.scene.part import without
 from study.scene.problem import problem_of
 from study.stages.fingerprint import fingerprint
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from study.models.finite_elements import reference_of
 from study.plan.look import LatticeLook, lattice_at_rest, on_lattice
 from study.plan.prediction import NONLINEAR_ORDER
 from study.problem.problem import Problem
-from study.progress import Progress
 from study.results.rest import RestRow
 from study.scene import Scene
 from study.scene.problem import problem_of
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 

@@ -13,13 +13,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from study.folders import tell
-from study.progress import Progress
 from study.results.records import StageRecord
 from study.stages.job_pool import Job, JobPool
 from study.stages.serialisation import flattened, restored
 from study.stages.store import Entry, Store, shown_size
 from study.sweep.status import duration
+from study.system.folders import tell
+from study.system.progress import Progress
 
 T = TypeVar("T")
 

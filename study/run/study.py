@@ -19,7 +19,6 @@ from study.models.model import SILENT, ModelRun, Watch
 from study.models.table import is_tuned, references
 from study.problem.response import Response
 from study.problem.trajectory import Trajectory
-from study.progress import Progress
 from study.results.folder import Arrays, Results
 from study.results.provenance import mesh_sha256, organ_sha256, provenance, tissue_sha256
 from study.results.records import (
@@ -58,6 +57,7 @@ from study.scene.part import without
 from study.stages.fingerprint import key
 from study.stages.job_pool import job_pool
 from study.stages.threads import threads
+from study.system.progress import Progress
 
 if TYPE_CHECKING:
     from study.run.organ_stages import OrganStages

@@ -17,11 +17,11 @@ from study.mesh.kinds import SurfaceMesh
 from study.mesh.load import load_mesh
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
 from study.organ.geometry import Geometry
-from study.progress import Progress, Silent
 from study.scene import Organ, Scene, Side
 from study.scene.file import read_scene
 from study.scene.place import OUTWARD
 from study.scene.problem import geometry_of, problem_of
+from study.system.progress import Progress, Silent
 
 Floats = NDArray[np.float64]
 
@@ -42,9 +42,9 @@ UNITS = {"support.stiffness": (1e-6, "MPa/m"), "tool.force": (1.0, "N")}
 MILLIMETRES = (1e3, "mm")
 
 
-def read_suited(name: str, overrides: Sequence[str], progress: Progress | None = None) -> Scene:
+def read_suited(name: str, overrides: Sequence[str]) -> Scene:
     """The scene of `read_scene`, adapted to its organ. ValueError as there, or for a bad mesh."""
-    return suited(read_scene(name, overrides), progress or Silent())
+    return suited(read_scene(name, overrides), Silent())
 
 
 def suited(scene: Scene, progress: Progress) -> Scene:

@@ -12,8 +12,8 @@ from study.models.model import Model, ModelRun, Prepared, Watch
 from study.problem.problem import Problem
 from study.problem.trajectory import empty_trajectory
 from study.problem.unfinished import UnfinishedError
-from study.progress import Advance, Progress
 from study.results.records import ModelRecord
+from study.system.progress import Advance, Progress
 
 NO_MEMORY = UnfinishedError(
     "the memory that this machine gave did not suffice",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from study.mesh.kinds import SurfaceMesh, TetrahedralMesh
 from study.mesh.locate import locate
-from study.mesh.quadrature import SurfaceRule, over_surface, over_volume
+from study.mesh.quadrature import SurfaceRule, VolumeRule, over_surface, over_volume
 from study.organ import geometry as shapes
 from study.organ.geometry import Geometry
 from study.problem.contact import Foundation, Load, ToolPatch, Weight
@@ -55,45 +55,53 @@ def problem_of(scene: Scene) -> Problem:
     refuse_far(dict(_places(scene)), surface, geometry.offset)
     foundation = _support(scene, surface)
     first, *loads = _loads(scene.tool, "tool", surface)
-    tool, factor = first.tool, first.factor
+    # The force of a moved tool is a result, and as a load it has none.
+    tool = replace(first.tool, force=0.0) if scene.tool.is_moved else first.tool
     surface_rule = over_surface(surface, SURFACE_POINTS)
     volume_rule = over_volume(geometry.mesh, VOLUME_POINTS)
     _check_held(foundation, surface_rule)
-    _check_touch(tool, "tool", surface_rule)
+    _check_touch(first.tool, "tool", surface_rule)
     further = tuple(_further_loads(scene, surface, surface_rule))
     weights = tuple(_weights(scene, surface, surface_rule))
-
-    if scene.tool.is_moved:  # its force is a result, and as a load it has none
-        tool = replace(tool, force=0.0)
-    times = np.linspace(0.0, scene.time.duration, scene.time.samples)
     places = _probes(scene, surface, (first, *loads))
-    probes = np.array(list(places.values()))
-    _check_inside(geometry.mesh, probes, tuple(places))
-    observation = Observation(
-        times,
-        probes,
-        (peak_sample(_extent(scene.tool, tool, times)), len(times) - 1),
-        volume_rule.points,
-        surface.points,
-    )
+    _check_inside(geometry.mesh, np.array(list(places.values())), tuple(places))
+    observation = _observation(scene, first.tool, places, volume_rule, surface)
     rigid = tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene))
-    refuse_blocked(rigid, foundation, surface_rule, times)
+    refuse_blocked(rigid, foundation, surface_rule, observation.times)
     return Problem(
-        geometry,
-        foundation,
-        tool,
-        factor,
-        tissue_of(scene.tissue, geometry),
-        surface_rule,
-        volume_rule,
-        observation,
-        tuple(places),
-        rigid,
-        (*loads, *further),
-        scene.gravity.acceleration * OUTWARD[scene.gravity.towards],
-        weights,
-        scene.gravity.given == "loaded",
-        tuple(notes_on_misses(rigid, surface_rule, times)),
+        geometry=geometry,
+        foundation=foundation,
+        tool=tool,
+        factor=first.factor,
+        tissue=tissue_of(scene.tissue, geometry),
+        surface_rule=surface_rule,
+        volume_rule=volume_rule,
+        observation=observation,
+        probes=tuple(places),
+        rigid_tools=rigid,
+        loads=(*loads, *further),
+        gravity=scene.gravity.acceleration * OUTWARD[scene.gravity.towards],
+        weights=weights,
+        given_loaded=scene.gravity.given == "loaded",
+        of_tools=tuple(notes_on_misses(rigid, surface_rule, observation.times)),
+    )
+
+
+def _observation(
+    scene: Scene,
+    tool: ToolPatch,
+    places: Mapping[str, Floats],
+    volume_rule: VolumeRule,
+    surface: SurfaceMesh,
+) -> Observation:
+    """The samples, the control points, and the fields at the peak and at the end."""
+    times = np.linspace(0.0, scene.time.duration, scene.time.samples)
+    return Observation(
+        times=times,
+        probes=np.array(list(places.values())),
+        frames=(peak_sample(_extent(scene.tool, tool, times)), len(times) - 1),
+        volume_points=volume_rule.points,
+        surface_points=surface.points,
     )
 
 

@@ -9,6 +9,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from study.compiled import drop_outdated
+from study.system.compiled import drop_outdated
 
 drop_outdated(Path(__file__).parent)  # before a kernel is loaded

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
-from study.folders import tell
 from study.stages.fingerprint import key
 from study.stages.serialisation import Arrays
 from study.stages.store import Store
+from study.system.folders import tell
 
 
 class _Current(NamedTuple):

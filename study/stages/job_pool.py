@@ -22,8 +22,8 @@ from multiprocessing.process import BaseProcess
 from threading import Thread
 from typing import Any, NamedTuple, NoReturn, Protocol
 
-from study import signals
-from study.progress import Advance, Lines, Progress, Silent
+from study.system import signals
+from study.system.progress import Advance, Lines, Progress, Silent
 
 EXIT_TIMEOUT = 5.0
 """Seconds that a process has to exit before it is killed."""

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.folders import FolderError, naming, refusal, tell
 from study.sweep.canonical import Plain, canonical, digest
+from study.system.folders import FolderError, naming, refusal, tell
 
 if TYPE_CHECKING:
     from study.stages.serialisation import Arrays

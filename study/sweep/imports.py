@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from study.folders import write_text
+from study.system.folders import write_text
 
 STATEMENTS = ("body", "orelse", "handlers", "finalbody", "cases")
 """Fields of a statement that hold other statements."""

@@ -15,10 +15,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.folders import FolderError, naming, refusal
 from study.sweep.canonical import Plain, canonical, digest
 from study.sweep.program import program
 from study.sweep.task import Task, key
+from study.system.folders import FolderError, naming, refusal
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,6 @@ import numpy as np
 
 from study.models.spacing_error import force_differences
 from study.models.tissue import FRACTION, lacks_poisson_ratio
-from study.progress import Progress
 from study.run.scene_problem import SceneProblem
 from study.scene import Scene
 from study.scene.file import write_scene
@@ -36,6 +35,7 @@ from study.similarity.fields import relative_l2
 from study.sweep.canonical import restored
 from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
+from study.system.progress import Progress
 from study.tradeoff import study
 from study.tradeoff.comparison import Comparison
 from study.tradeoff.contenders import Configuration, contender, fraction, may_be_single

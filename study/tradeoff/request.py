@@ -9,10 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from study.folders import check_file, write_text
 from study.models.table import model
 from study.problem.problem import Problem
-from study.progress import Progress
 from study.run.preparation import prepare_models
 from study.run.scene_problem import scene_arguments, scene_problem
 from study.run.suiting import read_suited
@@ -20,6 +18,8 @@ from study.scene import Scene
 from study.sweep.plan import plan
 from study.sweep.runner import Backend
 from study.sweep.store import Store
+from study.system.folders import check_file, write_text
+from study.system.progress import Progress
 from study.tradeoff import recommend, study, table
 from study.tradeoff.contenders import configurations, is_moved
 from study.tradeoff.demand import Demand, as_share, demand, length

@@ -11,10 +11,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from study import folders
-from study.folders import replacing
 from study.models.model import Stepper
-from study.progress import Progress
 from study.results.provenance import provenance
 from study.run.scene_problem import SceneProblem, scene_arguments, scene_problem
 from study.scene import Scene
@@ -24,6 +21,9 @@ from study.sweep.runner import Backend, Outcome, run
 from study.sweep.status import on_stderr
 from study.sweep.store import Store
 from study.sweep.task import Task
+from study.system import folders
+from study.system.folders import replacing
+from study.system.progress import Progress
 from study.tradeoff import observation, reference, table
 from study.tradeoff.comparison import Comparison, lattices, refuse_unlike, truth_of
 from study.tradeoff.contenders import Configuration, is_moved

@@ -29,21 +29,24 @@ RADIUS, HEIGHT = 0.025, 0.030
 BEAM = (0.1, 0.03, 0.03)
 """Length, width and height of the beam [m]."""
 BEAM_DENSITY = 1070.0
+BEAM_CELLS, BEAM_SPACINGS = (1, 2, 3), (7.5e-3, 5e-3, 3.75e-3)
+"""Elements across half the width, and spacings [m] of lattices, coarse to fine."""
 CUBE = 0.08
 """Edge [m]."""
 CUBE_DENSITY = 980.0
+CUBE_CELLS, CUBE_SPACED = (2, 3, 4), (3, 4, 6)
+"""Cells of elements and of lattices along half an edge, coarse to fine."""
+CYLINDER_PARTS = (3, 4, 6)
+"""Rings and layers of elements, and cells of lattices, in half the height, coarse to fine."""
 
 
-def cylinder(faces: str, parts: tuple[int, ...] = (3, 4, 6)) -> Specimen:
-    """An eighth of a silicone cylinder compressed by plates; factor 1 is its whole height.
-
-    `parts`: rings and layers of the elements, and cells of the lattice, in half the height.
-    """
+def cylinder(faces: str) -> Specimen:
+    """An eighth of a silicone cylinder compressed by plates; factor 1 is its whole height."""
     half = 0.5 * HEIGHT
     shape = ImplicitBody(lambda x: np.hypot(x[..., 0], x[..., 1]) - RADIUS)
     meshes = tuple(
         Meshed(partial(quarter_cylinder, RADIUS, half, n, n), half / n, onto_side(RADIUS, n))
-        for n in parts
+        for n in CYLINDER_PARTS
     )
 
     def prescribed(points: Floats) -> Floats:
@@ -59,7 +62,7 @@ def cylinder(faces: str, parts: tuple[int, ...] = (3, 4, 6)) -> Specimen:
     upper = np.array([RADIUS, RADIUS, half])
     return Specimen(
         meshes,
-        tuple(half / n for n in parts),
+        tuple(half / n for n in CYLINDER_PARTS),
         shape,
         np.zeros(3),
         upper,
@@ -70,16 +73,10 @@ def cylinder(faces: str, parts: tuple[int, ...] = (3, 4, 6)) -> Specimen:
     )
 
 
-def cube(
-    faces: str,
-    watched: Floats,
-    cells: tuple[int, ...] = (2, 3, 4),
-    spaced: tuple[int, ...] = (3, 4, 6),
-) -> Specimen:
+def cube(faces: str, watched: Floats) -> Specimen:
     """A quarter of the cube, held at its base z = 0, under a plate; factor 1 is its whole edge.
 
-    `watched` [m] (q, 3), mirrored into the quarter; `cells` of elements along half an edge, and
-    those of lattices, `spaced`.
+    `watched` [m] (q, 3), mirrored into the quarter.
     """
     half = 0.5 * CUBE
     size = (half, half, CUBE)
@@ -96,8 +93,8 @@ def cube(
         return found
 
     return Specimen(
-        tuple(_boxes(size, n) for n in cells),
-        tuple(half / n for n in spaced),
+        tuple(_boxes(size, n) for n in CUBE_CELLS),
+        tuple(half / n for n in CUBE_SPACED),
         EVERYWHERE,
         np.zeros(3),
         np.array(size),
@@ -110,16 +107,11 @@ def cube(
     )
 
 
-def beam(
-    tip_force: float,
-    watched: Floats,
-    cells: tuple[int, ...] = (1, 2, 3),
-    spacings: tuple[float, ...] = (7.5e-3, 5e-3, 3.75e-3),
-) -> Specimen:
+def beam(tip_force: float, watched: Floats) -> Specimen:
     """Half of the beam, clamped at x = -0.1 m, under its weight and a force on the upper tip edge.
 
-    `tip_force` [N] downwards, on the whole beam; `cells` across half the width. x is from the tip,
-    y from the plane of symmetry, z from the lower side.
+    `tip_force` [N] downwards, on the whole beam. x is from the tip, y from the plane of symmetry,
+    z from the lower side.
     """
     length, width, height = BEAM
     half = 0.5 * width
@@ -137,8 +129,8 @@ def beam(
 
     lower = np.array([-length, 0.0, 0.0])
     return Specimen(
-        tuple(_beam_level(n) for n in cells),
-        spacings,
+        tuple(_beam_level(n) for n in BEAM_CELLS),
+        BEAM_SPACINGS,
         EVERYWHERE,
         lower,
         np.array([0.0, half, height]),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from study.progress import Progress
+from study.system.progress import Progress
 from study.validation.bodies import BEAM, beam
 from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Markers, beam_markers

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-from study.progress import Progress
+from study.system.progress import Progress
 from study.validation.bodies import CUBE, FACES, cube
 from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Beads, beads

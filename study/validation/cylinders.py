@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from study.progress import Progress
+from study.system.progress import Progress
 from study.validation.bodies import BONDED, FACES, cylinder
 from study.validation.comparison import Comparison, own_error
 from study.validation.measured import Compression, compressions

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from study.folders import naming, write_text
+from study.system.folders import naming, write_text
 from study.validation.fitting import Fit
 
 NAME = "fit.csv"

@@ -25,10 +25,10 @@ from study.models.model import Model
 from study.models.table import MODELS, is_tuned, models_of
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Progress
 from study.scene import Scene
 from study.scene.consistency import contradictions
 from study.scene.problem import problem_of
+from study.system.progress import Progress
 from study.validation.user_data import Curve
 from study.validation.user_scene import coarser, probe_number, refuse_unanswered, seen
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.progress import Progress
 from study.scene.file import read_scene
+from study.system.progress import Progress
 from study.validation import cantilever, cube, cylinders, user_scene
 from study.validation.comparison import Comparison
 from study.validation.predictions import KINDS

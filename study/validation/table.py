@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from study.folders import write_text
+from study.system.folders import write_text
 from study.validation.comparison import Comparison
 
 COLUMNS = (

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.spreadsheet import Table, decimal_commas, number, read_table
+from study.system.spreadsheet import Table, decimal_commas, number, read_table
 
 Floats = NDArray[np.float64]
 

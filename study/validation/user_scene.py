@@ -17,9 +17,9 @@ from study.models.model import Model, Simulation
 from study.models.table import is_tuned, models_of
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.progress import Progress
 from study.scene import Scene
 from study.scene.problem import OUTSIDE, problem_of
+from study.system.progress import Progress
 from study.validation.comparison import ORDER, Comparison
 from study.validation.user_data import Curve, UserMarkers, read_curve, read_markers
 

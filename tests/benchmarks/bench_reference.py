@@ -22,9 +22,9 @@ from pathlib import Path
 
 from study.models.finite_elements import reference_of
 from study.models.model import Watch
-from study.progress import Silent
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
+from study.system.progress import Silent
 
 HERE = Path(__file__)
 ROOT = HERE.parents[2]

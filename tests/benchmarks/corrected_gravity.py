@@ -25,11 +25,11 @@ from study.models.lattice import requested_step
 from study.models.model import SILENT
 from study.models.remainder import FINER, ORDER, Remainder
 from study.models.table import model
-from study.progress import Silent
 from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2_of_curves
+from study.system.progress import Silent
 from tests.benchmarks.corrected_places import TABLE as PLACES
 from tests.benchmarks.corrected_places import written
 

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from study.models.finite_elements import models
 from study.models.mesh_error import MeshSolution, mesh_error
-from study.progress import Silent
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
+from study.system.progress import Silent
 
 Floats = NDArray[np.float64]
 

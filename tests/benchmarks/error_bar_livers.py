@@ -25,10 +25,10 @@ from study.mesh.tetrahedra import boundary
 from study.models.finite_elements import PreparedElements, reference_of
 from study.models.mesh_error import MeshSolution, mesh_error
 from study.organ.geometry import built_in_liver
-from study.progress import Silent
 from study.run.suiting import read_suited
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
+from study.system.progress import Silent
 from tests.mesh_samples import ellipsoid_surface, torus, write_surface
 
 Floats = NDArray[np.float64]

@@ -43,11 +43,11 @@ from study.models.remainder import PreparedRemainder
 from study.models.table import model
 from study.problem.problem import Problem
 from study.problem.tool_travel import DEGREE, StationFactor
-from study.progress import Silent
 from study.scene import LoadHistory, Scene
 from study.scene.place import depths
 from study.scene.problem import problem_of
 from study.scene.schema import Waypoint
+from study.system.progress import Silent
 from study.tradeoff.timing import in_turns
 from tests.benchmarks.corrected_places import by_frames, in_frame, written
 from tests.benchmarks.corrected_runs import LEVEL as FINER

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from study.folders import NO_PLACE, write_text
+from study.system.folders import NO_PLACE, write_text
 
 DELIMITERS = ",;\t"
 _ANNOUNCED = re.compile(r"sep=([,;\t])\r?\n")

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from study import lock
+from study.system import lock
 
 Foreign = Callable[[set[str]], str | None]
 """Given the names in a folder, one that must not be lost, or None."""
@@ -109,17 +109,17 @@ def making(folder: Path) -> Iterator[None]:
         raise
 
 
-def check_file(path: Path, flag: str = "--out") -> None:
-    """Refuse a file that could not be written. FolderError names the flag and the remedy."""
-    _check_name(path, flag)
+def check_file(path: Path) -> None:
+    """Refuse a file of --out that could not be written. FolderError names the remedy."""
+    _check_name(path, "--out")
     if path.is_dir():
-        raise FolderError(f"{flag} {path}: is a folder; give a file")
+        raise FolderError(f"--out {path}: is a folder; give a file")
     if path.exists():
-        _check_access(path, os.W_OK, flag)
+        _check_access(path, os.W_OK, "--out")
     elif not path.parent.is_dir():
-        raise FolderError(f"{flag} {path}: there is no folder {path.parent}; make it first")
+        raise FolderError(f"--out {path}: there is no folder {path.parent}; make it first")
     else:
-        _check_access(path.parent, os.W_OK | os.X_OK, flag)
+        _check_access(path.parent, os.W_OK | os.X_OK, "--out")
 
 
 def check_folder(folder: Path, flag: str = "--out") -> None:

@@ -21,7 +21,6 @@ from importlib.metadata import distributions, metadata
 from pathlib import Path
 
 from reports.credibility import credibility
-from study.folders import check_file, write_bytes
 from study.results import folder as results_folder
 from study.results import manifest
 from study.results.folder import Results, ResultsError
@@ -34,6 +33,7 @@ from study.results.provenance import (
 )
 from study.scene import Scene
 from study.scene.file import write_scene
+from study.system.folders import check_file, write_bytes
 
 SUMS = "SHA256SUMS"
 LARGEST = 2**31

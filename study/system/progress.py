@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from study.signals import stop_if_asked
+from study.system.signals import stop_if_asked
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress

@@ -18,26 +18,32 @@ from fem_reference.elements import chosen_element
 from fem_reference.exchange import calculix
 from fem_reference.exchange.calculix import Transient
 from fem_reference.exchange.calculix_rule import integrated
-from fem_reference.exchange.nodal import NodalProblem, nodal_problem
+from fem_reference.exchange.nodal import nodal_problem
 from fem_reference.external_loads import external_loads
 from fem_reference.memory import SHARE, available, needed, unknowns
 from fem_reference.model import Method
 from fem_reference.solvers import solve_static
-from study.folders import replacing
-from study.handover import write as handover
-from study.mesh.kinds import TetrahedralMesh
+from study.handover import lattice_files
+from study.handover.readme import (
+    VTU,
+    about_calculix,
+    about_mesh,
+    about_rest,
+    about_vtu,
+    external_loads_note,
+    organ_notes,
+)
 from study.mesh.save import save
 from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
-from study.problem.contact import Load
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
-from study.problem.tool_travel import StationFactor
-from study.progress import Progress
 from study.results import folder as results
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.scene.problem import problem_of
+from study.system.folders import replacing
+from study.system.progress import Progress
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +58,6 @@ FORMATS = ("calculix", "vtu", LATTICE, *MESHES)
 HELD = frozenset({"several-loads", "travelling-loads", "gravity", "weights"})
 """Features beside the first load that nodal forces and a gravity field can express."""
 MARK = "README.txt"
-VTU = "problem.vtu"
 ALPHA = -0.05
 """Parameter of HHT: CalculiX's own default."""
 # Including the files that CalculiX writes beside its decks.
@@ -62,7 +67,7 @@ FILES = {MARK, VTU, "mesh.inp", "foundation.inp", "load.inp", "spooles.out"} | {
     for end in ("inp", "csv", "dat", "frd", "sta", "cvg", "12d", "eig")
 }
 FILES |= {calculix.WEIGHTS, calculix.HISTORIES}
-FILES |= {file for file, _ in MESHES.values()} | handover.FILES
+FILES |= {file for file, _ in MESHES.values()} | lattice_files.FILES
 FURTHER_LOAD = re.compile(r"load\.\d+\.inp")
 FRAMES = 4
 """Number of equally spaced times at which the motion of all nodes is compared."""
@@ -143,7 +148,7 @@ def _write_mesh(to: str, target: _Target, folder: Path, progress: Progress) -> N
     mesh = _level(prepared, target.elements, progress).mesh
     file, format_ = MESHES[to]
     save(mesh, folder / file, format_)
-    _write(folder, {MARK: _about_mesh(target.scene, file, mesh)})
+    _write(folder, {MARK: about_mesh(target.scene, file, mesh)})
 
 
 def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
@@ -157,9 +162,9 @@ def _write_vtu(target: _Target, folder: Path, progress: Progress) -> None:
         folder,
         {
             VTU: vtu.text(given, displacement),
-            MARK: _about_vtu(scene, given)
-            + _external_loads_note(problem, given)
-            + _noted(scene, problem),
+            MARK: about_vtu(scene, given)
+            + external_loads_note(problem, given)
+            + organ_notes(scene, problem),
         },
     )
 
@@ -175,15 +180,17 @@ def _write_calculix(target: _Target, folder: Path, progress: Progress) -> None:
     files["static.csv"] = _table([(0.0, rest)], timed=False)
     at_rest = _difference(rest, own_rest)
     if motion is None:
-        about = _about_rest(scene, given, at_rest)
+        about = about_rest(scene, given, at_rest)
     else:
         with progress.stage("motion"):
             moved, own_moved = frames(theirs, motion), _own_frames(body, motion)
         files["dynamic.csv"] = _table(moved)
         pairs = zip(moved, own_moved, strict=True)
         differences = (at_rest, max(_difference(u, v) for (_, u), (_, v) in pairs))
-        about = _about_calculix(scene, given, motion, differences)
-    about += _external_loads_note(problem, given, merged=given.is_merged) + _noted(scene, problem)
+        about = about_calculix(scene, given, motion, differences)
+    about += external_loads_note(problem, given, merged=given.is_merged) + organ_notes(
+        scene, problem
+    )
     _write(folder, files | {MARK: about})
 
 
@@ -193,8 +200,8 @@ def _write_lattice(target: _Target, folder: Path, progress: Progress) -> None:
     found = lattices(target.scene, progress)
     if target.curves is not None:
         check_curves(found, target.curves)
-    handover.write(found, folder)
-    _write(folder, {MARK: handover.about(found)})
+    lattice_files.write(found, folder)
+    _write(folder, {MARK: lattice_files.about(found)})
 
 
 WRITERS = {"vtu": _write_vtu, "calculix": _write_calculix, LATTICE: _write_lattice}
@@ -284,145 +291,6 @@ def _table(moved: Sequence[tuple[float, Floats]], *, timed: bool = True) -> str:
     return text.getvalue()
 
 
-# --- what it says ------------------------------------------------------------------------------
-
-COMPARE = r"""same() {
-  paste -d, <(awk 'NF == 4 {print $1","$2","$3","$4}' $1.dat) <(tail -n +2 $1.csv) |
-  awk -F, '$1 != $5 {print "line " NR ": node " $1 " beside " $5; odd = 1; exit 1}
-           {for (i = 2; i < 5; i++) {d += ($i - $(i+4))^2; r += $(i+4)^2}}
-           END {if (!odd) print "relative L2 difference", sqrt(d / r)}'
-}"""
-INTEGRATED = {4: "C3D4, one integration point", 10: "C3D10, four integration points"}
-
-
-def _files_at_rest(given: NodalProblem) -> str:
-    return f"""\
-mesh.inp        {len(given.nodes)} nodes, {len(given.elements)} elements, material
-foundation.inp  the foundation's matrix as springs between nodes and to the ground; some constants
-                are negative, which is meant: their sum is the matrix
-load.inp        nodal forces [N] of the tool at full load
-static.inp      at rest under full load
-static.csv      what we get for it: displacement [m] of each node"""
-
-
-def _about_calculix(
-    scene: Scene, given: NodalProblem, motion: Transient, differences: tuple[float, float]
-) -> str:
-    at_rest, in_motion = differences
-    alpha, beta = motion.damping.mass, motion.damping.stiffness
-    return f"""\
-{scene.title or "A scene"}
-Its finite-element problem for CalculiX, SI units throughout.
-
-{_files_at_rest(given)}
-dynamic.inp     {motion.count} steps of {motion.step:g} s by HHT, alpha {motion.alpha:g}
-dynamic.csv     what we get for it, after every {motion.kept} steps and at the end
-
-Rayleigh damping: alpha {alpha:.6g} 1/s, beta {beta:.6g} s, the foundation's stiffness in it.
-The load starts from zero: where the scene's history does not, it rises within the first step.
-
-Run `ccx static` and `ccx dynamic` (which factors the matrix at every step: minutes for thousands of
-nodes), then compare in bash:
-
-{COMPARE}
-same static; same dynamic
-
-CalculiX prints seven digits: expect about 1.5e-7. The .csv files are solved by our own matrices
-with the quadrature of {INTEGRATED[given.elements.shape[1]]}. It is exact for the
-stiffness of straight elements, not for curved ones and not for the mass. With the quadrature of
-the study, and in motion its consistent mass and TR-BDF2 steps of the same size, the displacement
-differs by {at_rest:.1e} at rest and up to {in_motion:.1e} in motion, relative L2 over the nodes.
-"""
-
-
-def _about_rest(scene: Scene, given: NodalProblem, at_rest: float) -> str:
-    return f"""\
-{scene.title or "A scene"}
-Its finite-element problem at rest for CalculiX, SI units throughout.
-
-{_files_at_rest(given)}
-
-There is no motion: how another code damps the masses of attached weights was not checked.
-
-Run `ccx static`, then compare in bash:
-
-{COMPARE}
-same static
-
-CalculiX prints seven digits: expect about 1.5e-7. The .csv file is solved by our own matrices with
-the quadrature of {INTEGRATED[given.elements.shape[1]]}. With that of the study the
-displacement differs by {at_rest:.1e}, relative L2 over the nodes.
-"""
-
-
-def _external_loads_note(problem: Problem, given: NodalProblem, *, merged: bool = False) -> str:
-    """What acts beside the first load, and in which files; empty if nothing does.
-
-    `merged`: whether the files have all loads as one.
-    """
-    said = [
-        f"load {n} (load.{n}.inp, load_{n}): {_of_load(load)}, with a history of its own"
-        for n, load in enumerate(problem.loads, 2)
-    ]
-    if merged:
-        said = [
-            "loads that meet at nodes are one: histories.inp has the force [N] at each node over "
-            "time, load.inp that at rest in full, of a tool that travels where it is at the peak"
-        ]
-    if given.gravity is not None:
-        told = ", ".join(f"{part:g}" for part in given.gravity)
-        said.append(f"gravity ({told}) m/s^2 acts on the tissue at rest (*DLOAD, GRAV)")
-        said.append("a motion starts from rest under it, counts from there, and has it left out")
-    elif problem.gravity.any():
-        said.append("the given shape is that under gravity: displacements count from it")
-    if given.weight_forces is not None:
-        said.append("weights hang as nodal forces (weights.inp, weights)")
-    elif problem.weights:
-        said.append("weights have mass alone, which rest does not show")
-    return (
-        "".join(["\nBeside the first load:\n", *(f"- {line}\n" for line in said)]) if said else ""
-    )
-
-
-def _of_load(load: Load) -> str:
-    """Whose it is."""
-    travels = isinstance(load.factor, StationFactor)
-    return f"of {load.tool.name}" + (" at a station of its path" if travels else "")
-
-
-def _about_vtu(scene: Scene, given: NodalProblem) -> str:
-    tissue = scene.tissue
-    kind = "quadratic tetrahedra" if given.elements.shape[1] == 10 else "tetrahedra"
-    return f"""\
-{scene.title or "A scene"}
-Its finite-element problem, SI units throughout.
-
-{VTU}  {len(given.nodes)} nodes, {len(given.elements)} {kind}; on the nodes:
-  displacement     [m] at rest under full load
-  load             [N] nodal forces of the tool at full load
-  support_density  [Pa/m] stiffness per area of the foundation, mean of the facets at a node
-
-Material: Young's modulus {tissue.youngs_modulus:g} Pa, Poisson ratio {tissue.poisson_ratio:g},
-density {tissue.density:g} kg/m^3.
-"""
-
-
-def _about_mesh(scene: Scene, file: str, mesh: TetrahedralMesh) -> str:
-    return f"""\
-{scene.title or "A scene"}
-The mesh of its finite elements, in metres. A scene takes it as organ.mesh with organ.unit = "m",
-and then has the same tetrahedra again, also where a mesher that is not reproducible made them.
-
-{file}  {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra
-"""
-
-
-def _noted(scene: Scene, problem: Problem) -> str:
-    """What was found, repaired or chosen for the organ, without repetition."""
-    notes = dict.fromkeys((*scene.remarks, *problem.notes))
-    return "".join(["\nNotes on the organ:\n", *(f"- {note}\n" for note in notes)]) if notes else ""
-
-
 # --- the folder --------------------------------------------------------------------------------
 
 
@@ -432,6 +300,6 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _foreign(present: set[str]) -> str | None:
-    own = (handover.OF_A_MODEL, FURTHER_LOAD)
+    own = (lattice_files.OF_A_MODEL, FURTHER_LOAD)
     others = (name for name in present - FILES if not any(one.fullmatch(name) for one in own))
     return min(others, default=None)

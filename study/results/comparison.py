@@ -8,41 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.results.arrays import Arrays
 from study.results.folder import Results
-from study.results.tables import (
-    BandSample,
-    CertifiedSample,
-    CurveSample,
-    FieldDifference,
-    Iso18571Rating,
-    ScoreDifference,
-    ScoreError,
-    SensitivityEntry,
-    SimilarityScore,
-    ToolForceSample,
-    ToolForceScore,
-)
+from study.results.tables import TABLES, TableFile
 from study.scene.file import resolved
 
 Floats = NDArray[np.float64]
-Row = (
-    CurveSample
-    | BandSample
-    | CertifiedSample
-    | SimilarityScore
-    | Iso18571Rating
-    | ScoreError
-    | ScoreDifference
-    | FieldDifference
-    | SensitivityEntry
-    | ToolForceSample
-    | ToolForceScore
-)
 Flat = dict[str, object]
 Series = dict[str, dict[str, float]]
 """Numbers by the name of their series and their place in it."""
@@ -79,17 +56,7 @@ def differences(first: Results, second: Results) -> list[Difference]:
     A series is a model's curve at a control point, an array, or otherwise a single number.
     """
     found = [
-        *_tables("curves.csv", first.curves, second.curves, 2),
-        *_tables("bands.csv", first.bands, second.bands, 2),
-        *_tables("certified.csv", first.certified, second.certified, 2),
-        *_tables("tool_force.csv", first.tool_forces, second.tool_forces, 2),
-        *_tables("tool_similarity.csv", first.tool_scores, second.tool_scores, 5),
-        *_tables("similarity.csv", first.scores, second.scores, 5),
-        *_tables("iso_18571.csv", first.ratings, second.ratings, 4),
-        *_tables("score_errors.csv", first.score_errors, second.score_errors, 5),
-        *_tables("score_differences.csv", first.score_differences, second.score_differences, 6),
-        *_tables("errors.csv", first.field_differences, second.field_differences, 3),
-        *_tables("sensitivity.csv", first.sensitivity, second.sensitivity, 4),
+        *chain.from_iterable(_rows(table, first, second) for table in TABLES),
         *_arrays("fields.npz", first.fields, second.fields),
         *_arrays("fuzzy.npz", first.fuzzy, second.fuzzy),
         *_record(first, second),
@@ -107,16 +74,15 @@ def other_words(first: Results, second: Results) -> list[str]:
 # --- series --------------------------------------------------------------------------------------
 
 
-def _tables(
-    file: str, first: Sequence[Row], second: Sequence[Row], keys: int
-) -> Iterator[Difference]:
-    """Columns of a table, whose first `keys` name a series; curves go on by their times."""
-    one, other = _columns(first, keys), _columns(second, keys)
+def _rows(table: TableFile, first: Results, second: Results) -> Iterator[Difference]:
+    """Columns of a table; the samples of a curve make one series."""
+    pair = (getattr(results, table.attribute) for results in (first, second))
+    one, other = (_columns(rows, table.keys) for rows in pair)
     for column in dict.fromkeys([*one, *other]):
-        yield _compared(f"{file} {column}", one.get(column, {}), other.get(column, {}))
+        yield _compared(f"{table.file} {column}", one.get(column, {}), other.get(column, {}))
 
 
-def _columns(rows: Sequence[Row], keys: int) -> dict[str, Series]:
+def _columns(rows: Sequence[Any], keys: int) -> dict[str, Series]:
     """Numbers by column, series and, of a curve, sample."""
     columns: dict[str, Series] = {}
     for row in rows:
