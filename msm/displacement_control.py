@@ -21,7 +21,14 @@ from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
 from msm.network import Network
 from msm.tangent import SIGNS, Tangent, empty_tangent, linearise
-from study.continuation import Increments, follow
+from study.continuation import (
+    NO_EQUILIBRIUM,
+    NO_STEP,
+    UNSTABLE,
+    EquilibriumPath,
+    Increments,
+    follow,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,19 +63,6 @@ class EquilibriumState:
     residuals: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class EquilibriumPath:
-    """Equilibria at the requested factors, up to the last one found.
-
-    `reached`: factor of the last equilibrium found; `failure`: why the path ends there, empty if it
-    is complete.
-    """
-
-    states: tuple[EquilibriumState, ...]
-    reached: float
-    failure: str
-
-
 class _Iterate(NamedTuple):
     """Last iterate of Newton's method: u [m] (n, 3), pressures [J] (c,); stable if no failure.
 
@@ -90,20 +84,18 @@ class _Residual(NamedTuple):
 
 
 def equilibrium_path(
-    law: Law, net: Network, prescribed: Floats, factors: Sequence[float] = (1.0,)
-) -> EquilibriumPath:
-    """Equilibria at `factors` times the load and `prescribed` [m] (n, 3), NaN where free.
+    law: Law, net: Network, prescribed: Floats, load_factors: Sequence[float] = (1.0,)
+) -> EquilibriumPath[EquilibriumState]:
+    """Equilibria at `load_factors` times the load and `prescribed` [m] (n, 3), NaN where free.
 
     ValueError for a factor of zero, or prescribed values that do not fit the nodes.
     """
-    if not (np.isfinite(factors).all() and np.all(factors)):
-        raise ValueError(f"factors: {tuple(factors)} must be finite and not zero")
     if prescribed.shape != net.load.shape:
         raise ValueError(f"prescribed: {prescribed.shape} does not fit {net.load.shape} nodes")
     lattice = _MixedLattice(law, net, prescribed)
     start = _Iterate(0.0, np.zeros_like(net.load), np.zeros(len(net.cells)), ())
-    found = follow(start, factors, partial(_newton, lattice), INCREMENTS)
-    return EquilibriumPath(tuple(map(lattice.state, found.rests)), found.reached, found.failure)
+    search = partial(_newton, lattice)
+    return follow(start, load_factors, search, lambda at, _: lattice.state(at), INCREMENTS)
 
 
 def lowest_frequency(
@@ -132,7 +124,7 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
     """Newton's method at one factor; its first step takes up the prescribed displacements."""
     u, pressure, free = start.u.copy(), start.pressure.copy(), lattice.free
     constrained, residuals = np.flatnonzero(~free), list[float]()
-    target, failure = factor * lattice.prescribed.ravel()[constrained], "no balance of forces"
+    target, failure = factor * lattice.prescribed.ravel()[constrained], NO_EQUILIBRIUM
     while len(residuals) <= MOST_ITERATIONS:
         tangent = lattice.linearised(u)
         residual = lattice.residual(tangent, u, pressure, factor)
@@ -144,16 +136,16 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
         if residuals[-1] <= TOLERANCE and not increment.any():
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if _is_definite(factors) else "the lattice gives way"
+            failure = "" if _is_definite(factors) else UNSTABLE
             break
         if factors is None:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         prescribing = bool(increment[constrained].any())
         step = lattice.newton_step(tangent, residual, matrix, factors, increment)
         length = _step_length(lattice, (u, pressure), step, factor, residual, prescribing)
         if length == 0.0:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         u, pressure = u + length * step[0], pressure + length * step[1]
         if length == 1.0:  # removes the rounding of the sum

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+NO_EQUILIBRIUM = "no equilibrium found"
+NO_STEP = "Newton's method found no admissible step"
+UNSTABLE = "the equilibrium is unstable"
+"""Why a search for an equilibrium failed, in the words of every solver."""
 
-class Rest(Protocol):
-    """The result of a search for an equilibrium."""
+
+class Iterate(Protocol):
+    """The last iterate of a search for an equilibrium."""
 
     @property
     def factor(self) -> float:
@@ -23,7 +29,8 @@ class Rest(Protocol):
         """Why it is no equilibrium; empty if it is one."""
 
 
-R = TypeVar("R", bound=Rest)
+T = TypeVar("T", bound=Iterate)
+S = TypeVar("S")
 
 
 class Increments(NamedTuple):
@@ -35,41 +42,53 @@ class Increments(NamedTuple):
 
     easy: int
     smallest: float
-    unit: str = "what is asked for"
+    unit: str = "the prescribed loading"
 
 
 @dataclass(frozen=True)
-class Followed(Generic[R]):
-    """Equilibria at the requested load factors, as far as they were reached.
+class EquilibriumPath(Generic[S]):
+    """Equilibria at the requested load factors, up to the last one found.
 
-    `iterations`: spent on each since the one before; `reached`: factor of the last equilibrium
-    found, which need not be a requested one; `failure`: why the path ends there, empty if it is
-    complete.
+    `reached`: factor of the last equilibrium found, which need not be a requested one; `failure`:
+    why the path ends there, empty if it is complete.
     """
 
-    rests: tuple[R, ...]
-    iterations: tuple[int, ...]
+    states: tuple[S, ...]
     reached: float
-    failure: str = ""
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is a state at every requested load factor."""
+        return not self.failure
 
 
 def follow(
-    start: R, factors: Iterable[float], rest: Callable[[R, float], R], by: Increments
-) -> Followed[R]:
-    """Equilibria at the factors in the given order; `rest` searches for one from another."""
-    at, rests, spent = start, list[R](), list[int]()
-    for factor in factors:
-        at, iterations, failure = _move_up(at, factor, rest, by)
+    start: T,
+    load_factors: Sequence[float],
+    search: Callable[[T, float], T],
+    state: Callable[[T, int], S],
+    by: Increments,
+) -> EquilibriumPath[S]:
+    """Equilibria at the load factors in the given order.
+
+    `search` finds one from another; `state` makes a state of the path from an equilibrium and the
+    iterations spent since the one before. ValueError for a factor that is zero or not finite.
+    """
+    if not all(math.isfinite(one) and one for one in load_factors):
+        raise ValueError(f"load_factors: {tuple(load_factors)} must be finite and not zero")
+    at, states = start, list[S]()
+    for factor in load_factors:
+        at, iterations, failure = _move_up(at, factor, search, by)
         if failure:
-            return Followed(tuple(rests), tuple(spent), at.factor, failure)
-        rests.append(at)
-        spent.append(iterations)
-    return Followed(tuple(rests), tuple(spent), at.factor)
+            return EquilibriumPath(tuple(states), at.factor, failure)
+        states.append(state(at, iterations))
+    return EquilibriumPath(tuple(states), at.factor, "")
 
 
 def _move_up(
-    start: R, target: float, rest: Callable[[R, float], R], by: Increments
-) -> tuple[R, int, str]:
+    start: T, target: float, search: Callable[[T, float], T], by: Increments
+) -> tuple[T, int, str]:
     """The equilibrium at a target or the last one before it, the iterations, and the failure.
 
     First the whole increment is tried; an increment without an equilibrium is halved.
@@ -78,7 +97,7 @@ def _move_up(
     while at.factor != target:
         left = target - at.factor
         goal = target if abs(increment) >= abs(left) else at.factor + increment
-        found = rest(at, goal)
+        found = search(at, goal)
         spent = len(found.residuals) - 1
         iterations += spent
         if not found.failure:
