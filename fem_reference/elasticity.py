@@ -138,6 +138,11 @@ class Body:
         """Positions [m] (nodes, 3)."""
         return np.ascontiguousarray(self.nodes.doflocs.T)
 
+    @cached_property
+    def nodal_volume(self) -> csr_array:
+        """Integrals [m^3] (nodes, nodes) of products of shape functions, constraints aside."""
+        return products(self.nodes, pattern(self.nodes))
+
     def inertia(self, acceleration: Floats) -> Floats:
         """Mass times an acceleration [m/s^2] (n,): nodal forces [N] (n,)."""
         if self._nodal is None:
