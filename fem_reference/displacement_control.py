@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
 from study.continuation import (
@@ -28,6 +27,7 @@ from study.continuation import (
     Increments,
     follow,
 )
+from study.factors import has_inertia, symmetric_factors
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

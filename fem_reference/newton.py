@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.displacement_control import EquilibriumState, Loading, equilibrium_path
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
@@ -29,6 +28,7 @@ from study.continuation import (
     Increments,
     follow,
 )
+from study.factors import has_inertia, symmetric_factors
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]

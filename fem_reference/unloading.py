@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.direct import symmetric_factors
 from fem_reference.laws import IDENTITY
 from fem_reference.mixed_strain import MixedSolid, kinematics
 from study.continuation import NO_EQUILIBRIUM, NO_STEP, Increments, follow
+from study.factors import symmetric_factors
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array, kron
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
@@ -29,6 +29,7 @@ from study.continuation import (
     Increments,
     follow,
 )
+from study.factors import has_inertia, symmetric_factors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -110,7 +111,7 @@ def lowest_frequency(
     tangent = lattice.linearised(u)
     free = lattice.free
     stiffness = lattice.matrix(tangent, net.bulk * tangent.swelling)[free][:, free]
-    factors = _factorised(stiffness)
+    factors = symmetric_factors(stiffness)
     if factors is None:
         raise ValueError("the stiffness is singular: nothing holds the lattice")
     mass = diags_array(np.repeat(net.mass, 3)[free]).tocsc()
@@ -132,11 +133,11 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
         increment = np.zeros(u.size)
         increment[constrained] = target - u.ravel()[constrained]
         matrix = lattice.matrix(tangent, pressure)
-        factors = _factorised(matrix[free][:, free])
+        factors = symmetric_factors(matrix[free][:, free])
         if residuals[-1] <= TOLERANCE and not increment.any():
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if _is_definite(factors) else UNSTABLE
+            failure = "" if has_inertia(factors) else UNSTABLE
             break
         if factors is None:
             failure = NO_STEP
@@ -291,23 +292,3 @@ def _assembled(blocks: Floats, dofs: Ints, size: int) -> csc_array:
 
 def _norm(x: Floats) -> float:
     return float(np.linalg.norm(x))
-
-
-def _factorised(matrix: csc_array) -> Any:
-    """Sparse LDL-like factors with diagonal pivots; None if the matrix is singular."""
-    try:
-        return splu(
-            csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
-
-
-def _is_definite(factors: Any) -> bool:
-    """Whether the matrix is positive definite: all pivots are diagonal and positive."""
-    if factors is None or not (factors.perm_r == factors.perm_c).all():
-        return False
-    return bool((factors.U.diagonal() > 0.0).all())

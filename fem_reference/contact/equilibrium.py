@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_array, csr_array
 
 from fem_reference.contact.kinematics import Configuration, FiniteContact, PreviousState
-from fem_reference.direct import symmetric_factors
 from fem_reference.mixed_strain import MixedSolid
 from study.continuation import NO_EQUILIBRIUM
+from study.factors import symmetric_factors
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

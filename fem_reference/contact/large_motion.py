@@ -27,13 +27,13 @@ from fem_reference.contact.equilibrium import (
 )
 from fem_reference.contact.kinematics import Configuration, FiniteContact, PreviousState
 from fem_reference.contact.patch import Patch, patch
-from fem_reference.direct import symmetric_factors
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
 from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
 from fem_reference.unloading import unload
+from study.factors import symmetric_factors
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, PUNCH, RigidTool
 from study.problem.tissue import Tissue
