@@ -152,6 +152,10 @@ class Body:
     @cached_property
     def _nodal(self) -> csr_array | None:
         """Mass matrix of one component; None where the components differ."""
+        if self.fixed is not None:
+            held = self.fixed.reshape(-1, 3)
+            if (held != held[:, :1]).any():
+                return None
         own, found = self.mass.diagonal().reshape(-1, 3), csr_array(self.mass[::3, ::3])
         alike = self.mass.nnz == 3 * found.nnz and bool((own == own[:, :1]).all())
         return found if alike else None
