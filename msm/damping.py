@@ -35,24 +35,4 @@ def eq_9(gamma_0: float, gamma_1: float, mass: float) -> NodalDamping:
     return NodalDamping(gamma_0 / mass, gamma_1 / mass)
 
 
-def rayleigh(zetas: tuple[float, float], omegas: tuple[float, float]) -> NodalDamping:
-    """Rayleigh damping alpha M + beta K with given damping ratios at two frequencies.
-
-    From zeta = (alpha / omega + beta omega) / 2, omega [rad/s]. ValueError if alpha or beta would
-    be negative, which would supply energy to some mode.
-    """
-    (z1, z2), (w1, w2) = zetas, omegas
-    if not (w1 > 0.0 and w2 > 0.0 and w1 != w2):
-        raise ValueError(f"Rayleigh damping needs two different frequencies, not {w1:g} and {w2:g}")
-    spread = w2**2 - w1**2
-    alpha, beta = 2.0 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2.0 * (z2 * w2 - z1 * w1) / spread
-    if not (alpha >= 0.0 and beta >= 0.0):
-        raise ValueError(
-            f"no Rayleigh damping has ratios {z1:g} at {w1:g} rad/s and {z2:g} at {w2:g} rad/s: "
-            f"it would need alpha = {alpha:.3g} 1/s and beta = {beta:.3g} s, both at least 0; "
-            "bring the two ratios, or the two frequencies, closer together"
-        )
-    return NodalDamping(alpha, beta=beta)
-
-
 UNDAMPED = NodalDamping(0.0)
