@@ -23,11 +23,11 @@ from fem_reference.elements import ELEMENTS, Element
 from fem_reference.error_estimate import ErrorEstimate, discretisation_error
 from fem_reference.laws import LAWS, Law
 from fem_reference.model import METHODS, Method, Solution, build, run, static_field
-from fem_reference.newton import Path
 from fem_reference.newton import solve as solve_hyperelastic
 from fem_reference.observation import at_points, evaluation, largest_rotation, largest_strain
 from fem_reference.solvers import solve_static
 from fem_reference.subspace import Subspace, SubspaceMotion, modal_subspace, ritz_subspace
+from study.numerics.continuation import EquilibriumPath
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
 from study.problem.tissue import Tissue
@@ -42,13 +42,13 @@ __all__ = [
     "CertifiedMotion",
     "Comparison",
     "Element",
+    "EquilibriumPath",
     "ErrorEstimate",
     "Foundation",
     "Law",
     "Method",
     "Observation",
     "Oscillator",
-    "Path",
     "RayleighDamping",
     "Solution",
     "SteppedMotion",

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
+
+from study.numerics.factors import symmetric_factors
 
 Floats = NDArray[np.float64]
 Solve = Callable[[Floats], Floats]
@@ -55,33 +56,6 @@ def pivots(matrix: csc_array) -> Pivots:
     entries = int(np.diff(lower.indptr).max())
     largest = float(sizes.sum(axis=1).max() * sizes.sum(axis=0).max())
     return Pivots(int((pivot < 0.0).sum()), bool(in_place), entries * EPSILON * largest)
-
-
-def symmetric_factors(matrix: csc_array) -> Any:
-    """Sparse factors by symmetric elimination, whose pivots have the signs of the eigenvalues.
-
-    None if the matrix is singular.
-    """
-    try:
-        return splu(
-            csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
-
-
-def has_inertia(factors: Any, negative: int = 0) -> bool:
-    """Whether symmetric factors show so many negative eigenvalues, and all others positive.
-
-    By Sylvester's law of inertia, which needs all pivots on the diagonal; False without factors.
-    """
-    if factors is None or not (factors.perm_r == factors.perm_c).all():
-        return False
-    pivot = factors.U.diagonal()
-    return bool((pivot < 0.0).sum() == negative and (pivot > 0.0).sum() == len(pivot) - negative)
 
 
 def _factors(matrix: csc_array) -> Any:

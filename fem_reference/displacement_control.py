@@ -17,10 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import MixedSolid
-from study.problem.continuation import Increments, follow
+from study.numerics.continuation import (
+    NO_EQUILIBRIUM,
+    NO_STEP,
+    UNSTABLE,
+    EquilibriumPath,
+    Increments,
+    follow,
+)
+from study.numerics.factors import has_inertia, symmetric_factors
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -73,24 +80,6 @@ class EquilibriumState:
     iterations: int
 
 
-@dataclass(frozen=True)
-class EquilibriumPath:
-    """Equilibria at the requested factors, up to the last one found.
-
-    `reached`: factor of the last equilibrium found; `failure`: why the path ends there, empty if it
-    is complete.
-    """
-
-    states: tuple[EquilibriumState, ...]
-    reached: float
-    failure: str
-
-    @property
-    def converged(self) -> bool:
-        """Whether there is a state at every requested factor."""
-        return not self.failure
-
-
 class _Iterate(NamedTuple):
     """Last iterate of Newton's method; a stable equilibrium if `failure` is empty."""
 
@@ -101,17 +90,17 @@ class _Iterate(NamedTuple):
 
 
 def equilibrium_path(
-    body: MixedSolid, loading: Loading, factors: Sequence[float] = (1.0,)
-) -> EquilibriumPath:
-    """Equilibria at multiples of the loading, in the order of `factors`, starting without load.
+    body: MixedSolid, loading: Loading, load_factors: Sequence[float] = (1.0,)
+) -> EquilibriumPath[EquilibriumState]:
+    """Equilibria at multiples of the loading, in the order of `load_factors`.
 
-    ValueError for a factor of zero, or prescribed values that do not fit the body.
+    The path starts from the unloaded body. ValueError for a factor of zero, or prescribed values
+    that do not fit the body.
     """
-    _refuse(body, loading, factors)
+    _refuse_misfit(body, loading)
     start = _Iterate(0.0, np.zeros(body.size + body.pressures), ())
-    found = follow(start, factors, partial(_newton, body, loading), INCREMENTS)
-    states = map(partial(_state, body, loading), found.rests, found.iterations)
-    return EquilibriumPath(tuple(states), found.reached, found.failure)
+    search, state = partial(_newton, body, loading), partial(_state, body, loading)
+    return follow(start, load_factors, search, state, INCREMENTS)
 
 
 def solve_linear(body: MixedSolid, loading: Loading) -> EquilibriumState:
@@ -119,7 +108,7 @@ def solve_linear(body: MixedSolid, loading: Loading) -> EquilibriumState:
 
     ValueError if the stiffness is singular.
     """
-    _refuse(body, loading, (1.0,))
+    _refuse_misfit(body, loading)
     matrix, w = body.linear(), np.zeros(body.size + body.pressures)
     free = _free(body, loading)
     w[: body.size] = np.where(loading.free, 0.0, loading.prescribed.ravel())
@@ -144,9 +133,7 @@ def solve_linear(body: MixedSolid, loading: Loading) -> EquilibriumState:
     )
 
 
-def _refuse(body: MixedSolid, loading: Loading, factors: Sequence[float]) -> None:
-    if not (np.isfinite(factors).all() and np.all(factors)):
-        raise ValueError(f"factors: {tuple(factors)} must be finite and not zero")
+def _refuse_misfit(body: MixedSolid, loading: Loading) -> None:
     if loading.prescribed.shape != body.points.shape or loading.load.shape != (body.size,):
         raise ValueError(
             f"prescribed {loading.prescribed.shape} and load {loading.load.shape} do not fit "
@@ -184,7 +171,7 @@ def _newton(body: MixedSolid, loading: Loading, start: _Iterate, factor: float) 
     free, constrained, w = _free(body, loading), np.flatnonzero(~loading.free), start.w
     target, load = factor * loading.prescribed.ravel()[constrained], _load(body, loading, factor)
     residuals: list[float] = []
-    failure = "no balance of forces"
+    failure = NO_EQUILIBRIUM
     while len(residuals) <= MOST_ITERATIONS:
         residual, increment = load - body.gradient(w), np.zeros_like(w)
         increment[constrained] = target - w[constrained]
@@ -195,12 +182,12 @@ def _newton(body: MixedSolid, loading: Loading, start: _Iterate, factor: float) 
         if residuals[-1] <= TOLERANCE and not increment.any():
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if has_inertia(factors, body.pressures) else "the body gives way"
+            failure = "" if has_inertia(factors, body.pressures) else UNSTABLE
             break
         step = _newton_step(factors, matrix, residual, increment, free)
         length = _step_length(body, load, free, w, step, prescribing=bool(increment.any()))
         if length == 0.0:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         w = w + length * step
         if length == 1.0:  # removes the rounding of the sum

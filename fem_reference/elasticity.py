@@ -138,6 +138,11 @@ class Body:
         """Positions [m] (nodes, 3)."""
         return np.ascontiguousarray(self.nodes.doflocs.T)
 
+    @cached_property
+    def nodal_volume(self) -> csr_array:
+        """Integrals [m^3] (nodes, nodes) of products of shape functions, constraints aside."""
+        return products(self.nodes, pattern(self.nodes))
+
     def inertia(self, acceleration: Floats) -> Floats:
         """Mass times an acceleration [m/s^2] (n,): nodal forces [N] (n,)."""
         if self._nodal is None:
@@ -147,6 +152,10 @@ class Body:
     @cached_property
     def _nodal(self) -> csr_array | None:
         """Mass matrix of one component; None where the components differ."""
+        if self.fixed is not None:
+            held = self.fixed.reshape(-1, 3)
+            if (held != held[:, :1]).any():
+                return None
         own, found = self.mass.diagonal().reshape(-1, 3), csr_array(self.mass[::3, ::3])
         alike = self.mass.nnz == 3 * found.nnz and bool((own == own[:, :1]).all())
         return found if alike else None

@@ -173,8 +173,9 @@ def _refined(
         if not np.isfinite(residual).all():
             break
     raise ValueError(
-        "the finite elements find no rest: the support does not hold the body, or a tetrahedron is "
-        "nearly flat; enlarge support.depth, raise support.stiffness, or repair organ.mesh"
+        "the finite elements find no static equilibrium: the support does not hold the body, or a "
+        "tetrahedron is nearly flat; enlarge support.depth, raise support.stiffness, or repair "
+        "organ.mesh"
     )
 
 

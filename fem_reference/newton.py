@@ -14,14 +14,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.direct import has_inertia, symmetric_factors
 from fem_reference.displacement_control import EquilibriumState, Loading, equilibrium_path
 from fem_reference.elasticity import Body
 from fem_reference.elements import ELEMENTS
 from fem_reference.hyperelasticity import HyperelasticSolid, largest_log_strain, solid
 from fem_reference.laws import DEFAULT, Law
 from fem_reference.mixed_strain import on_nodes
-from study.problem.continuation import Increments, follow
+from study.numerics.continuation import (
+    NO_EQUILIBRIUM,
+    NO_STEP,
+    UNSTABLE,
+    EquilibriumPath,
+    Increments,
+    follow,
+)
+from study.numerics.factors import has_inertia, symmetric_factors
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
@@ -55,25 +62,6 @@ class State:
     iterations: int
 
 
-@dataclass(frozen=True)
-class Path:
-    """Equilibria at the requested load factors, up to the last one found.
-
-    Under large loads a body may have several stable equilibria; these are the ones on the path from
-    the unloaded body. `reached`: load factor of the last equilibrium found, which need not be a
-    requested one; `failure`: why the path ends there, empty if it is complete.
-    """
-
-    states: tuple[State, ...]
-    reached: float
-    failure: str
-
-    @property
-    def converged(self) -> bool:
-        """Whether there is a state at every requested load factor."""
-        return not self.failure
-
-
 class _Iterate(NamedTuple):
     """Last iterate of Newton's method; a stable equilibrium if `failure` is empty."""
 
@@ -88,25 +76,25 @@ def solve(
     tissue: Tissue,
     law: str | Law = DEFAULT,
     load_factors: Sequence[float] = (1.0,),
-) -> Path:
+) -> EquilibriumPath[State]:
     """Equilibria under multiples of the body's load, in the order of `load_factors`.
 
-    The path starts from the unloaded body. Mixed elements are solved for displacement and pressure
+    Under large loads a body may have several stable equilibria; these are the ones on the path from
+    the unloaded body. Mixed elements are solved for displacement and pressure
     by `fem_reference.displacement_control`, in the neo-Hookean law. ValueError for an unknown law,
     a law without a mixed form where the elements are mixed, or a load factor of zero.
     """
-    if not (np.isfinite(load_factors).all() and np.all(load_factors)):
-        raise ValueError(f"load_factors: {tuple(load_factors)} must be finite and not zero")
     if ELEMENTS[body.element].mixed:
         return _mixed_path(body, tissue, law, load_factors)
     problem = solid(body, tissue, law)
     start = _Iterate(0.0, np.zeros(len(body.load)), (0.0,))
-    found = follow(start, load_factors, partial(_newton, problem), INCREMENTS)
-    states = map(partial(_state, problem), found.rests, found.iterations)
-    return Path(tuple(states), found.reached, found.failure)
+    search, state = partial(_newton, problem), partial(_state, problem)
+    return follow(start, load_factors, search, state, INCREMENTS)
 
 
-def _mixed_path(body: Body, tissue: Tissue, law: str | Law, load_factors: Sequence[float]) -> Path:
+def _mixed_path(
+    body: Body, tissue: Tissue, law: str | Law, load_factors: Sequence[float]
+) -> EquilibriumPath[State]:
     """The equilibrium path of mixed elements."""
     if law != "neo-hookean":
         raise ValueError(
@@ -118,7 +106,7 @@ def _mixed_path(body: Body, tissue: Tissue, law: str | Law, load_factors: Sequen
     if body.fixed is not None:
         prescribed[body.fixed.reshape(-1, 3)] = 0.0
     found = equilibrium_path(mixed, Loading(prescribed, body.whole_load), load_factors)
-    return Path(tuple(map(_as_state, found.states)), found.reached, found.failure)
+    return EquilibriumPath(tuple(map(_as_state, found.states)), found.reached, found.failure)
 
 
 def _as_state(state: EquilibriumState) -> State:
@@ -151,7 +139,7 @@ def _newton(problem: HyperelasticSolid, start: _Iterate, factor: float) -> _Iter
     """Newton's method at one load."""
     load, u = factor * problem.load, start.displacement
     residuals: list[float] = []
-    failure = "no balance of forces"
+    failure = NO_EQUILIBRIUM
     while len(residuals) <= MOST_ITERATIONS:
         residual = load - problem.internal_force(u)
         residuals.append(float(np.linalg.norm(residual) / np.linalg.norm(load)))
@@ -159,12 +147,12 @@ def _newton(problem: HyperelasticSolid, start: _Iterate, factor: float) -> _Iter
         if residuals[-1] <= TOLERANCE:
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if has_inertia(factors) else "the body gives way"
+            failure = "" if has_inertia(factors) else UNSTABLE
             break
         step = _newton_step(factors, residual)
         length = _step_length(problem, load, u, step, float(residual @ step))
         if length == 0.0:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         u = u + length * step
     return _Iterate(factor, u, tuple(residuals), failure)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import diags_array
 from scipy.sparse.linalg import cg
 
 from fem_reference.direct import Solve
@@ -115,15 +115,14 @@ def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
 
 def _projection(body: Body) -> Any:
     """L2 projection from values (cells, q) at the integration points to nodal values."""
-    basis, mass = body.nodes, csr_array(body.mass[::3, ::3])
-    weights = basis.dx * (mass.sum() / basis.dx.sum())
+    basis, products = body.nodes, body.nodal_volume
     shapes = [np.asarray(basis.basis[k][0]) for k in range(basis.Nbfun)]
-    scale = diags_array(1.0 / mass.diagonal())
+    scale = diags_array(1.0 / products.diagonal())
 
     def project(values: Floats) -> Floats:
         right = np.zeros(basis.N)
         for dofs, shape in zip(basis.element_dofs, shapes, strict=True):
-            right += np.bincount(dofs, (values * shape * weights).sum(axis=1), basis.N)
-        return np.asarray(cg(mass, right, M=scale, rtol=PROJECTED)[0])
+            right += np.bincount(dofs, (values * shape * basis.dx).sum(axis=1), basis.N)
+        return np.asarray(cg(products, right, M=scale, rtol=PROJECTED)[0])
 
     return project

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.direct import symmetric_factors
 from fem_reference.laws import IDENTITY
 from fem_reference.mixed_strain import MixedSolid, kinematics
-from study.problem.continuation import Increments, follow
+from study.numerics.continuation import NO_EQUILIBRIUM, NO_STEP, Increments, follow
+from study.numerics.factors import symmetric_factors
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -81,9 +81,9 @@ def unload(given: MixedSolid, load: Floats, free: Bools) -> Unloading:
     def solve(start: _Iterate, factor: float) -> _Iterate:
         return _newton(given, factor * load, free, start.z)._replace(factor=factor)
 
-    found = follow(_Iterate(np.zeros(len(free))), (1.0,), solve, INCREMENTS)
-    back = found.rests[-1].z if found.rests else np.zeros(len(free))
-    return Unloading(back, found.reached)
+    undeformed = np.zeros(len(free))
+    found = follow(_Iterate(undeformed), (1.0,), solve, lambda at, _: at.z, INCREMENTS)
+    return Unloading(found.states[-1] if found.converged else undeformed, found.reached)
 
 
 def _newton(given: MixedSolid, load: Floats, free: Bools, start: Floats) -> _Iterate:
@@ -113,9 +113,9 @@ def _newton(given: MixedSolid, load: Floats, free: Bools, start: Floats) -> _Ite
                     break
             length *= 0.5
         else:
-            return _Iterate(z, tuple(residuals), "no way towards balance")
+            return _Iterate(z, tuple(residuals), NO_STEP)
         z, at, residual = trial, trial_values, trial_residual
-    return _Iterate(z, tuple(residuals), "no balance of forces")
+    return _Iterate(z, tuple(residuals), NO_EQUILIBRIUM)
 
 
 def _point_values(given: MixedSolid, z: Floats) -> _PointValues:

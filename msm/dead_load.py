@@ -107,5 +107,5 @@ def from_shape(net: Network, u: Floats) -> Network:
 def volume_ratios(net: Network, u: Floats, ratio: Floats) -> None:
     """Set the volume ratio J (c,) of each cell at the displacement u [m] (n, 3)."""
     for c in range(net.cells.shape[0]):
-        f, g, h = deformation(net.cells[c], net.spacing, u)
+        f, g, h = deformation(net.cells[c], net.edges[c], u)
         ratio[c] = dot(f, cross(g, h))

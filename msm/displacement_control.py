@@ -15,13 +15,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array, kron
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from msm.forces import internal_forces
 from msm.laws import Law, initial_stiffness
 from msm.network import Network
 from msm.tangent import SIGNS, Tangent, empty_tangent, linearise
-from study.problem.continuation import Increments, follow
+from study.numerics.continuation import (
+    NO_EQUILIBRIUM,
+    NO_STEP,
+    UNSTABLE,
+    EquilibriumPath,
+    Increments,
+    follow,
+)
+from study.numerics.factors import has_inertia, symmetric_factors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,19 +64,6 @@ class EquilibriumState:
     residuals: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class EquilibriumPath:
-    """Equilibria at the requested factors, up to the last one found.
-
-    `reached`: factor of the last equilibrium found; `failure`: why the path ends there, empty if it
-    is complete.
-    """
-
-    states: tuple[EquilibriumState, ...]
-    reached: float
-    failure: str
-
-
 class _Iterate(NamedTuple):
     """Last iterate of Newton's method: u [m] (n, 3), pressures [J] (c,); stable if no failure.
 
@@ -90,20 +85,18 @@ class _Residual(NamedTuple):
 
 
 def equilibrium_path(
-    law: Law, net: Network, prescribed: Floats, factors: Sequence[float] = (1.0,)
-) -> EquilibriumPath:
-    """Equilibria at `factors` times the load and `prescribed` [m] (n, 3), NaN where free.
+    law: Law, net: Network, prescribed: Floats, load_factors: Sequence[float] = (1.0,)
+) -> EquilibriumPath[EquilibriumState]:
+    """Equilibria at `load_factors` times the load and `prescribed` [m] (n, 3), NaN where free.
 
     ValueError for a factor of zero, or prescribed values that do not fit the nodes.
     """
-    if not (np.isfinite(factors).all() and np.all(factors)):
-        raise ValueError(f"factors: {tuple(factors)} must be finite and not zero")
     if prescribed.shape != net.load.shape:
         raise ValueError(f"prescribed: {prescribed.shape} does not fit {net.load.shape} nodes")
     lattice = _MixedLattice(law, net, prescribed)
     start = _Iterate(0.0, np.zeros_like(net.load), np.zeros(len(net.cells)), ())
-    found = follow(start, factors, partial(_newton, lattice), INCREMENTS)
-    return EquilibriumPath(tuple(map(lattice.state, found.rests)), found.reached, found.failure)
+    search = partial(_newton, lattice)
+    return follow(start, load_factors, search, lambda at, _: lattice.state(at), INCREMENTS)
 
 
 def lowest_frequency(
@@ -118,7 +111,7 @@ def lowest_frequency(
     tangent = lattice.linearised(u)
     free = lattice.free
     stiffness = lattice.matrix(tangent, net.bulk * tangent.swelling)[free][:, free]
-    factors = _factorised(stiffness)
+    factors = symmetric_factors(stiffness)
     if factors is None:
         raise ValueError("the stiffness is singular: nothing holds the lattice")
     mass = diags_array(np.repeat(net.mass, 3)[free]).tocsc()
@@ -132,7 +125,7 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
     """Newton's method at one factor; its first step takes up the prescribed displacements."""
     u, pressure, free = start.u.copy(), start.pressure.copy(), lattice.free
     constrained, residuals = np.flatnonzero(~free), list[float]()
-    target, failure = factor * lattice.prescribed.ravel()[constrained], "no balance of forces"
+    target, failure = factor * lattice.prescribed.ravel()[constrained], NO_EQUILIBRIUM
     while len(residuals) <= MOST_ITERATIONS:
         tangent = lattice.linearised(u)
         residual = lattice.residual(tangent, u, pressure, factor)
@@ -140,20 +133,20 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
         increment = np.zeros(u.size)
         increment[constrained] = target - u.ravel()[constrained]
         matrix = lattice.matrix(tangent, pressure)
-        factors = _factorised(matrix[free][:, free])
+        factors = symmetric_factors(matrix[free][:, free])
         if residuals[-1] <= TOLERANCE and not increment.any():
             # An indefinite tangent during the iterations does no harm; at equilibrium it is a
             # loss of stability.
-            failure = "" if _is_definite(factors) else "the lattice gives way"
+            failure = "" if has_inertia(factors) else UNSTABLE
             break
         if factors is None:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         prescribing = bool(increment[constrained].any())
         step = lattice.newton_step(tangent, residual, matrix, factors, increment)
         length = _step_length(lattice, (u, pressure), step, factor, residual, prescribing)
         if length == 0.0:
-            failure = "no way towards balance"
+            failure = NO_STEP
             break
         u, pressure = u + length * step[0], pressure + length * step[1]
         if length == 1.0:  # removes the rounding of the sum
@@ -299,23 +292,3 @@ def _assembled(blocks: Floats, dofs: Ints, size: int) -> csc_array:
 
 def _norm(x: Floats) -> float:
     return float(np.linalg.norm(x))
-
-
-def _factorised(matrix: csc_array) -> Any:
-    """Sparse LDL-like factors with diagonal pivots; None if the matrix is singular."""
-    try:
-        return splu(
-            csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
-        return None
-
-
-def _is_definite(factors: Any) -> bool:
-    """Whether the matrix is positive definite: all pivots are diagonal and positive."""
-    if factors is None or not (factors.perm_r == factors.perm_c).all():
-        return False
-    return bool((factors.U.diagonal() > 0.0).all())

@@ -50,7 +50,7 @@ def solved(stiffness: csr_array, load: Floats, tolerance: float = TOLERANCE) -> 
     preconditioner, most = diags_array(1.0 / stiffness.diagonal()), 7 * len(load)
     found, failed = cg(stiffness, load, rtol=tolerance, maxiter=most, M=preconditioner)
     if failed:
-        raise ValueError("the lattice finds no rest: the support does not hold it")
+        raise ValueError("the lattice has no static equilibrium: the support does not hold it")
     return np.asarray(found)
 
 

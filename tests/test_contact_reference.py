@@ -10,10 +10,10 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial import cKDTree
 
 from fem_reference import model as fem
-from fem_reference.contact.law import Areas, dragged, forces
-from fem_reference.contact.motion import Pressed, at_peak, run
+from fem_reference.contact.law import ComplementarityProblem, frictional_forces, frictionless_forces
+from fem_reference.contact.motion import ContactProblem, at_peak, run
 from fem_reference.contact.patch import patch
-from fem_reference.contact.reduction import answered, krylov, reduced
+from fem_reference.contact.reduction import contact_response, krylov, reduced
 from fem_reference.elasticity import discretise
 from fem_reference.external_loads import ExternalLoads, with_external_loads
 from study.known import pressed
@@ -85,17 +85,17 @@ def test_the_tools_work_is_what_damping_takes():
         return np.outer(1.5e-3 * (1.0 - np.cos(2.0 * np.pi * np.minimum(at / 0.3, 1.0))), DOWN)
 
     punch = RigidTool("tool", PUNCH, 0.015, TOP, DOWN, travel)
-    given = answered(body, (punch,), times, nothing, 0.15)
-    pressing = Pressed(given, DAMPING, np.zeros_like, nothing, times, 2)
+    given = contact_response(body, (punch,), times, nothing, 0.15)
+    pressing = ContactProblem(given, DAMPING, np.zeros_like, nothing, times, 2)
     among = reduced(given, krylov(given, 3), pressing.highest)
     states = pressing.sampled(among, lambda _: None).states
-    force = np.array([-given.touch.on_tools(one.grip.force)[0] for one in states])
+    force = np.array([-given.contact.tool_forces(one.solution.force)[0] for one in states])
     steps = 0.5 * (force[1:] + force[:-1]) * np.diff(travel(times), axis=0)
     work = np.append(0.0, np.cumsum(steps.sum(axis=1)))
     power = [DAMPING.mass * float(one.v @ one.v) for one in states]
     taken = cumulative_trapezoid(power, times, initial=0.0)
-    count = len(among.pushed)  # beside them stand the loads, which are nought
-    dents = given.touch.pushes.T @ among.residual[:, :count]
+    count = len(among.contact_modes)  # beside them stand the loads, which are nought
+    dents = given.contact.nodal_forces.T @ among.residual[:, :count]
     stored = [one.r[:count] @ dents @ one.r[:count] for one in states]
     held = [
         0.5 * float(one.v @ one.v + among.squares @ one.q**2 + part)
@@ -127,7 +127,7 @@ def test_the_support_takes_what_a_tool_gives(shape):
     body = block()
     rest = at_peak(body, (tool(shape, depth=1e-3),), observed(0.4, 41, 15))
     taken = (body.support @ rest.displacement).reshape(-1, 3).sum(axis=0)
-    assert rest.forces[0] == pytest.approx(-rest.pushes[0].reshape(-1, 3).sum(axis=0))
+    assert rest.forces[0] == pytest.approx(-rest.nodal_forces[0].reshape(-1, 3).sum(axis=0))
     assert taken @ DOWN == pytest.approx(-(rest.forces[0] @ DOWN), rel=1e-6)
 
 
@@ -300,10 +300,12 @@ def test_friction_of_nothing_is_none():
     A = rng.normal(size=(12, 12))
     A = A @ A.T + np.eye(12)
     offset = rng.normal(size=(4, 3))
-    found = dragged(A, offset, np.zeros(4), np.zeros((4, 3)))
+    found = frictional_forces(A, offset, np.zeros(4), np.zeros((4, 3)))
     normal = np.arange(0, 12, 3)
     held = np.zeros(4, dtype=bool)
-    exact = forces(Areas(A[np.ix_(normal, normal)], offset[:, 0], held), np.zeros(4))
+    exact = frictionless_forces(
+        ComplementarityProblem(A[np.ix_(normal, normal)], offset[:, 0], held), np.zeros(4)
+    )
     assert found[:, 0] == pytest.approx(exact, abs=1e-7)
     assert np.abs(found[:, 1:]).max() == 0.0
 
@@ -314,7 +316,7 @@ def test_the_law_of_contact_holds_at_every_area():
         A = rng.normal(size=(9, 9))
         A = A @ A.T + 0.1 * np.eye(9)
         offset, held = rng.normal(size=9), np.arange(9) < 2
-        found = forces(Areas(A, offset, held), np.zeros(9))
+        found = frictionless_forces(ComplementarityProblem(A, offset, held), np.zeros(9))
         gap = A @ found + offset
         assert np.abs(gap[held]).max() < 1e-9
         assert found[~held].min() >= 0.0
@@ -327,7 +329,7 @@ def test_the_law_of_contact_holds_at_every_area():
 )
 def test_an_area_slides_at_the_limit_or_sticks(friction, slides):
     offset = np.array([[-1.0, 0.5, 0.0]])
-    found = dragged(np.eye(3), offset, np.array([friction]), np.zeros((1, 3)))[0]
+    found = frictional_forces(np.eye(3), offset, np.array([friction]), np.zeros((1, 3)))[0]
     assert found[0] == pytest.approx(1.0)
     assert found[1] == pytest.approx(-0.2 if slides else -0.5, rel=1e-6)
 

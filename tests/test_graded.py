@@ -10,6 +10,7 @@ from msm import octree
 from msm.assembly import Material, arrays, assemble, assemble_graded
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
+from msm.dead_load import from_shape
 from msm.forces import internal_forces
 from msm.grid import grids_of
 from msm.hanging import interpolate
@@ -203,6 +204,15 @@ def test_momentum_is_conserved(assembly):
     assert np.abs(np.cross(lattice.nodes + u, found).sum(axis=0)).max() < 1e-13 * size * 0.06
     wrong = force(m, net._replace(part=0.9 * net.part), u)
     assert np.abs(wrong.sum(axis=0)).max() > 1e-4 * size
+
+
+def test_a_network_from_a_shape_is_free_of_stress_in_it(assembly):
+    """Cells of each size have their own edges, by which their volume changes."""
+    m, lattice = material(assembly), assembly.lattice
+    net = free(arrays(assembly, m))
+    u = lattice.masters @ (5e-4 * np.random.default_rng(8).standard_normal(lattice.nodes.shape))
+    stressed = np.abs(force(m, net, u)).max()
+    assert np.abs(force(m, from_shape(net, u), u)).max() < 1e-9 * stressed
 
 
 def test_stiffness_is_the_slope_of_the_forces(assembly):

@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from fem_reference.elasticity import discretise
 from fem_reference.error_estimate import SAFETY_ASSUMED, SAFETY_GRADED, graded_error
+from fem_reference.external_loads import ExternalLoads, with_external_loads
 from fem_reference.recovery import energy_products, goal_errors, recovered
 from fem_reference.solvers import solve_static, solver
 from study.mesh.bisection import bisected, cut_into
@@ -20,6 +22,10 @@ from study.models.model import SILENT
 from study.organ.block import block_mesh
 from study.organ.geometry import Level
 from study.organ.grading import equidistributed
+from study.problem.contact import Foundation, ToolPatch, Weight
+from study.problem.heterogeneous import Ellipsoid, HeterogeneousTissue, Region
+from study.problem.supports import FixedSurface
+from study.problem.tissue import Tissue
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.system.progress import Silent
@@ -131,6 +137,24 @@ def test_the_recovered_strain_of_a_quadratic_field_is_its_own(pressed):
     rough = np.stack([np.abs(x - 0.02) ** 1.5, 0 * x, 0 * x], axis=1).ravel()
     other = recovered(body, rough)
     assert np.abs(other.error).max() > 2e-2 * np.abs(other.strain).max()
+
+
+@pytest.mark.parametrize("case", ["fixed", "denser inclusion", "weight"])
+def test_a_uniform_strain_is_recovered_whatever_the_mass(case):
+    """The projection is that of the shape functions; constraints and masses are no part of it."""
+    top, down = np.array([0.02, 0.02, 0.04]), np.array([0.0, 0.0, -1.0])
+    base = Foundation(down, 0.0, 1e-3, 1e6)
+    inside = Ellipsoid(np.full(3, 0.02), np.full(3, 0.01))
+    ball = Region(name="ball", distance=inside, youngs_modulus=4e3, density=5000.0)
+    tissue = HeterogeneousTissue(regions=(ball,)) if case == "denser inclusion" else Tissue()
+    support = FixedSurface(base, np.ones(3, dtype=bool)) if case == "fixed" else base
+    patch = ToolPatch(top, down, 0.02, 0.0)
+    body = discretise(block_mesh((0.04,) * 3, 0.01), tissue, support, patch, "p2")
+    if case == "weight":
+        body = with_external_loads(body, ExternalLoads(weights=(Weight(patch, 0.05),)))
+    gradient = np.array([[0.01, 0.02, 0.0], [0.0, -0.01, 0.03], [0.01, 0.0, 0.02]])
+    found = recovered(body, (body.points @ gradient.T).ravel())
+    assert np.abs(found.error).max() < 1e-3 * np.abs(found.strain).max()
 
 
 def test_the_effectivity_of_the_estimated_energy_is_steady(pressed):

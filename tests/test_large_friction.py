@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem_reference.contact import finite, large_motion
-from fem_reference.contact.finite import Before, Configuration
-from fem_reference.contact.large_motion import Steps, pressed, run
-from fem_reference.contact.law import dragged, off_law
+from fem_reference.contact import kinematics, large_motion
+from fem_reference.contact.kinematics import Configuration, PreviousState
+from fem_reference.contact.large_motion import Integrator, contact_problem, run
+from fem_reference.contact.law import frictional_forces, law_residual
 from fem_reference.contact.motion import at_peak
 from fem_reference.elasticity import discretise
 from study.models import hyperelastic
 from study.models.model import SILENT
 from study.models.table import models_of
+from study.numerics.continuation import NO_EQUILIBRIUM
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
 from study.problem.damping import RayleighDamping
@@ -54,18 +55,20 @@ def tool(shape=SPHERE, friction=0.0, depth=3e-3, along=(3e-3,), **settings):
 def way(body, one, stations=16):
     """The body, and its states at rest at stations on the way of a tool."""
     times = np.linspace(0.0, 1.0, stations + 1)
-    given = pressed(body, TISSUE, (one,), DAMPING, np.zeros_like, times)
-    steps, nothing = Steps(given), np.zeros(given.body.solid.size)
+    given = contact_problem(body, TISSUE, (one,), DAMPING, np.zeros_like, times)
+    steps, nothing = Integrator(given), np.zeros(given.body.solid.size)
     found = [steps.start()]
     for time in times[1:]:
-        found.append(steps.at_rest(found[-1], time, nothing))
+        found.append(steps.equilibrium(found[-1], time, nothing))
     return given, found
 
 
 def forces(body, one, stations=16):
     """On the body along the drag and into it [N] (stations + 1, 2)."""
     given, found = way(body, one, stations)
-    return np.array([-given.on_tools(state)[0] @ np.column_stack([ALONG, DOWN]) for state in found])
+    return np.array(
+        [-given.tool_forces(state)[0] @ np.column_stack([ALONG, DOWN]) for state in found]
+    )
 
 
 def slides_at_the_cone(body):
@@ -104,8 +107,10 @@ def of_another_coefficient(exact, compliance, offset, friction, start):
 )
 def test_an_error_planted_in_the_law_is_not_balanced(body, plant, monkeypatch):
     """What does not meet the law is not handed out, whoever found it."""
-    monkeypatch.setattr(finite, "dragged", lambda *given: plant(dragged, *given))
-    with pytest.raises(ValueError, match="balance"):
+    monkeypatch.setattr(
+        kinematics, "frictional_forces", lambda *given: plant(frictional_forces, *given)
+    )
+    with pytest.raises(ValueError, match=NO_EQUILIBRIUM):
         slides_at_the_cone(body)
 
 
@@ -124,7 +129,7 @@ def test_an_error_planted_in_how_friction_is_shared_out_is_seen(body, rows, monk
     try:
         assert not slides_at_the_cone(body)
     except ValueError as error:
-        assert "balance" in str(error)  # noqa: PT017 - one of two ways to be seen
+        assert NO_EQUILIBRIUM in str(error)  # noqa: PT017 - one of two ways to be seen
 
 
 @pytest.mark.parametrize(("shape", "off"), [(PUNCH, 1e-2), (PLATE, 2e-3)])
@@ -182,10 +187,10 @@ def test_a_problem_in_turned_axes_has_turned_forces(body, shape):
     turned = replace(mesh, points=mesh.points @ Q.T)
     other_body = discretise(turned, TISSUE, base, blunt, "taylor-hood")
     (given, exact), (there, found) = way(body, one, 8), way(other_body, other, 8)
-    force = given.on_tools(exact[-1])[0]
+    force = given.tool_forces(exact[-1])[0]
     assert abs(force[0]) > 0.1 * abs(force[2])
     size = np.linalg.norm(force)
-    assert there.on_tools(found[-1])[0] == pytest.approx(Q @ force, abs=1e-4 * size)
+    assert there.tool_forces(found[-1])[0] == pytest.approx(Q @ force, abs=1e-4 * size)
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +204,9 @@ def test_friction_takes_energy_at_every_step_and_gives_none(loop):
     _, given, found = loop
     heat = []
     for state in found[1:]:
-        slip, force = (one.reshape(-1, 3)[:, 1:] for one in (given.met(state).gaps, state.force))
+        slip, force = (
+            one.reshape(-1, 3)[:, 1:] for one in (given.configuration(state).gaps, state.force)
+        )
         heat.append(-float((slip * force).sum()))
     largest = max(heat)
     assert min(heat) > -1e-6 * largest
@@ -210,14 +217,16 @@ def test_a_closed_loop_costs_what_slips_on_it(loop):
     """The work of the tool in one round is heat; what is stored comes back."""
     one, given, found = loop
     ends = found[-17], found[-1]
-    force = np.array([-given.on_tools(state)[0] for state in found[-17:]])
+    force = np.array([-given.tool_forces(state)[0] for state in found[-17:]])
     times = [state.time for state in found[-17:]]
     places = one.travel(np.array(times))
     work = float((0.5 * (force[1:] + force[:-1]) * np.diff(places, axis=0)).sum())
     stored = [given.energy(state) for state in ends]
     heat = 0.0
     for state in found[-16:]:
-        slip, pushed = (each.reshape(-1, 3)[:, 1:] for each in (given.met(state).gaps, state.force))
+        slip, pushed = (
+            each.reshape(-1, 3)[:, 1:] for each in (given.configuration(state).gaps, state.force)
+        )
         heat -= float((slip * pushed).sum())
     assert work > 0.0
     assert abs(stored[1] - stored[0]) < 0.02 * work
@@ -226,35 +235,35 @@ def test_a_closed_loop_costs_what_slips_on_it(loop):
 
 def test_forces_of_body_and_tool_are_in_balance(body, rng):
     one = tool(SPHERE, 0.5)
-    contact = pressed(
+    contact = contact_problem(
         body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5)
     ).body.contact
-    u, force = 1e-3 * rng.standard_normal(contact.size), rng.random(len(contact.held))
-    met = contact.at(u, 1.0, Before(np.zeros_like(u), 0.0))
+    u, force = 1e-3 * rng.standard_normal(contact.size), rng.random(len(contact.bonded))
+    met = contact.at(u, 1.0, PreviousState(np.zeros_like(u), 0.0))
     on_body = (met.derivative.T @ force).reshape(-1, 3).sum(axis=0)
-    assert met.on_tools(force)[0] == pytest.approx(-on_body)
+    assert met.tool_forces(force)[0] == pytest.approx(-on_body)
 
 
 def test_slip_counts_from_where_body_and_tool_were(body):
     """A body that moves with the tool does not slip; one that stays slips back."""
     one = tool(PLATE, 0.5, depth=0.0, along=(3e-3,))
-    contact = pressed(
+    contact = contact_problem(
         body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5)
     ).body.contact
     still, carried = np.zeros(contact.size), np.tile(3e-3 * ALONG, contact.size // 3)
-    before = Before(still, 0.5)
+    before = PreviousState(still, 0.5)
     slip = contact.at(carried, 1.0, before).gaps.reshape(-1, 3)[:, 1:]
     assert np.abs(slip).max() < 1e-12
     slip = contact.at(still, 1.0, before).gaps.reshape(-1, 3)[:, 1:]
     assert np.hypot(*slip.T) == pytest.approx(3e-3)
-    half = contact.at(still, 1.0, Before(still, 0.75)).gaps.reshape(-1, 3)[:, 1:]
+    half = contact.at(still, 1.0, PreviousState(still, 0.75)).gaps.reshape(-1, 3)[:, 1:]
     assert np.hypot(*half.T) == pytest.approx(1.5e-3)
 
 
 def test_tangents_are_across_the_normal_and_turn_smoothly_with_it(rng):
     axis = np.array([0.48, -0.6, 0.64])
     normals = rng.normal(size=(200, 3))
-    tangents = finite._tangents(axis, normals)
+    tangents = kinematics._tangents(axis, normals)
     unit = normals / np.linalg.norm(normals, axis=1)[:, None]
     frames = np.concatenate([unit[:, :, None], tangents], axis=2)
     assert np.einsum("vik,vil->vkl", frames, frames) == pytest.approx(
@@ -262,17 +271,17 @@ def test_tangents_are_across_the_normal_and_turn_smoothly_with_it(rng):
     )
     assert np.linalg.det(frames) == pytest.approx(1.0)
     ahead = unit @ axis > -0.9
-    moved = finite._tangents(axis, unit + 1e-4 * rng.normal(size=(200, 3)))
+    moved = kinematics._tangents(axis, unit + 1e-4 * rng.normal(size=(200, 3)))
     assert np.abs(moved - tangents)[ahead].max() < 0.01
 
 
 def test_tangents_under_a_sphere_are_across_the_mean_normal_of_each_vertex(body):
     one = tool(SPHERE, 0.5, depth=8e-3)
-    contact = pressed(
+    contact = contact_problem(
         body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5)
     ).body.contact
     met = contact.at(np.zeros(contact.size), 0.5)
-    rows = met.derivative.toarray().reshape(len(contact.held) // 3, 3, -1, 3)
+    rows = met.derivative.toarray().reshape(len(contact.bonded) // 3, 3, -1, 3)
     normal, first, second = rows.sum(axis=2).transpose(1, 0, 2)
     leaning = np.linalg.norm(np.cross(normal, DOWN), axis=1)
     assert leaning.max() > 0.1
@@ -283,15 +292,15 @@ def test_tangents_under_a_sphere_are_across_the_mean_normal_of_each_vertex(body)
 def test_what_sticks_moves_with_the_tool(body):
     """To the velocity, from the end of the step on within which the tool is dragged off."""
     one = tool(PLATE, 100.0, depth=1e-3, along=(2e-3,))
-    given = pressed(body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5))
-    steps = Steps(given)
+    given = contact_problem(body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5))
+    steps = Integrator(given)
     for state in steps.march(steps.start(), 0.06):
         if state.time > 0.5:
             break
-    pushed = given.met(state).derivative @ state.v
-    moving = (given.met(state).derivative @ np.tile(4e-3 * ALONG, given.body.solid.size // 3))[
-        state.force.reshape(-1, 3)[:, 0].repeat(3) > 0.0
-    ]
+    pushed = given.configuration(state).derivative @ state.v
+    moving = (
+        given.configuration(state).derivative @ np.tile(4e-3 * ALONG, given.body.solid.size // 3)
+    )[state.force.reshape(-1, 3)[:, 0].repeat(3) > 0.0]
     found = pushed[state.force.reshape(-1, 3)[:, 0].repeat(3) > 0.0]
     assert len(found) > 30
     assert found == pytest.approx(moving, abs=1e-5 * 4e-3)
@@ -302,7 +311,7 @@ def test_a_dragged_sphere_in_motion_stays_in_its_cone_and_gains_nothing(body):
     seen = Observation(
         np.linspace(0.0, 1.0, 41), TOP[None], (20, 40), np.zeros((0, 3)), np.zeros((0, 3))
     )
-    given = pressed(body, TISSUE, (one,), DAMPING, np.zeros_like, seen.times)
+    given = contact_problem(body, TISSUE, (one,), DAMPING, np.zeros_like, seen.times)
     found = run(body, given, seen, 1)
     assert found.trajectory.status == "finished"
     force = -found.trajectory.tool_force[:, 0]
@@ -322,8 +331,10 @@ def test_beside_a_smooth_tool_friction_is_that_of_the_other_alone(body):
     left, right = TOP - 0.015 * ALONG, TOP + 0.015 * ALONG
     rough = replace(tool(SPHERE, 0.5), name="rough", tip=left, radius=0.012)
     smooth = replace(tool(SPHERE, 0.0), name="smooth", tip=right, radius=0.012)
-    given = pressed(body, TISSUE, (rough, smooth), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 9))
-    state = Steps(given).peak(1.0, np.zeros(given.body.solid.size))
+    given = contact_problem(
+        body, TISSUE, (rough, smooth), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 9)
+    )
+    state = Integrator(given).peak_equilibrium(1.0, np.zeros(given.body.solid.size))
     contact = given.body.contact
     drag = [np.abs(state.force[part].reshape(-1, 3)[:, 1:]).max() for part in contact.parts]
     assert drag[0] > 1e-3
@@ -337,9 +348,11 @@ def test_a_bonded_tool_is_the_same_beside_one_that_could_rub(body):
     lifted = replace(lifted, travel=lambda t: np.outer(-1e-3 * t, DOWN))
     found = []
     for tools in ((held, lifted), (held,)):
-        given = pressed(body, TISSUE, tools, DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 9))
-        state = Steps(given).peak(1.0, np.zeros(given.body.solid.size))
-        found.append(given.on_tools(state))
+        given = contact_problem(
+            body, TISSUE, tools, DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 9)
+        )
+        state = Integrator(given).peak_equilibrium(1.0, np.zeros(given.body.solid.size))
+        found.append(given.tool_forces(state))
     assert abs(found[1][0, 0]) > 0.05 * abs(found[1][0, 2])
     assert found[0][0] == pytest.approx(found[1][0], rel=1e-4)
     assert (found[0][1] == 0.0).all()
@@ -348,7 +361,7 @@ def test_a_bonded_tool_is_the_same_beside_one_that_could_rub(body):
 def test_tissue_that_rises_beside_a_punch_passes_its_side(body):
     """And is under it only where its face comes down on it."""
     one = tool(PUNCH, depth=0.0, along=(0.0,))
-    contact = pressed(
+    contact = contact_problem(
         body, TISSUE, (one,), DAMPING, np.zeros_like, np.linspace(0.0, 1.0, 5)
     ).body.contact
     points = contact.patches[0].points
@@ -359,12 +372,12 @@ def test_tissue_that_rises_beside_a_punch_passes_its_side(body):
     lifted[:, 2] = 0.3 * RADIUS
     drawn[:, 0] = 0.5 * RADIUS
     still = contact.at(np.zeros(contact.size), 1.0, None)
-    risen = contact.at(lifted.ravel(), 1.0, Before(lifted.ravel(), 1.0))
+    risen = contact.at(lifted.ravel(), 1.0, PreviousState(lifted.ravel(), 1.0))
     assert np.isfinite(still.gaps).sum() > 4
     assert np.isinf(risen.gaps).all()
     assert risen.penetration == 0.0
     assert (risen.derivative.data == 0.0).all()
-    moved = contact.at(drawn.ravel(), 1.0, Before(drawn.ravel(), 1.0))
+    moved = contact.at(drawn.ravel(), 1.0, PreviousState(drawn.ravel(), 1.0))
     assert (np.isfinite(moved.gaps) != np.isfinite(still.gaps)).any()
 
 
@@ -391,26 +404,26 @@ SEED = 91
 def test_relaxation_settles_where_whole_sweeps_go_round():
     compliance, offset = wedged()
     friction = np.full(4, 1.0)
-    found = dragged(compliance, offset, friction, np.zeros((4, 3)))
+    found = frictional_forces(compliance, offset, friction, np.zeros((4, 3)))
     gaps = (compliance @ found.ravel()).reshape(-1, 3) + offset
-    assert off_law(gaps, found, friction, 1.0) < 1e-7
+    assert law_residual(gaps, found, friction, 1.0) < 1e-7
 
 
 def test_what_is_off_the_law_of_friction_is_told():
     friction = np.array([0.5, 0.5, 0.5, np.inf])
     gaps = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]])
     force = np.array([[2.0, 0.0, 0.9], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0], [-1.0, 5.0, 0.0]])
-    assert off_law(gaps, force, friction, 10.0) < 1e-12
+    assert law_residual(gaps, force, friction, 10.0) < 1e-12
     for place, value in [((0, 2), 1.1), ((1, 1), 0.9), ((1, 1), -1.0), ((2, 0), 0.1)]:
         other = force.copy()
         other[place] = value
-        assert off_law(gaps, other, friction, 10.0) > 0.005
+        assert law_residual(gaps, other, friction, 10.0) > 0.005
     for place, value in [((0, 1), 0.1), ((1, 2), 1.0), ((0, 0), -0.1), ((3, 1), 0.1)]:
         other = gaps.copy()
         other[place] = value
-        assert off_law(other, force, friction, 10.0) > 0.005
+        assert law_residual(other, force, friction, 10.0) > 0.005
     away = np.where(np.arange(4)[:, None] == 2, np.inf, gaps)
-    assert off_law(away, force, friction, 10.0) < 1e-12
+    assert law_residual(away, force, friction, 10.0) < 1e-12
 
 
 def test_the_mesh_is_fine_along_the_way_of_a_tool_and_not_in_its_depth():

@@ -153,6 +153,16 @@ def test_three_sliding_sides_leave_a_block_in_uniform_stress():
 # What moves in time ----------------------------------------------------------------------------
 
 
+def test_inertia_is_the_mass_where_each_axis_slides_on_its_own_side():
+    """By symmetry the components of a cube have as many entries each, at other nodes."""
+    sides = [
+        FixedSurface(Foundation(-axis, 0.0, 1e-3, 1.0), axis.astype(bool)) for axis in np.eye(3)
+    ]
+    body = cube(Supports(tuple(sides)))
+    motion = np.random.default_rng(1).standard_normal(len(body.load))
+    assert body.inertia(motion) == pytest.approx(body.mass @ motion, rel=1e-12, abs=1e-15)
+
+
 @pytest.mark.parametrize("integrator", [name for name in INTEGRATORS if name != "xpbd"])
 def test_integrators_leave_clamped_and_sliding_nodes_alone(integrator):
     settings = (f"lattice.integrator={integrator}", "lattice.volume_term=true")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fem_reference import unloading
-from fem_reference.contact.balance import Balance, Balanced, Demand
-from fem_reference.contact.large_motion import Steps, pressed, touched, unloaded
+from fem_reference.contact.equilibrium import ContactState, EquilibriumSolver, Increment
+from fem_reference.contact.large_motion import Integrator, contact_body, contact_problem, unloaded
 from fem_reference.elasticity import discretise
 from study.organ.block import block_mesh
 from study.problem.contact import Foundation, ToolPatch
@@ -29,7 +29,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def bare(body):
-    return touched(body, TISSUE, (), np.array([0.0, 1.0]))
+    return contact_body(body, TISSUE, (), np.array([0.0, 1.0]))
 
 
 def weight(body, times):
@@ -63,9 +63,9 @@ def test_the_unloaded_shape_loaded_from_nothing_is_the_given_one(body, bare, tim
     hanging = unloaded(bare, load)
     sag = np.abs(hanging.origin).max()
     begun = np.zeros(len(bare.free))
-    balance, at = Balance(hanging), Balanced(begun, np.zeros(0))
+    solver, at = EquilibriumSolver(hanging), ContactState(begun, np.zeros(0))
     for share in np.linspace(0.0, 1.0, 5)[1:]:
-        at = balance.found(at, Demand(0.0, 0.0, share * load), float(np.linalg.norm(load)))
+        at = solver.solve(at, Increment(0.0, 0.0, share * load), float(np.linalg.norm(load)))
     assert sag > 2e-4 * times
     assert np.abs(hanging.given(at.w)).max() < 1e-5 * sag
 
@@ -73,10 +73,10 @@ def test_the_unloaded_shape_loaded_from_nothing_is_the_given_one(body, bare, tim
 def test_what_is_found_balances_in_the_equations_of_motion(body, bare):
     load = weight(body, 15.0)
     hanging = unloaded(bare, load)
-    given = pressed(
+    given = contact_problem(
         body, TISSUE, (), RayleighDamping(30.0), np.zeros_like, np.array([0.0, 1.0]), load
     )
-    start = Steps(given).start()
+    start = Integrator(given).start()
     assert start.w[: len(load)] == pytest.approx(hanging.origin, abs=1e-9)
 
 

@@ -201,7 +201,7 @@ def test_the_own_error_covers_what_a_finer_mesh_changes():
 
 
 def test_tables_hold_every_comparison(tmp_path):
-    found = [compared(), compared(found=math.nan, note="gives way"), compared(found=20.0)]
+    found = [compared(), compared(found=math.nan, note="unstable"), compared(found=20.0)]
     table.write(found, tmp_path / "v.csv")
     rows = list(csv.DictReader((tmp_path / "v.csv").read_text().splitlines()))
     assert [row["verdict"] for row in rows] == ["agrees", "", "differs"]
@@ -209,7 +209,7 @@ def test_tables_hold_every_comparison(tmp_path):
     records = json.loads(table.as_json(found))["comparisons"]
     assert records[1]["found"] is None
     text = "\n".join(table.lines(found))
-    assert "gives way" in text
+    assert "unstable" in text
     assert "differs" in text
     assert "1 of 2 predictions agree" in text
 

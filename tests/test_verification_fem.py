@@ -9,7 +9,7 @@ from scipy.sparse import block_array, csc_array
 from scipy.special import jv
 
 from fem_reference import dynamics, elasticity, memory
-from fem_reference.contact.finite import Configuration
+from fem_reference.contact.kinematics import Configuration
 from fem_reference.dynamics import Oscillator, march
 from fem_reference.elasticity import discretise
 from fem_reference.grid import straight

@@ -1,4 +1,4 @@
-"""Compiled relaxation of contact forces with Coulomb's friction, block by block."""
+"""Compiled nonlinear Gauss-Seidel iteration for contact forces with Coulomb friction."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ Floats = NDArray[np.float64]
 
 SWEEPS = 20_000
 TOLERANCE = 1e-9
-"""Of the largest change of a force in a sweep, over the largest force."""
+"""Largest change of a force in a sweep, relative to the largest force."""
 LOOKED_AFTER, FALLEN, LEAST_PART = 100, 0.9, 1 / 16
-"""After so many sweeps that leave more than this share of the change, changes are halved, at most
-to a part: where friction is high and couples with the normal forces, whole ones need not settle."""
+"""Sweeps between two checks; a larger remaining share of the change halves the relaxation, to
+LEAST_PART at least: with high friction that couples normal and tangential forces, full relaxation
+need not converge."""
 
 
 @numba.njit(cache=True, error_model="numpy")
-def relaxed(compliance: Floats, offset: Floats, friction: Floats, start: Floats) -> Floats:
-    """Forces [N] (v, 3) that each area's own law is met by, the others being as they are.
+def nonlinear_gauss_seidel(
+    compliance: Floats, offset: Floats, friction: Floats, start: Floats
+) -> Floats:
+    """Forces [N] (v, 3) that meet the law at each contact point, given those at the others.
 
-    Arguments as of `fem_reference.contact.law.dragged`, without areas of infinite gap. An infinite
-    friction stands for an area that is held, which may be pulled too.
+    Arguments as of `fem_reference.contact.law.frictional_forces`, without points of infinite gap.
     """
     count = len(offset)
     force = start.copy()
@@ -35,7 +37,7 @@ def relaxed(compliance: Floats, offset: Floats, friction: Floats, start: Floats)
             k = 3 * i
             own = compliance[k : k + 3, k : k + 3].copy()
             free = gap[k : k + 3] - own @ force[i]
-            new = _of_area(own, free, friction[i], force[i])
+            new = _local_force(own, free, friction[i], force[i])
             change = part * (new - force[i])
             size = np.abs(change).max()
             if size > 0.0:
@@ -53,8 +55,8 @@ def relaxed(compliance: Floats, offset: Floats, friction: Floats, start: Floats)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _of_area(own: Floats, free: Floats, friction: float, before: Floats) -> Any:
-    """Force (3,) of one area whose displacement is free + own force."""
+def _local_force(own: Floats, free: Floats, friction: float, before: Floats) -> Any:
+    """Force (3,) of one contact point with relative displacement free + own force."""
     stuck = np.linalg.solve(own, -free)
     if np.isinf(friction):
         return stuck
@@ -64,7 +66,7 @@ def _of_area(own: Floats, free: Floats, friction: float, before: Floats) -> Any:
     if stuck[0] > 0.0 and np.hypot(stuck[1], stuck[2]) <= friction * stuck[0]:
         return stuck
     found[:] = before
-    # Slip: the tangential force is the projection on the disc of friction of what would stick.
+    # Slip: the tangential force is the projection of the sticking one onto the friction disc.
     stiff = 1.0 / max(own[1, 1], own[2, 2])
     for _ in range(200):
         normal = max(0.0, -(free[0] + own[0, 1] * found[1] + own[0, 2] * found[2]) / own[0, 0])

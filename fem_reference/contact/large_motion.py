@@ -1,10 +1,10 @@
-"""Motion and rest of a neo-Hookean body under rigid tools that are moved, at large strain.
+"""Motion and equilibrium of a neo-Hookean body in contact with moving rigid tools, at large strain.
 
-The motion is stepped by the stiffly accurate diagonally implicit Runge-Kutta method of two stages
-and second order: Alexander (1977), SIAM J. Numer. Anal. 14:1006. Each stage ends with forces that
-keep the vertices out of the tools, and damps what the step cannot follow, so that what an impact
-sets ringing does not last. A step for which no balance is found is halved; where the shortest fails
-too, the motion ends and says when.
+Time integration is by the stiffly accurate, singly diagonally implicit Runge-Kutta method of two
+stages and order 2: Alexander (1977), SIAM J. Numer. Anal. 14:1006. Each stage ends with contact
+forces that satisfy the contact conditions, and damps frequencies that the step does not resolve,
+such as those excited by an impact. A step without an equilibrium is halved; where the shortest
+fails too, the motion ends and reports the time.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.contact.balance import (
-    Balance,
-    Balanced,
-    Demand,
-    TouchedBody,
-    UnbalancedError,
+from fem_reference.contact.equilibrium import (
+    ContactBody,
+    ContactState,
+    EquilibriumSolver,
+    Increment,
+    NoEquilibriumError,
 )
-from fem_reference.contact.finite import Before, Configuration, FiniteContact
+from fem_reference.contact.kinematics import Configuration, FiniteContact, PreviousState
 from fem_reference.contact.patch import Patch, patch
-from fem_reference.direct import symmetric_factors
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
 from fem_reference.observation import at_points
 from fem_reference.recording import Recorder
 from fem_reference.unloading import unload
+from study.numerics.factors import symmetric_factors
 from study.problem.damping import RayleighDamping
 from study.problem.rigid import PLATE, PUNCH, RigidTool
 from study.problem.tissue import Tissue
@@ -46,27 +46,29 @@ Advance = Callable[[float], None]
 
 GAMMA = 1.0 - np.sqrt(0.5)
 POINTWISE = 4.0
-"""Of the shear modulus, the part of lambda [Pa] that keeps each point from collapse: too little to
-lock, as that of a Poisson ratio of 0.4."""
+"""Part of lambda that acts at each integration point, over the shear modulus: enough to prevent
+local collapse, too little to lock, as that of a Poisson ratio of 0.4."""
 HALVINGS = 6
-"""How often a step, or an increment of a way, may be halved."""
+"""How often a step, or an increment of a static path, may be halved."""
 MARGIN = 0.5
-"""Round what a tool would meet of the surface at rest, over its radius, of a plate its travel."""
+"""Margin of the patch around a tool, relative to its radius, for a plate to its travel."""
 WAY = 8
-"""Stations on the way of tools with friction or an edge to a rest."""
+"""Static increments on the path of tools with friction or an edge."""
 LOOKS, MOST_LOOKS = 32, 1000
-"""Places of a tool on its way at which the surface is looked at."""
+"""Least and largest number of positions of a tool on its path at which the patch is determined."""
 SHORTLY = 1e-3
-"""Of a stage's length, over which the speed of a tool at its end is seen."""
+"""Interval, relative to a stage, over which the velocity of a tool at its end is measured."""
 FARTHEST = 0.5
-"""Share of its radius that a tool may move in a step: it must not pass through a surface unseen."""
+"""Largest travel of a tool in a step, relative to its radius, so that it cannot pass a surface."""
 
 
-def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Floats) -> TouchedBody:
-    """A body without stress, where tools may touch it on their way at times [s].
+def contact_body(
+    body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Floats
+) -> ContactBody:
+    """The stress-free body with the surface that tools may touch on their paths at times [s].
 
-    ValueError for a tool that meets nothing or cannot be followed, or a Poisson ratio at which no
-    pressure carries the volume.
+    ValueError for a tool that touches nothing or moves too fast, or a Poisson ratio without a mixed
+    formulation.
     """
     mixed = on_nodes(body.nodes, tissue, body.support, body.composition)
     solid = replace(mixed, pointwise=np.minimum(POINTWISE * mixed.shear, 0.5 * mixed.lame))
@@ -75,11 +77,11 @@ def touched(body: Body, tissue: Tissue, tools: Sequence[RigidTool], times: Float
     if body.fixed is not None:
         free[: solid.size] = ~body.fixed
     contact = FiniteContact(tuple(patches), solid.size)
-    return TouchedBody(solid, contact, body.mass, free, np.zeros(solid.size))
+    return ContactBody(solid, contact, body.mass, free, np.zeros(solid.size))
 
 
 def _patch(body: Body, tool: RigidTool, times: Floats) -> Patch:
-    """What a tool may touch, of a punch also what is round it, which may be drawn under it."""
+    """The patch of a tool; that of a punch is wider, as tissue may be drawn under it."""
     wide = tool
     if tool.shape == PUNCH and not tool.bonded:
         wide = replace(tool, radius=(1.0 + MARGIN) * tool.radius)
@@ -88,7 +90,7 @@ def _patch(body: Body, tool: RigidTool, times: Floats) -> Patch:
 
 
 def _looked(tool: RigidTool, times: Floats) -> Floats:
-    """Times [s] between which a tool moves by no more than a share of its radius."""
+    """Times [s] between which a tool moves by a share of its radius at most."""
     way = np.linalg.norm(np.diff(tool.travel(times), axis=0), axis=1).sum()
     count = LOOKS if tool.shape == PLATE else max(LOOKS, int(way / (FARTHEST * tool.radius)))
     return np.linspace(times[0], times[-1], min(count, MOST_LOOKS) + 1)
@@ -101,11 +103,11 @@ def _margin(tool: RigidTool, times: Floats) -> float:
 
 
 def linear_rest(body: Body, tissue: Tissue) -> Floats:
-    """Displacement [m] (n,) at rest under all loads in full, if it were small and no tool there.
+    """Static displacement [m] (n,) under all loads in full, without tools, at small strain.
 
-    ValueError if nothing holds the body.
+    ValueError if the support does not hold the body.
     """
-    bare = touched(body, tissue, (), np.zeros(1))
+    bare = contact_body(body, tissue, (), np.zeros(1))
     load, w = np.zeros(len(bare.free)), np.zeros(len(bare.free))
     load[: bare.solid.size] = body.whole_load
     factors = symmetric_factors(csc_array(bare.solid.linear()[bare.free][:, bare.free]))
@@ -115,55 +117,55 @@ def linear_rest(body: Body, tissue: Tissue) -> Floats:
     return w[: bare.solid.size]
 
 
-class Moving(NamedTuple):
-    """State at a time [s]: w, velocity v [m/s] (n,) and forces [N] (c,) under the tools.
+class MotionState(NamedTuple):
+    """State at a time [s]: w, velocity v [m/s] (n,) and contact forces [N] (c,).
 
-    `before`: the state from which it was found, if any.
+    `previous`: the state from which it was found, if any.
     """
 
     time: float
     w: Floats
     v: Floats
     force: Floats
-    before: Before | None = None
+    previous: PreviousState | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
-    """A body under tools, with all else that acts on it: `load` [N] (n,) at a time [s].
+class ContactProblem:
+    """A body under tools and a `load` [N] (n,) that depends on the time [s].
 
-    `dead` [N] (n,) is the part of it that acts at all times; `drag` [1/s]: damping over mass.
+    `dead` [N] (n,): the constant part of the load; `damping_rate` [1/s]: damping over mass.
     """
 
-    body: TouchedBody
+    body: ContactBody
     load: Callable[[float], Floats]
     dead: Floats
-    drag: float
+    damping_rate: float
 
     @property
-    def nothing(self) -> Balanced:
-        """Without stress."""
-        return Balanced(np.zeros(len(self.body.free)), np.zeros(len(self.body.contact.held)))
+    def stress_free(self) -> ContactState:
+        """The stress-free state without contact forces."""
+        return ContactState(np.zeros(len(self.body.free)), np.zeros(len(self.body.contact.bonded)))
 
-    def energy(self, state: Moving) -> float:
-        """Kinetic and stored [J]."""
+    def energy(self, state: MotionState) -> float:
+        """Kinetic and strain energy [J]."""
         kinetic = 0.5 * float(state.v @ (self.body.mass @ state.v))
         return kinetic + self.body.solid.energy(state.w)
 
-    def met(self, state: Moving) -> Configuration:
-        """Where the body and the tools are."""
-        return self.body.contact.at(self.body.given(state.w), state.time, state.before)
+    def configuration(self, state: MotionState) -> Configuration:
+        """Positions of body and tools in a state."""
+        return self.body.contact.at(self.body.given(state.w), state.time, state.previous)
 
-    def on_tools(self, state: Moving) -> Floats:
-        """Forces [N] (tools, 3)."""
-        return self.met(state).on_tools(state.force)
+    def tool_forces(self, state: MotionState) -> Floats:
+        """Force [N] (tools, 3) of the body on each tool."""
+        return self.configuration(state).tool_forces(state.force)
 
-    def since(self, state: Moving) -> Before:
-        """The state, as that from which the next is found."""
-        return Before(self.body.given(state.w), state.time)
+    def as_previous(self, state: MotionState) -> PreviousState:
+        """The state as the reference of the next one."""
+        return PreviousState(self.body.given(state.w), state.time)
 
 
-def pressed(
+def contact_problem(
     body: Body,
     tissue: Tissue,
     tools: Sequence[RigidTool],
@@ -171,13 +173,14 @@ def pressed(
     factors: Factors,
     times: Floats,
     borne: Floats | None = None,
-) -> Pressed:
-    """A body under tools and loads; `borne` [N] (n,): forces at rest under which it is as given.
+) -> ContactProblem:
+    """A body under tools and loads.
 
-    ValueError as of `touched`, and for damping by stiffness; UnfinishedError as of `unloaded`.
+    `borne` [N] (n,): load under which the given shape is in equilibrium. ValueError as of
+    `contact_body`, and for stiffness-proportional damping; UnfinishedError as of `unloaded`.
     """
     refuse(damping, tissue)
-    free = touched(body, tissue, tools, times)
+    free = contact_body(body, tissue, tools, times)
     dead = np.zeros(free.solid.size) if body.dead is None else body.dead
     if borne is not None:
         free, dead = unloaded(free, borne), dead + borne
@@ -186,11 +189,11 @@ def pressed(
     def load(time: float) -> Floats:
         return np.asarray(dead + loads @ np.atleast_1d(factors(np.array([time]))[0]))
 
-    return Pressed(free, load, dead, damping.mass)
+    return ContactProblem(free, load, dead, damping.mass)
 
 
 def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
-    """ValueError for damping or tissue that a motion at large strain cannot have."""
+    """ValueError for damping or tissue without a formulation at large strain."""
     if damping.stiffness > 0.0:
         raise ValueError(
             "damping.stiffness: at large strain damping goes by mass only; set it to 0, or leave "
@@ -203,131 +206,134 @@ def refuse(damping: RayleighDamping, tissue: Tissue) -> None:
         )
 
 
-def unloaded(body: TouchedBody, load: Floats) -> TouchedBody:
-    """The body without stress that a load [N] (n,) deforms into the given shape.
+def unloaded(body: ContactBody, load: Floats) -> ContactBody:
+    """The stress-free body that a load [N] (n,) deforms into the given shape.
 
-    UnfinishedError where none is found (`fem_reference.unloading`).
+    UnfinishedError if none is found (`fem_reference.unloading`).
     """
     found, n = unload(body.solid, load, body.free), body.solid.size
     if found.reached < 1.0:
         part = f", but for {100.0 * found.reached:.2g} % of the load" if found.reached else ""
         raise UnfinishedError(
-            "gravity.given: no shape without load is found from which the organ would sag into the "
-            f"given one{part}",
+            "gravity.given: no stress-free shape is found that gravity deforms into the given one"
+            f"{part}",
             'reduce gravity.acceleration, or set gravity.given to "unloaded"',
         )
     return replace(body, solid=relieved(body.solid, found.back), origin=-found.back[:n])
 
 
-class Steps:
-    """Implicit steps of a body under tools."""
+class Integrator:
+    """Time steps and static equilibria of a body in contact."""
 
-    def __init__(self, pressed: Pressed) -> None:
-        self.pressed, self.balance = pressed, Balance(pressed.body)
+    def __init__(self, problem: ContactProblem) -> None:
+        self.problem, self.solver = problem, EquilibriumSolver(problem.body)
 
-    def at_rest(self, start: Moving, time: float, load: Floats) -> Moving:
-        """The rest at a time [s] under a load [N] (n,), which grows from that of a rest before.
+    def equilibrium(self, start: MotionState, time: float, load: Floats) -> MotionState:
+        """The equilibrium at a time [s] under a load [N] (n,), from one before.
 
-        The tools are brought there on their way. UnbalancedError where the way ends before.
+        Tools and load move there together, in increments. NoEquilibriumError if the path ends
+        before.
         """
-        begun = self.pressed.body.solid.gradient(start.w)[: len(load)]
-        begun -= self._pushes(start)
+        begun = self.problem.body.solid.gradient(start.w)[: len(load)]
+        begun -= self._contact_forces(start)
 
-        def demand(share: float) -> Demand:
+        def increment(share: float) -> Increment:
             at = start.time + share * (time - start.time)
-            since = self.pressed.since(now)
-            return Demand(at, 0.0, begun + share * (load - begun), since)
+            reference = self.problem.as_previous(now)
+            return Increment(at, 0.0, begun + share * (load - begun), reference)
 
         share, goal, now = 0.0, 1.0, start
         scale = float(np.linalg.norm(load))
         while share < 1.0:
             try:
-                self._refuse_far(now.time, demand(goal).time)
-                found = self._kept_out(Balanced(now.w, now.force), demand(goal), scale)
-            except UnbalancedError:
+                self._refuse_long_travel(now.time, increment(goal).time)
+                found = self._equilibrium(ContactState(now.w, now.force), increment(goal), scale)
+            except NoEquilibriumError:
                 goal = 0.5 * (share + goal)
                 if goal - share < 0.5**HALVINGS:
                     raise
                 continue
-            asked = demand(goal)
+            asked = increment(goal)
             still = np.zeros_like(now.v)
-            now = Moving(asked.time, found.w, still, found.force, asked.before)
+            now = MotionState(asked.time, found.w, still, found.force, asked.previous)
             share, goal = goal, 1.0
         return now
 
-    def _kept_out(self, guess: Balanced, demand: Demand, scale: float) -> Balanced:
-        """The state that balances; an UnbalancedError if a tool has gone through the surface."""
-        found, body = self.balance.found(guess, demand, scale), self.pressed.body
-        if body.met(found.w, demand).through:
-            raise UnbalancedError("a tool has gone through the surface")
+    def _equilibrium(self, guess: ContactState, increment: Increment, scale: float) -> ContactState:
+        """The equilibrium of an increment; NoEquilibriumError if a tool has passed through."""
+        found, body = self.solver.solve(guess, increment, scale), self.problem.body
+        if body.configuration(found.w, increment).passed_through:
+            raise NoEquilibriumError("a tool has gone through the surface")
         return found
 
-    def _pushes(self, state: Moving) -> Floats:
+    def _contact_forces(self, state: MotionState) -> Floats:
         """Nodal forces [N] (n,) of the tools."""
-        return np.asarray(self.pressed.met(state).derivative.T @ state.force)
+        return np.asarray(self.problem.configuration(state).derivative.T @ state.force)
 
-    def start(self) -> Moving:
-        """At rest under what acts at all times, with the tools where they start."""
-        pressed, n = self.pressed, self.pressed.body.solid.size
-        w = np.zeros(len(pressed.body.free))
-        w[:n] = pressed.body.origin
-        begun = Moving(0.0, w, np.zeros(n), pressed.nothing.force)
-        return self.at_rest(begun, 0.0, pressed.dead)
+    def start(self) -> MotionState:
+        """Equilibrium under the constant load, with the tools at their start."""
+        problem, n = self.problem, self.problem.body.solid.size
+        w = np.zeros(len(problem.body.free))
+        w[:n] = problem.body.origin
+        begun = MotionState(0.0, w, np.zeros(n), problem.stress_free.force)
+        return self.equilibrium(begun, 0.0, problem.dead)
 
-    def peak(self, time: float, load: Floats) -> Moving:
-        """At rest with the tools where they are at a time [s], under a load [N] (n,).
+    def peak_equilibrium(self, time: float, load: Floats) -> MotionState:
+        """Equilibrium with the tools at their places of a time [s], under a load [N] (n,).
 
-        What rubs, or has an edge, is followed there by stations on its way.
+        With friction, or a punch, the path there is followed in increments.
         """
-        now, contact = self.start(), self.pressed.body.contact
+        now, contact = self.start(), self.problem.body.contact
         edged = any(one.tool.shape == PUNCH for one in contact.patches)
-        stations = WAY if contact.rubs or edged else 1
-        begun = self.pressed.dead
+        stations = WAY if contact.frictional or edged else 1
+        begun = self.problem.dead
         for share in np.arange(1, stations + 1) / stations:
-            now = self.at_rest(now, share * time, begun + share * (load - begun))
+            now = self.equilibrium(now, share * time, begun + share * (load - begun))
         return now
 
-    def march(self, start: Moving, step: float) -> Iterator[Moving]:
-        """States from a start on, a step [s] apart; ends with an UnbalancedError if it must."""
-        before, now = start, start
+    def march(self, start: MotionState, step: float) -> Iterator[MotionState]:
+        """States one `step` [s] apart; NoEquilibriumError where the motion ends."""
+        previous, now = start, start
         yield now
         for k in range(1, 2**62):
             goal = start.time + k * step
-            before, now = now, self._to(goal, now, before, HALVINGS)
+            previous, now = now, self._to(goal, now, previous, HALVINGS)
             yield now
 
-    def _to(self, goal: float, now: Moving, before: Moving, halvings: int) -> Moving:
-        """One step to a time [s], or where it fails two of half the length."""
+    def _to(
+        self, goal: float, now: MotionState, previous: MotionState, halvings: int
+    ) -> MotionState:
+        """One step to a time [s], or two of half the length if it fails."""
         try:
-            self._refuse_far(now.time, goal)
-            return self._step(goal, now, before)
-        except UnbalancedError:
+            self._refuse_long_travel(now.time, goal)
+            return self._step(goal, now, previous)
+        except NoEquilibriumError:
             if halvings == 0:
                 raise
-        middle = self._to(0.5 * (now.time + goal), now, before, halvings - 1)
+        middle = self._to(0.5 * (now.time + goal), now, previous, halvings - 1)
         return self._to(goal, middle, now, halvings - 1)
 
-    def _refuse_far(self, begun: float, time: float) -> None:
-        """UnbalancedError for a tool that moves too far at once."""
-        for tool in (one.tool for one in self.pressed.body.contact.patches):
+    def _refuse_long_travel(self, begun: float, time: float) -> None:
+        """NoEquilibriumError for a tool that moves too far in one step."""
+        for tool in (one.tool for one in self.problem.body.contact.patches):
             away = np.linalg.norm(np.diff(tool.travel(np.array([begun, time])), axis=0))
             if tool.shape != PLATE and away > FARTHEST * tool.radius:
-                raise UnbalancedError("a tool moves too far in a step")
+                raise NoEquilibriumError("a tool moves too far in a step")
 
-    def _step(self, goal: float, now: Moving, before: Moving) -> Moving:
+    def _step(self, goal: float, now: MotionState, previous: MotionState) -> MotionState:
         step = goal - now.time
-        length, n = GAMMA * step, self.pressed.body.solid.size
-        guess = _onward(before, now, now.time + length)
-        since = self.pressed.since(now)
-        first = self._stage(now.time + length, length, now.w[:n], now.v, guess, since)
+        length, n = GAMMA * step, self.problem.body.solid.size
+        guess = _extrapolated(previous, now, now.time + length)
+        reference = self.problem.as_previous(now)
+        first = self._stage(now.time + length, length, now.w[:n], now.v, guess, reference)
         acceleration = (first.v - now.v) / length
         rest = step - length
-        guess = _onward(now, first, goal)
+        guess = _extrapolated(now, first, goal)
         base = now.w[:n] + rest * first.v
-        since = self.pressed.since(first)
-        last = self._stage(goal, length, base, now.v + rest * acceleration, guess, since)
-        state, demand = Balanced(last.w, last.force), Demand(goal, 0.0, base, since)
-        v = self.balance.in_touch(state, last.v, demand, goal - SHORTLY * length)
+        reference = self.problem.as_previous(first)
+        last = self._stage(goal, length, base, now.v + rest * acceleration, guess, reference)
+        state, increment = ContactState(last.w, last.force), Increment(goal, 0.0, base, reference)
+        v = self.solver.compatible_velocity(state, last.v, increment, goal - SHORTLY * length)
         return last._replace(v=v)
 
     def _stage(
@@ -336,45 +342,45 @@ class Steps:
         length: float,
         place: Floats,
         speed: Floats,
-        guess: Balanced,
-        since: Before,
-    ) -> Moving:
-        """The state at the end of a stage [s], from what it starts from and a guess."""
-        body, n = self.pressed.body, self.pressed.body.solid.size
-        inertia = 1.0 / length**2 + self.pressed.drag / length
-        given = self.pressed.load(time)
+        guess: ContactState,
+        previous: PreviousState,
+    ) -> MotionState:
+        """The state at the end of a stage of a `length` [s], from its start values and a guess."""
+        body, n = self.problem.body, self.problem.body.solid.size
+        inertia = 1.0 / length**2 + self.problem.damping_rate / length
+        given = self.problem.load(time)
         load = given + body.mass @ (inertia * place + speed / length)
         if body.solid.volume_ratio(guess.w).min() <= 0.0:
-            raise UnbalancedError("elements would turn inside out")
+            raise NoEquilibriumError("the start of the iteration inverts an element")
         scale = float(np.linalg.norm(given))
-        found = self._kept_out(guess, Demand(time, inertia, load, since), scale)
-        return Moving(time, found.w, (found.w[:n] - place) / length, found.force, since)
+        found = self._equilibrium(guess, Increment(time, inertia, load, previous), scale)
+        return MotionState(time, found.w, (found.w[:n] - place) / length, found.force, previous)
 
 
-def _onward(before: Moving, now: Moving, time: float) -> Balanced:
-    """A guess at a time [s], on the line through two states."""
-    if now.time <= before.time:
-        return Balanced(now.w, now.force)
-    share = (time - now.time) / (now.time - before.time)
-    return Balanced(now.w + share * (now.w - before.w), now.force)
+def _extrapolated(previous: MotionState, now: MotionState, time: float) -> ContactState:
+    """Linear extrapolation of two states to a time [s], with the contact forces of the last."""
+    if now.time <= previous.time:
+        return ContactState(now.w, now.force)
+    share = (time - now.time) / (now.time - previous.time)
+    return ContactState(now.w + share * (now.w - previous.w), now.force)
 
 
 @dataclass(frozen=True, eq=False)
 class LargeSolution:
-    """A motion and what it took: `iterations` of Newton's method, and how often it `factored`.
+    """A motion with its cost: numbers of Newton `iterations` and `factorisations`, `wall` [s].
 
-    `states` at the samples, as many as were reached. `largest_strain`: largest absolute principal
-    logarithmic strain in the kept frames, `smallest_volume`: smallest J there. `penetration` [m]:
-    how deep any point of the surface was inside a tool at a sample, and `overlooked` [m]: of what
-    no patch sees; `vertices` that tools may touch; `wall` [s].
+    `states` at the samples that were reached. `largest_strain`: largest absolute principal
+    logarithmic strain in the recorded frames, `smallest_volume`: smallest J there. `penetration`
+    [m]: largest penetration of a contact point at a sample, `overlooked` [m]: of the surface
+    outside the patches in the recorded frames. `vertices`: number that tools may touch.
     """
 
     trajectory: Trajectory
-    states: tuple[Moving, ...]
+    states: tuple[MotionState, ...]
     step: float
     steps: int
     iterations: int
-    factored: int
+    factorisations: int
     largest_strain: float
     smallest_volume: float
     penetration: float
@@ -385,60 +391,63 @@ class LargeSolution:
 
 def run(
     body: Body,
-    pressed: Pressed,
+    problem: ContactProblem,
     observation: Observation,
     per_sample: int,
     advance: Advance = lambda _: None,
 ) -> LargeSolution:
-    """Motion from rest under loads and tools, by so many steps from sample to sample."""
+    """Motion from rest under loads and tools, with `per_sample` steps between samples."""
     started, times = clock.perf_counter(), observation.times
-    recorder = Recorder(body, observation, None, len(pressed.body.contact.patches))
+    recorder = Recorder(body, observation, None, len(problem.body.contact.patches))
     step = float(times[1] - times[0]) / per_sample
-    steps, states = Steps(pressed), list[Moving]()
+    steps, states = Integrator(problem), list[MotionState]()
     lost: float | None = None
     try:
         for n, state in enumerate(steps.march(steps.start(), step)):
             if n % per_sample == 0:
-                _record(recorder, pressed, len(states), state)
+                _record(recorder, problem, len(states), state)
                 states.append(state)
                 advance(len(states) / len(times))
             if len(states) == len(times):
                 break
-    except UnbalancedError:
+    except NoEquilibriumError:
         lost = float(times[len(states)])
     trajectory = recorder.trajectory
     if lost is not None:
         trajectory = replace(trajectory, status="diverged", ended_at=lost)
     kept = [states[k] for k in set(observation.frames) if k < len(states)]
-    gradients = [pressed.body.solid.deformation(one.w) for one in kept]
-    contact, given = pressed.body.contact, pressed.body.given
-    deepest = max((pressed.met(one).penetration for one in states), default=0.0)
+    gradients = [problem.body.solid.deformation(one.w) for one in kept]
+    contact, given = problem.body.contact, problem.body.given
+    deepest = max((problem.configuration(one).penetration for one in states), default=0.0)
     return LargeSolution(
         trajectory,
         tuple(states),
         step,
         (len(times) - 1) * per_sample,
-        steps.balance.iterations,
-        steps.balance.factored,
+        steps.solver.iterations,
+        steps.solver.factorisations,
         max(map(largest_log_strain, gradients), default=0.0),
         min((float(np.linalg.det(F).min()) for F in gradients), default=1.0),
         deepest,
-        max((_beside(body, contact, given(one.w), one.time) for one in kept), default=0.0),
+        max(
+            (_unseen_penetration(body, contact, given(one.w), one.time) for one in kept),
+            default=0.0,
+        ),
         sum(one.count for one in contact.patches),
         clock.perf_counter() - started,
     )
 
 
-def _record(recorder: Recorder, pressed: Pressed, sample: int, state: Moving) -> None:
-    u = pressed.body.given(state.w)
+def _record(recorder: Recorder, problem: ContactProblem, sample: int, state: MotionState) -> None:
+    u = problem.body.given(state.w)
     points = recorder.at_probes
     recorder.motion(sample, at_points(points, u), at_points(points, state.v))
-    recorder.trajectory.tool_force[sample] = pressed.on_tools(state)
+    recorder.trajectory.tool_force[sample] = problem.tool_forces(state)
     recorder.field(sample, u)
 
 
-def _beside(body: Body, contact: FiniteContact, u: Floats, time: float) -> float:
-    """How deep [m] surface nodes that no patch sees are inside a tool that slides."""
+def _unseen_penetration(body: Body, contact: FiniteContact, u: Floats, time: float) -> float:
+    """Largest penetration [m] of surface nodes outside the patches into a tool not bonded."""
     boundary = body.nodes.get_dofs(body.nodes.mesh.boundary_facets()).flatten()  # scikit-fem's
     deepest = 0.0
     for one, seen in zip(contact.patches, contact.nodes, strict=True):

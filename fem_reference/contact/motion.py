@@ -18,9 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fem_reference.contact.linear import ContactNotConvergedError, ContactSolution, SurfaceResponse
 from fem_reference.contact.outcome import ContactOutcome
-from fem_reference.contact.reduction import Answered, Factors, Reduced, answered, krylov, reduced
-from fem_reference.contact.touch import Answer, Grip, UnsettledError
+from fem_reference.contact.reduction import (
+    ContactResponse,
+    Factors,
+    ReducedBody,
+    contact_response,
+    krylov,
+    reduced,
+)
 from fem_reference.direct import Solve
 from fem_reference.elasticity import Body
 from fem_reference.model import Advance, Method, Solution, start_of
@@ -45,11 +52,11 @@ TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
+class MotionState:
     """State at a time [s].
 
     `q`, `v` (m,): modal displacement and velocity; `r`, `s` (c + k,): contact forces [N] and load
-    factors as delayed by damping in the static residuals, and their rates [N/s, 1/s]; `grip`:
+    factors as delayed by damping in the static residuals, and their rates [N/s, 1/s]; `solution`:
     contact forces.
     """
 
@@ -58,7 +65,7 @@ class Moving:
     v: Floats
     r: Floats
     s: Floats
-    grip: Grip
+    solution: ContactSolution
 
 
 class Stages:
@@ -69,15 +76,15 @@ class Stages:
 
     def __init__(
         self,
-        given: Answered,
-        body: Reduced,
+        given: ContactResponse,
+        body: ReducedBody,
         damping: RayleighDamping,
         factors: Factors,
         base: Floats,
         length: float,
     ) -> None:
         self.given, self.body, self.factors, self.length = given, body, factors, length
-        unknowns = given.touch.unknowns
+        unknowns = given.contact.unknowns
         self.base, self.shapes = base[unknowns], body.shapes[unknowns]
         self.residual = body.residual[unknowns]
         self.damped = 1.0 / (
@@ -86,39 +93,41 @@ class Stages:
             + length**2 * body.squares
         )
         self.delay = damping.stiffness / (damping.stiffness + length)
-        lever = (self.shapes * (length**2 * self.damped)) @ body.pushed.T
-        self.under_tools = len(body.pushed)
-        self.lever = lever + (1.0 - self.delay) * self.residual[:, : self.under_tools]
-        compliance = np.asarray(given.touch.means @ self.lever)
+        influence = (self.shapes * (length**2 * self.damped)) @ body.contact_modes.T
+        self.under_tools = len(body.contact_modes)
+        self.influence = influence + (1.0 - self.delay) * self.residual[:, : self.under_tools]
+        compliance = np.asarray(given.contact.means @ self.influence)
         self.compliance = 0.5 * (compliance + compliance.T)
 
     def loaded(self, time: float) -> Floats:
         """Factors (k,) of the loads at a time [s]."""
         return np.atleast_1d(self.factors(np.array([time]))[0])
 
-    def reached(self, time: float, q: Floats, v: Floats, r: Floats, grip: Grip) -> Moving:
+    def reached(
+        self, time: float, q: Floats, v: Floats, r: Floats, solution: ContactSolution
+    ) -> MotionState:
         """State at the end of a stage at a time [s], from its start values and the last forces."""
         body, length, count = self.body, self.length, self.under_tools
         loaded = self.loaded(time)
         free = (v + length * (body.loads @ loaded - body.squares * q)) * self.damped
-        dented = self.delay * r
-        dented[count:] += (1.0 - self.delay) * loaded
-        base = self.base + self.shapes @ (q + length * free) + self.residual @ dented
-        answer = Answer(base, self.lever, self.compliance)
-        found = self.given.touch.settled(answer, grip, time)
-        speed = free + length * self.damped * (body.pushed.T @ found.force)
-        dented[:count] += (1.0 - self.delay) * found.force
-        rate = (dented - r) / length
-        return Moving(time, q + length * speed, speed, dented, rate, found)
+        delayed = self.delay * r
+        delayed[count:] += (1.0 - self.delay) * loaded
+        base = self.base + self.shapes @ (q + length * free) + self.residual @ delayed
+        response = SurfaceResponse(base, self.influence, self.compliance)
+        found = self.given.contact.solve(response, solution, time)
+        speed = free + length * self.damped * (body.contact_modes.T @ found.force)
+        delayed[:count] += (1.0 - self.delay) * found.force
+        rate = (delayed - r) / length
+        return MotionState(time, q + length * speed, speed, delayed, rate, found)
 
 
-def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
+def march(stages: Stages, start: MotionState, step: float) -> Iterator[MotionState]:
     """States from a start at rest, one `step` [s] apart."""
     now = start
     yield now
     for n in range(1, 2**62):
         begun = (n - 1) * step
-        first = stages.reached(begun + GAMMA * step, now.q, now.v, now.r, now.grip)
+        first = stages.reached(begun + GAMMA * step, now.q, now.v, now.r, now.solution)
         rest = (1.0 - GAMMA) * step
         acceleration = (first.v - now.v) / stages.length
         now = stages.reached(
@@ -126,7 +135,7 @@ def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
             now.q + rest * first.v,
             now.v + rest * acceleration,
             now.r + rest * first.s,
-            first.grip,
+            first.solution,
         )
         yield now
 
@@ -135,23 +144,23 @@ def march(stages: Stages, start: Moving, step: float) -> Iterator[Moving]:
 class Sampled:
     """States at the samples, and the time [s] at which contact did not converge, if any."""
 
-    states: tuple[Moving, ...]
-    unsettled: float | None
+    states: tuple[MotionState, ...]
+    not_converged_at: float | None
 
-    def curves(self, body: Reduced, recorder: Recorder) -> ProbeCurves:
+    def curves(self, body: ReducedBody, recorder: Recorder) -> ProbeCurves:
         """Displacement and velocity of the control points."""
         matrix = recorder.at_probes
-        modes, dents = (_seen(matrix, one) for one in (body.shapes, body.residual))
+        modes, residuals = (_seen(matrix, one) for one in (body.shapes, body.residual))
         pairs = [((one.q, one.r), (one.v, one.s)) for one in self.states]
         curves = [
-            np.array([modes @ a + dents @ b for a, b in (pair[k] for pair in pairs)])
+            np.array([modes @ a + residuals @ b for a, b in (pair[k] for pair in pairs)])
             for k in range(2)
         ]
         return ProbeCurves(*curves)
 
-    def forces(self, given: Answered) -> Floats:
+    def forces(self, given: ContactResponse) -> Floats:
         """Forces [N] (samples, tools, 3) on the tools."""
-        return np.array([given.touch.on_tools(one.grip.force) for one in self.states])
+        return np.array([given.contact.tool_forces(one.solution.force) for one in self.states])
 
 
 def _seen(matrix: csr_array, vectors: Floats) -> Floats:
@@ -162,10 +171,10 @@ def _seen(matrix: csr_array, vectors: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class ContactProblem:
     """A motion in contact: body, damping, load factors, static displacement, samples and steps."""
 
-    given: Answered
+    given: ContactResponse
     damping: RayleighDamping
     factors: Factors
     base: Floats
@@ -182,21 +191,21 @@ class Pressed:
         """Nyquist angular frequency [1/s] of the samples."""
         return float(np.pi / (self.times[1] - self.times[0]))
 
-    def start(self, body: Reduced) -> Moving:
+    def start(self, body: ReducedBody) -> MotionState:
         """Equilibrium under the dead load with the tools at their start."""
-        grip = self.given.at_rest(self.base, self.given.free, np.zeros(1))
-        q = (body.pushed.T @ grip.force) / body.squares
-        dented = np.append(grip.force, np.zeros(self.given.body.loads.shape[1]))
-        return Moving(0.0, q, np.zeros_like(q), dented, np.zeros_like(dented), grip)
+        solution = self.given.at_rest(self.base, self.given.free, np.zeros(1))
+        q = (body.contact_modes.T @ solution.force) / body.squares
+        delayed = np.append(solution.force, np.zeros(self.given.body.loads.shape[1]))
+        return MotionState(0.0, q, np.zeros_like(q), delayed, np.zeros_like(delayed), solution)
 
-    def stages(self, body: Reduced) -> Stages:
+    def stages(self, body: ReducedBody) -> Stages:
         """The implicit stages of this motion."""
         length = GAMMA * self.step
         return Stages(self.given, body, self.damping, self.factors, self.base, length)
 
-    def sampled(self, body: Reduced, advance: Advance) -> Sampled:
+    def sampled(self, body: ReducedBody, advance: Advance) -> Sampled:
         """States of the motion in a reduced basis at the samples."""
-        states: list[Moving] = []
+        states: list[MotionState] = []
         count = len(self.times)
         steps = march(self.stages(body), self.start(body), self.step)
         try:
@@ -204,7 +213,7 @@ class Pressed:
                 if n % self.per_sample == 0:
                     states.append(state)
                     advance(len(states) / count)
-        except UnsettledError:
+        except ContactNotConvergedError:
             return Sampled(tuple(states), float(self.times[len(states)]))
         return Sampled(tuple(states), None)
 
@@ -227,23 +236,23 @@ def run(
     recorder = Recorder(body, observation, start, len(tools))
     base = recorder.start
     peak = float(times[observation.frames[0]])
-    given = answered(body, tools, times, base, peak)
-    pressed = Pressed(given, damping, factors, base, times, steps_per_sample(method, times))
-    chosen, found, change = _enough(pressed, recorder, advance)
-    outcome = _outcome(pressed, chosen, found, change, _rest(pressed, chosen, found, peak))
-    _record(recorder, pressed, chosen, found)
+    given = contact_response(body, tools, times, base, peak)
+    problem = ContactProblem(given, damping, factors, base, times, steps_per_sample(method, times))
+    chosen, found, change = _enough(problem, recorder, advance)
+    outcome = _outcome(problem, chosen, found, change, _rest(problem, chosen, found, peak))
+    _record(recorder, problem, chosen, found)
     sizes = body.node_count, len(body.mesh.tetrahedra), body.element
-    steps = (len(times) - 1) * pressed.per_sample
+    steps = (len(times) - 1) * problem.per_sample
     return Solution(
         _trajectory(recorder, found),
         *sizes,
-        pressed.step,
+        problem.step,
         steps,
         clock.perf_counter() - started,
         recorder.strain,
         recorder.rotation,
         start=start,
-        moving=lambda sample: _state(pressed, chosen, found.states[sample]),
+        moving=lambda sample: _state(problem, chosen, found.states[sample]),
         contact=outcome,
     )
 
@@ -256,128 +265,141 @@ def steps_per_sample(method: Method, times: Floats) -> int:
 
 
 def _enough(
-    pressed: Pressed, recorder: Recorder, advance: Advance
-) -> tuple[Reduced, Sampled, tuple[CurveChange, Floats]]:
+    problem: ContactProblem, recorder: Recorder, advance: Advance
+) -> tuple[ReducedBody, Sampled, tuple[CurveChange, Floats]]:
     """The motion in a converged subspace, and its change by the last quarter of the vectors."""
     generations = GENERATIONS
     while True:
-        space = krylov(pressed.given, generations)
-        whole = reduced(pressed.given, space, pressed.highest)
-        found = pressed.sampled(whole, advance)
-        change = _change(pressed, space, whole, found, recorder)
+        space = krylov(problem.given, generations)
+        whole = reduced(problem.given, space, problem.highest)
+        found = problem.sampled(whole, advance)
+        change = _change(problem, space, whole, found, recorder)
         good = change[0].displacement < GOOD and change[1].max(initial=0.0) < GOOD
-        if good or generations >= MOST_GENERATIONS or found.unsettled is not None:
+        if good or generations >= MOST_GENERATIONS or found.not_converged_at is not None:
             return whole, found, change
         generations += GENERATIONS
 
 
 def _change(
-    pressed: Pressed, space: Subspace, whole: Reduced, found: Sampled, recorder: Recorder
+    problem: ContactProblem, space: Subspace, whole: ReducedBody, found: Sampled, recorder: Recorder
 ) -> tuple[CurveChange, Floats]:
     """Relative change of curves and tool forces by the last quarter of vectors and frequencies."""
-    less = reduced(pressed.given, space.leading(fewer(space.load.size)), LESS * pressed.highest)
-    other = pressed.sampled(less, lambda _: None)
+    less = reduced(problem.given, space.leading(fewer(space.load.size)), LESS * problem.highest)
+    other = problem.sampled(less, lambda _: None)
     count = min(len(found.states), len(other.states))
     curves = [
         ProbeCurves(*(curve[:count] for curve in one.curves(body, recorder)))
         for one, body in ((found, whole), (other, less))
     ]
-    a, b = (one.forces(pressed.given)[:count] for one in (found, other))
+    a, b = (one.forces(problem.given)[:count] for one in (found, other))
     sizes = np.maximum(np.linalg.norm(a, axis=(0, 2)), TINY)
     return curve_change(curves[0], curves[1]), np.linalg.norm(a - b, axis=(0, 2)) / sizes
 
 
-def _state(pressed: Pressed, body: Reduced, state: Moving) -> tuple[Floats, Floats]:
+def _state(problem: ContactProblem, body: ReducedBody, state: MotionState) -> tuple[Floats, Floats]:
     """Displacement from the given shape [m] and velocity [m/s] (n,) of all unknowns."""
-    moved = pressed.base + body.shapes @ state.q + body.residual @ state.r
+    moved = problem.base + body.shapes @ state.q + body.residual @ state.r
     return moved, body.shapes @ state.v + body.residual @ state.s
 
 
-def _record(recorder: Recorder, pressed: Pressed, body: Reduced, found: Sampled) -> None:
+def _record(recorder: Recorder, problem: ContactProblem, body: ReducedBody, found: Sampled) -> None:
     """Record the motion; strain also where a control point is farthest out."""
     curves = found.curves(body, recorder)
     for sample, (u, v) in enumerate(zip(*curves, strict=True)):
         recorder.motion(sample, u, v)
-    forces = found.forces(pressed.given)
+    forces = found.forces(problem.given)
     recorder.trajectory.tool_force[: len(forces)] = forces
     farthest = int(np.linalg.norm(curves.displacement, axis=2).max(axis=1).argmax())
     for sample in {*recorder.observation.frames, farthest}:
         if sample < len(found.states):
-            u = _state(pressed, body, found.states[sample])[0] - pressed.base
+            u = _state(problem, body, found.states[sample])[0] - problem.base
             recorder.field(sample, u)
             recorder.look(u)
 
 
 def _trajectory(recorder: Recorder, found: Sampled) -> Trajectory:
-    if found.unsettled is None:
+    if found.not_converged_at is None:
         return recorder.trajectory
-    return replace(recorder.trajectory, status="diverged", ended_at=found.unsettled)
+    return replace(recorder.trajectory, status="diverged", ended_at=found.not_converged_at)
 
 
 def _outcome(
-    pressed: Pressed,
-    body: Reduced,
+    problem: ContactProblem,
+    body: ReducedBody,
     found: Sampled,
     change: tuple[CurveChange, Floats],
-    rest: AtPeak,
+    rest: PeakEquilibrium,
 ) -> ContactOutcome:
-    touch, unknowns = pressed.given.touch, pressed.given.touch.unknowns
+    contact, unknowns = problem.given.contact, problem.given.contact.unknowns
     deepest = max(
-        touch.penetration(_state(pressed, body, one)[0][unknowns], one.time) for one in found.states
+        contact.penetration(_state(problem, body, one)[0][unknowns], one.time)
+        for one in found.states
     )
-    vertices = sum(one.count for one in touch.patches)
+    vertices = sum(one.count for one in contact.patches)
     return ContactOutcome(
-        vertices, body.size, *change, deepest, rest.displacement, rest.pushes, found.unsettled
+        vertices,
+        body.size,
+        *change,
+        deepest,
+        rest.displacement,
+        rest.nodal_forces,
+        found.not_converged_at,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class AtPeak:
+class PeakEquilibrium:
     """Static equilibrium with the tools at the peak and all loads in full.
 
-    `displacement` [m] (n,); `pushes` [N] (tools, n): nodal forces; `forces` [N] (tools, 3) on the
-    tools; `solve`: solver of the body.
+    `displacement` [m] (n,); `nodal_forces` [N] (tools, n) of the tools; `forces` [N] (tools, 3) on
+    the tools; `solve`: solver of the body.
     """
 
     displacement: Floats
-    pushes: Floats
+    nodal_forces: Floats
     forces: Floats
     solve: Solve
 
 
-def at_peak(body: Body, tools: tuple[RigidTool, ...], observation: Observation) -> AtPeak:
+def at_peak(body: Body, tools: tuple[RigidTool, ...], observation: Observation) -> PeakEquilibrium:
     """Static equilibrium of a body at the peak. ValueError for a tool that touches nothing."""
     base = Recorder(body, observation, start_of(body)).start
     peak = float(observation.times[observation.frames[0]])
-    return _at_rest(answered(body, tools, observation.times, base, peak), base, peak)
+    return _at_rest(contact_response(body, tools, observation.times, base, peak), base, peak)
 
 
-def _at_rest(given: Answered, base: Floats, peak: float) -> AtPeak:
-    loaded, touch = base + _under_loads(given), given.touch
+def _at_rest(given: ContactResponse, base: Floats, peak: float) -> PeakEquilibrium:
+    loaded, contact = base + _under_loads(given), given.contact
     way = np.linspace(0.0, peak, WAY) if peak > 0.0 else np.zeros(1)
-    grip = given.at_rest(loaded, given.free, way)
-    pushes = []
-    for part in touch.slices:
-        own = np.zeros_like(grip.force)
-        own[part] = grip.force[part]
-        pushes.append(touch.pushes @ own)
-    found = given.moved(loaded, grip)
-    return AtPeak(found, np.array(pushes), touch.on_tools(grip.force), given.solve)
+    solution = given.at_rest(loaded, given.free, way)
+    nodal_forces = []
+    for part in contact.slices:
+        own = np.zeros_like(solution.force)
+        own[part] = solution.force[part]
+        nodal_forces.append(contact.nodal_forces @ own)
+    found = given.moved(loaded, solution)
+    return PeakEquilibrium(
+        found, np.array(nodal_forces), contact.tool_forces(solution.force), given.solve
+    )
 
 
-def _rest(pressed: Pressed, body: Reduced, found: Sampled, peak: float) -> AtPeak:
+def _rest(
+    problem: ContactProblem, body: ReducedBody, found: Sampled, peak: float
+) -> PeakEquilibrium:
     """Equilibrium at the peak; without convergence, the state of the motion there or the last."""
-    given, touch = pressed.given, pressed.given.touch
+    given, contact = problem.given, problem.given.contact
     try:
-        return _at_rest(given, pressed.base, peak)
-    except UnsettledError:
+        return _at_rest(given, problem.base, peak)
+    except ContactNotConvergedError:
         state = next((one for one in found.states if one.time >= peak), found.states[-1])
-        pushes = np.zeros((len(touch.patches), len(pressed.base)))
-        moved = _state(pressed, body, state)[0]
-        return AtPeak(moved, pushes, touch.on_tools(state.grip.force), given.solve)
+        nodal_forces = np.zeros((len(contact.patches), len(problem.base)))
+        moved = _state(problem, body, state)[0]
+        return PeakEquilibrium(
+            moved, nodal_forces, contact.tool_forces(state.solution.force), given.solve
+        )
 
 
-def _under_loads(given: Answered) -> Floats:
+def _under_loads(given: ContactResponse) -> Floats:
     """Static displacement [m] (n,) under all loads in full, without tools and dead load."""
     whole = given.body.full_load
     return given.solve(whole) if whole.any() else np.zeros_like(whole)

@@ -18,9 +18,9 @@ class ContactOutcome:
 
     `truncation`: relative change of the curves by the last quarter of the `vectors`;
     `force_truncation` (tools,): that of the tool forces. `penetration` [m]: largest penetration at
-    a sample. `at_rest` [m] (n,): static displacement with the tools at the peak, and `pushes` [N]
-    (tools, n): their nodal forces there. `unsettled` [s]: time at which the contact iteration did
-    not converge, None if it always did.
+    a sample. `at_rest` [m] (n,): static displacement with the tools at the peak, and `nodal_forces`
+    [N] (tools, n): their nodal forces there. `not_converged_at` [s]: time at which the contact
+    iteration did not converge, None if it always did.
     """
 
     vertices: int
@@ -29,5 +29,5 @@ class ContactOutcome:
     force_truncation: Floats
     penetration: float
     at_rest: Floats
-    pushes: Floats
-    unsettled: float | None = None
+    nodal_forces: Floats
+    not_converged_at: float | None = None

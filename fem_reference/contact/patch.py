@@ -68,7 +68,7 @@ class Patch:
         """Nodal forces (nodes, v) of a unit force at each vertex; transposed, weighted means."""
         return csr_array((self.shares @ self.shapes).T)
 
-    def seeing(self, nodes: Ints) -> Patch:
+    def restricted_to(self, nodes: Ints) -> Patch:
         """The patch restricted to these nodes, which include all with support on the surface."""
         first, second = (csr_array(one[:, nodes]) for one in self.along)
         return replace(self, shapes=csr_array(self.shapes[:, nodes]), along=(first, second))

@@ -19,8 +19,13 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
+from fem_reference.contact.linear import (
+    ContactNotConvergedError,
+    ContactSolution,
+    LinearContact,
+    SurfaceResponse,
+)
 from fem_reference.contact.patch import patch
-from fem_reference.contact.touch import Answer, Grip, Touch, UnsettledError
 from fem_reference.direct import Solve
 from fem_reference.elasticity import Body
 from fem_reference.memory import factors_fit
@@ -51,23 +56,23 @@ is dependent."""
 
 
 @dataclass(frozen=True, eq=False)
-class Answered:
+class ContactResponse:
     """Static response [m/N] (n, c) of a body to unit contact forces, and its solver."""
 
     body: Body
-    touch: Touch
+    contact: LinearContact
     solve: Solve
-    answers: Floats
+    responses: Floats
 
     @cached_property
-    def lever(self) -> Floats:
+    def influence(self) -> Floats:
         """Response [m/N] (3 s, c) of the surface nodes."""
-        return self.answers[self.touch.unknowns]
+        return self.responses[self.contact.unknowns]
 
     @cached_property
     def compliance(self) -> Floats:
         """Response [m/N] (c, c) in the weighted means at the vertices."""
-        found = np.asarray(self.touch.means @ self.lever)
+        found = np.asarray(self.contact.means @ self.influence)
         return np.asarray(0.5 * (found + found.T))
 
     @cached_property
@@ -76,31 +81,35 @@ class Answered:
         loads = self.body.loads.T
         return np.column_stack([self.solve(one) if one.any() else one for one in loads])
 
-    def at_rest(self, displacement: Floats, start: Grip, times: Floats) -> Grip:
+    def at_rest(
+        self, displacement: Floats, start: ContactSolution, times: Floats
+    ) -> ContactSolution:
         """Static contact forces at the last of times [s] along the path of the tools.
 
         `displacement` [m] (n,): static displacement without tools, under all other loads.
         """
-        answer = Answer(displacement[self.touch.unknowns], self.lever, self.compliance)
-        grip = start
+        response = SurfaceResponse(
+            displacement[self.contact.unknowns], self.influence, self.compliance
+        )
+        solution = start
         for time in times:
-            grip = self.touch.settled(answer, grip, float(time))
-        return grip
+            solution = self.contact.solve(response, solution, float(time))
+        return solution
 
-    def moved(self, displacement: Floats, grip: Grip) -> Floats:
+    def moved(self, displacement: Floats, solution: ContactSolution) -> Floats:
         """Displacement [m] (n,) with contact forces added."""
-        return np.asarray(displacement + self.answers @ grip.force)
+        return np.asarray(displacement + self.responses @ solution.force)
 
     @property
-    def free(self) -> Grip:
+    def free(self) -> ContactSolution:
         """Zero contact forces at time zero."""
-        count = self.answers.shape[1]
-        return Grip(np.zeros(count), np.zeros(count), 0.0)
+        count = self.responses.shape[1]
+        return ContactSolution(np.zeros(count), np.zeros(count), 0.0)
 
 
-def answered(
+def contact_response(
     body: Body, tools: tuple[RigidTool, ...], times: Floats, displacement: Floats, peak: float
-) -> Answered:
+) -> ContactResponse:
     """The static response of a body to contact with tools on their paths at times [s].
 
     `displacement` [m] (n,): displacement without tools; `peak` [s]: time at which the surface
@@ -112,17 +121,17 @@ def answered(
     looked = np.unique(np.append(looked, [times[-1], peak]))
     for k in range(WIDENED + 1):
         patches = [patch(body, one, looked, 2.0**k * _margin(one, times)) for one in tools]
-        touch = Touch.of(patches)
-        columns = touch.pushes.shape[1]
+        contact = LinearContact.of(patches)
+        columns = contact.nodal_forces.shape[1]
         _refuse_many(sum(one.count for one in patches))
         solve = solve or _solver(body, columns)
-        found = Answered(body, touch, solve, _solved(solve, touch.pushes))
+        found = ContactResponse(body, contact, solve, _solved(solve, contact.nodal_forces))
         way = np.linspace(0.0, peak, 9)
         try:
-            grip = found.at_rest(displacement, found.free, way if peak > 0.0 else way[:1])
-        except UnsettledError:
+            solution = found.at_rest(displacement, found.free, way if peak > 0.0 else way[:1])
+        except ContactNotConvergedError:
             break  # the motion will end where this happens
-        deep = _beside(body, touch, found.moved(displacement, grip), peak)
+        deep = _beside(body, contact, found.moved(displacement, solution), peak)
         if deep <= OVERLOOKED * max(map(_travelled, tools, [times] * len(tools))):
             break
     return found
@@ -159,17 +168,17 @@ def _solved(solve: Solve, loads: csr_array) -> Floats:
     return np.column_stack([solve(rows[[k]].toarray().ravel()) for k in range(rows.shape[0])])
 
 
-def _beside(body: Body, touch: Touch, displacement: Floats, time: float) -> float:
+def _beside(body: Body, contact: LinearContact, displacement: Floats, time: float) -> float:
     """Largest penetration [m] of surface nodes outside all patches into a tool not bonded."""
     boundary = np.unique(
         body.nodes.get_dofs(body.nodes.mesh.boundary_facets()).flatten()  # scikit-fem's
     )
-    others = np.setdiff1d(boundary, touch.nodes)
+    others = np.setdiff1d(boundary, contact.nodes)
     moved = (body.points + displacement.reshape(-1, 3))[others]
     return max(
         (
             float(max(0.0, -one.tool.gap(moved, time)[0].min(initial=np.inf)))
-            for one in touch.patches
+            for one in contact.patches
             if not one.tool.bonded
         ),
         default=0.0,
@@ -177,17 +186,17 @@ def _beside(body: Body, touch: Touch, displacement: Floats, time: float) -> floa
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
+class ReducedBody:
     """A body in the modes of a subspace, with the static residuals outside it.
 
-    `squares` [1/s^2] (m,) and `shapes` (n, m) of the modes; `pushed` (c, m): their weighted mean
-    displacements at the vertices; `loads` (m, k): modal loads; `residual` (n, c + k): static
+    `squares` [1/s^2] (m,) and `shapes` (n, m) of the modes; `contact_modes` (c, m): their weighted
+    mean displacements at the vertices; `loads` (m, k): modal loads; `residual` (n, c + k): static
     response outside the subspace to contact forces [m/N], then to the loads [m].
     """
 
     squares: Floats
     shapes: Floats
-    pushed: Floats
+    contact_modes: Floats
     loads: Floats
     residual: Floats
 
@@ -197,7 +206,7 @@ class Reduced:
         return len(self.squares)
 
 
-def krylov(given: Answered, generations: int) -> Subspace:
+def krylov(given: ContactResponse, generations: int) -> Subspace:
     """Block Krylov space of loads and contact force patterns, with so many blocks."""
     body = given.body
     block = np.column_stack([*_of_loads(given), _patterns(given)])
@@ -213,15 +222,15 @@ def krylov(given: Answered, generations: int) -> Subspace:
     return found
 
 
-def _of_loads(given: Answered) -> list[Floats]:
-    return [answer for answer in given.of_loads.T if answer.any()]
+def _of_loads(given: ContactResponse) -> list[Floats]:
+    return [response for response in given.of_loads.T if response.any()]
 
 
-def _patterns(given: Answered) -> Floats:
+def _patterns(given: ContactResponse) -> Floats:
     """Static responses (n, r) to the force patterns of each tool that move most of the mass."""
     found = []
-    for part in given.touch.slices:
-        own = given.answers[:, part]
+    for part in given.contact.slices:
+        own = given.responses[:, part]
         sizes, weights = np.linalg.eigh(own.T @ (given.body.mass @ own))
         best = [k for k in range(len(sizes))[::-1] if sizes[k] > LEAST_PATTERN**2 * sizes[-1]]
         found.append(own @ weights[:, best[:PATTERNS]])
@@ -235,7 +244,7 @@ def _with(body: Body, found: Subspace, vector: Floats) -> Subspace:
     return found if norms[0] <= INSIDE**2 * norms[1] else extended(body, found, vector)
 
 
-def reduced(given: Answered, subspace: Subspace, highest: float) -> Reduced:
+def reduced(given: ContactResponse, subspace: Subspace, highest: float) -> ReducedBody:
     """The body in the modes of a subspace up to the `highest` angular frequency [1/s].
 
     Modes above it respond statically, like the part outside the subspace. At least one mode is
@@ -244,11 +253,11 @@ def reduced(given: Answered, subspace: Subspace, highest: float) -> Reduced:
     squares, modes = eigh(subspace.stiffness)
     kept = max(1, int(np.searchsorted(squares, highest**2)))
     squares, shapes = squares[:kept], subspace.vectors @ modes[:, :kept]
-    pushed = np.asarray(given.touch.pushes.T @ shapes)
+    contact_modes = np.asarray(given.contact.nodal_forces.T @ shapes)
     loads = shapes.T @ given.body.loads
-    answers = np.column_stack([given.answers, given.of_loads])
-    residual = answers - (shapes / squares) @ np.vstack([pushed, loads.T]).T
-    return Reduced(squares, shapes, pushed, loads, residual)
+    responses = np.column_stack([given.responses, given.of_loads])
+    residual = responses - (shapes / squares) @ np.vstack([contact_modes, loads.T]).T
+    return ReducedBody(squares, shapes, contact_modes, loads, residual)
 
 
 Factors = Callable[[Floats], Floats]

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from fem_reference import model as fem
 from fem_reference.contact import large_motion
-from fem_reference.contact.large_motion import LargeSolution, Pressed, Steps, linear_rest
+from fem_reference.contact.large_motion import (
+    ContactProblem,
+    Integrator,
+    LargeSolution,
+    linear_rest,
+)
 from fem_reference.contact.outcome import ContactOutcome
 from fem_reference.elasticity import Body, without_fixed
 from fem_reference.memory import refuse_too_large
@@ -129,7 +134,7 @@ class PreparedHyperelastic:
         """The body on a mesh. ValueError if it is not held or touched."""
         return self._linear.body(level)
 
-    def pressed(self, body: Body) -> Pressed:
+    def contact_problem(self, body: Body) -> ContactProblem:
         """With the tools and loads of the problem."""
         problem, borne = self.problem, None
         if problem.given_loaded and problem.gravity.any():
@@ -137,7 +142,7 @@ class PreparedHyperelastic:
             borne = without_fixed(body.nodal_mass * gravity, body.fixed)
         times = problem.observation.times
         given = (problem.tissue, problem.rigid_tools, self.model.linear.damping)
-        return large_motion.pressed(body, *given, problem.factors, times, borne)
+        return large_motion.contact_problem(body, *given, problem.factors, times, borne)
 
     def simulate(self, longest: float | None = None) -> Simulation:
         """The motion on the model's own mesh, by its own steps, those of its rate or equal ones."""
@@ -147,7 +152,7 @@ class PreparedHyperelastic:
         if longest is not None:
             every = whole_steps(float(times[1] - times[0]), longest)
         body = self.body(self.level())
-        found = large_motion.run(body, self.pressed(body), self.problem.observation, every)
+        found = large_motion.run(body, self.contact_problem(body), self.problem.observation, every)
         return Simulation(found.trajectory, found.step, largest_strain=found.largest_strain)
 
     @property
@@ -163,10 +168,10 @@ class PreparedHyperelastic:
         return at_points(evaluation(body, problem.observation.volume_points), u)
 
     def stepper(self) -> Stepper:
-        """Steps at the rate, each to a balance of forces."""
+        """Steps at the rate, each to an equilibrium."""
         body, step = self.body(self.level()), 1.0 / (self.model.rate or FRAME_RATE)
-        pressed = self.pressed(body)
-        steps = Steps(pressed)
+        contact = self.contact_problem(body)
+        steps = Integrator(contact)
         states = steps.march(steps.start(), step)
         now = [next(states)]
 
@@ -174,9 +179,9 @@ class PreparedHyperelastic:
             now[0] = next(states)
 
         def displacement() -> Floats:
-            return pressed.body.given(now[0].w).reshape(-1, 3)
+            return contact.body.given(now[0].w).reshape(-1, 3)
 
-        return Stepper(take_step, displacement, step, len(pressed.body.free))
+        return Stepper(take_step, displacement, step, len(contact.body.free))
 
     def run(self, watch: Watch) -> ModelRun:
         """The motion on two meshes, on the coarser also by steps twice as long."""
@@ -185,27 +190,27 @@ class PreparedHyperelastic:
         for below in COARSER:
             level = self.level(below)
             body = self.body(level)
-            pressed = self.pressed(body)
-            found = self._moved(body, pressed, self.problem.observation, progress)
+            contact = self.contact_problem(body)
+            found = self._moved(body, contact, self.problem.observation, progress)
             if not solved:
-                errors, force_steps = self._by_steps(body, pressed, found.trajectory, progress)
+                errors, force_steps = self._by_steps(body, contact, found.trajectory, progress)
             solved = [*(one.outlined for one in solved), self._solution(level, body, found)]
         self.best = solved[-1]
         record = self._record(solved, errors, force_steps)
         checks = tuple(step_checks(name, errors)) if errors else ()
-        self._keep_fields(body, pressed, found, watch)
+        self._keep_fields(body, contact, found, watch)
         return ModelRun(found.trajectory, record, checks, tuple(self._of_overlooked(found)))
 
     def _moved(
-        self, body: Body, pressed: Pressed, seen: Observation, progress: Progress
+        self, body: Body, contact: ContactProblem, seen: Observation, progress: Progress
     ) -> LargeSolution:
         text = f"{self.model.name}: {len(body.mesh.tetrahedra)} tetrahedra"
         doubled = seen is not self.problem.observation
         with progress.stage(text + (", doubled steps" if doubled else "")) as advance:
-            return large_motion.run(body, pressed, seen, self._per_sample, advance)
+            return large_motion.run(body, contact, seen, self._per_sample, advance)
 
     def _by_steps(
-        self, body: Body, pressed: Pressed, found: Trajectory, progress: Progress
+        self, body: Body, contact: ContactProblem, found: Trajectory, progress: Progress
     ) -> tuple[dict[str, CurveErrors], Floats]:
         """Errors of curves and of the tools' forces (tools,) by the steps; none if it diverged.
 
@@ -216,7 +221,7 @@ class PreparedHyperelastic:
         if found.status != "finished" or len(seen.times) < FEWEST:
             return {}, np.zeros(0)
         thinned = replace(seen, times=seen.times[::2], frames=(0,))
-        other = self._moved(body, pressed, thinned, progress).trajectory
+        other = self._moved(body, contact, thinned, progress).trajectory
         if other.status != "finished":
             return {}, np.zeros(0)
         own = replace(
@@ -271,12 +276,12 @@ class PreparedHyperelastic:
         return model_record(model.name, model.label, self.problem, damping, best, errors, elements)
 
     def _keep_fields(
-        self, body: Body, pressed: Pressed, found: LargeSolution, watch: Watch
+        self, body: Body, contact: ContactProblem, found: LargeSolution, watch: Watch
     ) -> None:
         """Write the motion of the vertices if requested."""
         mesh, times = body.mesh, self.problem.observation.times
         states = (
-            [x.reshape(-1, 3)[: len(mesh.points)] for x in (pressed.body.given(state.w), state.v)]
+            [x.reshape(-1, 3)[: len(mesh.points)] for x in (contact.body.given(state.w), state.v)]
             for state in found.states
         )
         shown = Mesh(mesh.points, mesh.tetrahedra)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fem_reference.contact.linear import ContactNotConvergedError
 from fem_reference.contact.motion import at_peak
-from fem_reference.contact.touch import UnsettledError
 from fem_reference.dynamics import ORDER
 from fem_reference.elasticity import Body
 from fem_reference.error_estimate import discretisation_error, graded_error
@@ -72,11 +72,11 @@ def contact_errors(problem: Problem, body: Body) -> Floats:
     """
     try:
         found = at_peak(body, problem.rigid_tools, problem.observation)
-    except UnsettledError:  # the motion ends before, and what is fine makes no difference
+    except ContactNotConvergedError:  # the motion ends before, and what is fine makes no difference
         return np.asarray(body.nodes.dx.sum(axis=1))
     u = found.displacement
     seen = evaluation(body, problem.observation.probes)
-    goals = [push for push in found.pushes if abs(push @ u) > 0.0]
+    goals = [push for push in found.nodal_forces if abs(push @ u) > 0.0]
     goals += [
         np.outer(row.toarray().ravel(), moved / np.linalg.norm(moved)).ravel()
         for row, moved in zip(seen, at_points(seen, u), strict=True)

@@ -89,7 +89,7 @@ def _large_displacements(
     """Effect of large displacements [m] (p, 3), and the error [m] (p,) that remains."""
     if coarse.nonlinear is None or fine.nonlinear is None:
         raise ValueError(
-            "the lattice finds no rest under the full load; reduce tool.force or enlarge "
+            "the lattice finds no equilibrium under the full load; reduce tool.force or enlarge "
             "tool.radius"
         )
     before, change = (

@@ -18,7 +18,6 @@ growth     ours alone, parts of the job as the mesh is refined, and the process'
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import shutil
@@ -46,6 +45,7 @@ from study.scene import Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.benchmarks.machine import machine
+from tests.benchmarks.tables import cells, write
 from tests.oracles.calculix import PROGRAM as CCX
 from tests.oracles.calculix import version as release
 
@@ -265,21 +265,11 @@ def peak_memory() -> float:
     return float(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024.0
 
 
-def write(rows: list[Row]) -> None:
-    """Write the table, and print it."""
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
-        for line in rows:
-            cells = [f"{v:.4g}" if isinstance(v, float) else v for v in line]
-            table.writerow(cells)
-            sys.stdout.write("  ".join(str(cell) for cell in cells[:-1]) + "\n")
-
-
 def main() -> None:
     """Print the figures and write the table."""
     felupe = sys.argv[1] if len(sys.argv) > 1 else None
-    write([*assembly(felupe), *jobs(), *growth()])
+    for row in write(TABLE, [*assembly(felupe), *jobs(), *growth()]):
+        sys.stdout.write("  ".join(map(str, cells(row)[:-1])) + "\n")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,6 @@ better use by another run.
 
 from __future__ import annotations
 
-import csv
 import subprocess
 import sys
 import tempfile
@@ -29,7 +28,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +50,7 @@ from msm.timestep import LOOK
 from msm.volume import volume_term
 from study.models.damping import nodal_damping
 from study.scene.file import read_scene
-from tests.benchmarks import field_error, grid_in_c
+from tests.benchmarks import field_error, grid_in_c, tables
 from tests.benchmarks.machine import load, machine
 
 Floats = NDArray[np.float64]
@@ -59,6 +58,7 @@ Ints = NDArray[np.int64]
 
 TABLE = Path(__file__).parents[2] / "reports" / "data" / "real_time.csv"
 KERNELS = TABLE.with_name("lattice_kernels.csv")
+DIGITS = 6
 RATIOS = (0.45, 0.49)
 SPACINGS = (0.012, 0.010, 0.008, 0.02 / 3, 0.005)
 KERNEL_SPACINGS = (0.010, 0.02 / 3, 0.005)
@@ -402,35 +402,12 @@ def static_errors(
 
 def read() -> list[Row]:
     """Rows of the table against real time as written."""
-    with TABLE.open(newline="", encoding="utf-8") as file:
-        return [Row(**_parsed(line, {"nodes", "springs"})) for line in csv.DictReader(file)]
+    return tables.read(TABLE, Row)
 
 
 def read_kernels() -> list[Kernel]:
     """Rows of the table of kernels as written."""
-    with KERNELS.open(newline="", encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
-    return [
-        Kernel(**_parsed(line, {"nodes", "springs", "lanes"}))._replace(
-            volume_term=line["volume_term"] == "True"
-        )
-        for line in lines
-    ]
-
-
-def _parsed(line: dict[str, str], whole: set[str]) -> dict[str, Any]:
-    words = {"machine", "kernel", "volume_term"}
-    kinds = {name: str if name in words else int if name in whole else float for name in line}
-    return {name: kinds[name](text) for name, text in line.items()}
-
-
-def write(path: Path, rows: Sequence[Row] | Sequence[Kernel]) -> None:
-    """Write a table."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(rows[0]._fields)
-        for line in rows:
-            table.writerow(f"{v:.6g}" if isinstance(v, float) else v for v in line)
+    return tables.read(KERNELS, Kernel)
 
 
 def main() -> None:
@@ -438,8 +415,8 @@ def main() -> None:
     case = field_error.liver()
     found = all_kernels(case)
     report_kernels(found)
-    write(KERNELS, found)
-    write(TABLE, real_time(case))
+    tables.write(KERNELS, found, DIGITS)
+    tables.write(TABLE, real_time(case), DIGITS)
 
 
 if __name__ == "__main__":

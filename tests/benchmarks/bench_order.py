@@ -9,7 +9,6 @@ Orders of nodes matter only to the list of springs, as a grid has its own.
 
 from __future__ import annotations
 
-import csv
 import resource
 import subprocess
 import sys
@@ -34,6 +33,7 @@ from tests.benchmarks.bench_lattice import (
     stepping,
 )
 from tests.benchmarks.machine import load, machine
+from tests.benchmarks.tables import cells, write
 
 Ints = NDArray[np.int64]
 
@@ -152,20 +152,10 @@ def latency() -> dict[str, Timing]:
     return {name: found[name] / count for name, count in counts.items()}
 
 
-def write(found: list[Row]) -> None:
-    """Write the table, and print it."""
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
-        for line in found:
-            cells = [f"{v:.4g}" if isinstance(v, float) else v for v in line]
-            table.writerow(cells)
-            sys.stdout.write("  ".join(map(str, cells[:-2])) + "\n")
-
-
 def main() -> None:
     """Print the figures and write the table."""
-    write([*growth(), *orders(ORDERED)])
+    for row in write(TABLE, [*growth(), *orders(ORDERED)]):
+        sys.stdout.write("  ".join(map(str, cells(row)[:-2])) + "\n")
     for name, step in latency().items():
         sys.stdout.write(f"One step of {LATENCY_NODES} nodes, {name}: {1e6 * step.least:.0f} us\n")
 

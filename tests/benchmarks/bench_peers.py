@@ -18,7 +18,6 @@ finite elements.
 
 from __future__ import annotations
 
-import csv
 import sys
 import time
 from collections.abc import Iterator
@@ -37,6 +36,7 @@ from tests.benchmarks.bench_lattice import in_turns
 from tests.benchmarks.contender import FRACTION, LOAD, Contender, block, lattice
 from tests.benchmarks.converged import Converged
 from tests.benchmarks.machine import load, machine
+from tests.benchmarks.tables import write
 
 Floats = NDArray[np.float64]
 ReferenceSolution = tuple[Converged, Floats, Floats]
@@ -177,13 +177,7 @@ def main() -> None:
             sys.stdout.write(f"{name} is not installed and is left out: pip install {name}\n")
     case = field_error.block()
     truths = {nu: field_error.reference(case, nu) for nu in (0.25, 0.45)}
-    with TABLE.open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
-        for spacing in SPACINGS:
-            for line in measured(case, spacing, truths):
-                table.writerow(f"{v:.4g}" if isinstance(v, float) else v for v in line)
-                file.flush()
+    write(TABLE, (line for spacing in SPACINGS for line in measured(case, spacing, truths)))
 
 
 if __name__ == "__main__":

@@ -12,9 +12,8 @@ know nothing of springs.
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2_of_curves
 from study.system.progress import Silent
 from tests.benchmarks.corrected_places import TABLE as PLACES
-from tests.benchmarks.corrected_places import written
+from tests.benchmarks.tables import complete
 
 Floats = NDArray[np.float64]
 
@@ -125,28 +124,10 @@ def _neo_hooke(scene: Scene) -> tuple[Floats, dict[str, float]]:
     return ran.trajectory.displacement, {k: one.displacement for k, one in found.by_probe.items()}
 
 
-def kept() -> list[Row]:
-    """Rows of the table that are there."""
-    if not TABLE.exists():
-        return []
-    with TABLE.open(encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
-    texts = {"scene", "probe"}
-    return [
-        Row(**{k: v if k in texts else float(v) for k, v in one.items()})  # type: ignore[arg-type]
-        for one in lines
-    ]
-
-
 def main() -> None:
     """Write what is missing of the table."""
-    found = kept()
-    for name in SCENES:
-        if name not in {one.scene for one in found}:
-            found += rows(name)
-            written(TABLE, found)
-            sys.stdout.write(f"{name}\n")
-            sys.stdout.flush()
+    tasks = {name: partial(rows, name) for name in SCENES}
+    complete(TABLE, Row, tasks, lambda one: one.scene)
 
 
 if __name__ == "__main__":

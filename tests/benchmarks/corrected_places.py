@@ -14,7 +14,6 @@ both, and, as `own`, with the finest lattice, which has an error of the linear p
 
 from __future__ import annotations
 
-import csv
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -41,6 +40,7 @@ from study.sweep.store import Store
 from study.sweep.task import Task
 from study.tradeoff.timing import in_turns
 from tests.benchmarks.corrected_runs import FUNCTION, LEVEL, SAMPLES, SPACINGS, scene
+from tests.benchmarks.tables import write
 
 Floats = NDArray[np.float64]
 
@@ -303,18 +303,6 @@ def cost(
     return Cost(*named, one.unknowns, one.step, *walls, field, tool)
 
 
-def written(path: Path, rows: Sequence[NamedTuple]) -> None:
-    """A table of named tuples."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(type(rows[0])._fields)
-        table.writerows([_printed(v) for v in one] for one in rows)
-
-
-def _printed(value: object) -> object:
-    return f"{value:.4g}" if isinstance(value, float) else value
-
-
 def summary(rows: Sequence[Row]) -> Iterator[str]:
     """What the table says, in lines; `docs.figures` holds it against the costs."""
     for name, of in groups(rows):
@@ -350,14 +338,14 @@ def main(folder: str | None = None, places: str = str(PLACES)) -> None:
     """Run what is missing and write its table, or that of costs, and print what it says."""
     if folder is None:
         priced = costs()
-        written(COSTS, priced)
+        write(COSTS, priced)
         for cost in priced:
             sys.stdout.write(f"{cost}\n")
         return
     with on_stderr("places") as tell:
         outcomes = run(tasks(int(places)), Store(Path(folder)), None, tell)
     rows = [row(at) for at in observed(outcomes)]
-    written(TABLE, rows)
+    write(TABLE, rows)
     for line in summary(rows):
         sys.stdout.write(line + "\n")
 

@@ -9,7 +9,6 @@ finer than the one judged; it takes some minutes.
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterator
 from itertools import groupby
@@ -25,6 +24,7 @@ from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.system.progress import Silent
+from tests.benchmarks.tables import write
 
 Floats = NDArray[np.float64]
 
@@ -120,15 +120,7 @@ def _order(observed: float | None) -> float:
 
 def main() -> None:
     """Write the table, and print how often the truth was within."""
-    found = []
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
-        for name in SCENES:
-            for row in rows(name):
-                table.writerow(f"{v:.4g}" if isinstance(v, float) else v for v in row)
-                found.append(row)
-            file.flush()
+    found = write(TABLE, (row for name in SCENES for row in rows(name)))
     for level, group in groupby(sorted(found, key=lambda r: r.level), key=lambda r: r.level):
         ratios = [row.true / row.stated for row in group]
         within = sum(ratio <= 1.0 for ratio in ratios)

@@ -10,7 +10,6 @@ that are given are judged too. It takes some minutes a shape.
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,6 +28,7 @@ from study.run.suiting import read_suited
 from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.system.progress import Silent
+from tests.benchmarks.tables import write
 from tests.mesh_samples import ellipsoid_surface, torus, write_surface
 
 Floats = NDArray[np.float64]
@@ -75,6 +75,7 @@ SHAPES = {
 
 def rows(shape: str, path: Path, unit: str) -> Iterator[Row]:
     """Of one organ, on each graded mesh that has two coarser ones and two finer ones."""
+    sys.stdout.write(f"{shape}\n")
     overrides = (f"organ.mesh={path}", f"organ.unit={unit}", 'models=["fem"]')
     scene = read_suited("liver", overrides)
     problem = problem_of(scene)
@@ -113,22 +114,14 @@ def _solved(prepared: PreparedElements) -> list[MeshSolution]:
 
 def main() -> None:
     """Write the table, and print how often the truth was within."""
-    found: list[Row] = []
     files = zip(sys.argv[1::2], sys.argv[2::2], strict=True)
     given = [(Path(one).stem, Path(one), unit) for one, unit in files]
-    with TemporaryDirectory() as folder, TABLE.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
+    with TemporaryDirectory() as folder:
         for n, (name, surface) in enumerate(SHAPES.items()):
             path = Path(folder) / f"{n}.obj"
             write_surface(path, surface.points, surface.triangles)
             given.insert(n, (name, path, "m"))
-        for shape in given:
-            sys.stdout.write(f"{shape[0]}\n")
-            for row in rows(*shape):
-                table.writerow(f"{v:.4g}" if isinstance(v, float) else v for v in row)
-                found.append(row)
-            file.flush()
+        found = write(TABLE, (row for shape in given for row in rows(*shape)))
     ratios = [row.true / row.stated for row in found]
     sys.stdout.write(
         f"{sum(ratio <= 1.0 for ratio in ratios)} of {len(ratios)} within, true over stated at "

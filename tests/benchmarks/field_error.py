@@ -8,7 +8,6 @@ few minutes.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +35,7 @@ from study.problem.tissue import Tissue
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from study.similarity.fields import best_factor, relative_l2
+from tests.benchmarks import tables
 from tests.benchmarks.converged import Converged, converged
 
 Floats = NDArray[np.float64]
@@ -196,27 +196,19 @@ def order(spacings: list[float], errors: list[float]) -> float:
 
 def read() -> list[Row]:
     """Rows of the table as written."""
-    with TABLE.open(newline="") as file:
-        return [_parsed(line) for line in csv.DictReader(file)]
+    return tables.read(TABLE, Row)
 
 
-def _parsed(line: dict[str, str]) -> Row:
-    body, nu, volume, spacing, nodes, *numbers = line.values()
-    found = map(float, numbers)
-    return Row(body, float(nu), volume == "True", float(spacing), int(nodes), *found)
+def _all_rows() -> Iterator[Row]:
+    for case in (block(), liver()):
+        assemblies = [lattice(case, spacing) for spacing in SPACINGS]
+        for nu in RATIOS:
+            yield from rows(case, nu, assemblies)
 
 
 def main() -> None:
     """Write the table."""
-    with TABLE.open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Row._fields)
-        for case in (block(), liver()):
-            assemblies = [lattice(case, spacing) for spacing in SPACINGS]
-            for nu in RATIOS:
-                for line in rows(case, nu, assemblies):
-                    table.writerow(f"{v:.8g}" if isinstance(v, float) else v for v in line)
-                file.flush()
+    tables.write(TABLE, _all_rows(), digits=8)
 
 
 if __name__ == "__main__":

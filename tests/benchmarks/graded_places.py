@@ -30,8 +30,9 @@ from study.scene import Place, Scene
 from study.scene.problem import problem_of
 from study.tradeoff.timing import in_turns
 from tests.benchmarks import corrected_places
-from tests.benchmarks.corrected_places import REACHES, by_frames, written
+from tests.benchmarks.corrected_places import REACHES, by_frames
 from tests.benchmarks.corrected_runs import VECTORS, scene
+from tests.benchmarks.tables import complete, read
 
 Floats = NDArray[np.float64]
 
@@ -159,26 +160,14 @@ def ratio(one: PreparedLattice, whole: PreparedLattice) -> float:
 
 
 def kept() -> dict[tuple[float, float], Row]:
-    """Rows of the table that are there."""
-    if not TABLE.exists():
-        return {}
-    with TABLE.open(encoding="utf-8") as file:
-        whole = {"region_nodes", "graded_nodes", "graded_near_nodes"}
-        rows = [
-            Row(**{k: int(v) if k in whole else float(v) for k, v in one.items()})
-            for one in csv.DictReader(file)
-        ]
-    return {(one.at_x, one.at_z): one for one in rows}
+    """Rows of the table that are there, by place."""
+    return {(one.at_x, one.at_z): one for one in read(TABLE, Row)}
 
 
 def main(places: int = PLACES) -> None:
-    """Write the table, after each place."""
-    rows = kept()
-    for one in known()[:places]:
-        key = one["at_x"], one["at_z"]
-        if key not in rows:
-            rows[key] = row(one)
-            written(TABLE, list(rows.values()))
+    """Write what is missing of the table, after each place."""
+    tasks = {(one["at_x"], one["at_z"]): lambda one=one: [row(one)] for one in known()[:places]}
+    complete(TABLE, Row, tasks, lambda one: (one.at_x, one.at_z))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ as its cells shrink; in elements it tells the first two parts from each other.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +35,7 @@ from msm.statics import static_displacement
 from study.mesh.quadrature import over_volume
 from study.organ.block import block_mesh
 from study.similarity.fields import relative_l2
+from tests.benchmarks import tables
 from tests.benchmarks.field_error import SIZE, Case, block, lattice, material
 
 Floats = NDArray[np.float64]
@@ -46,6 +46,7 @@ LOADS = (0.01, 0.1, 0.2, 0.4, 0.8, 1.2, 1.6)
 """Times the tool force of one newton of the block."""
 
 ELEMENTS_TABLE = TABLE.with_name("large_strain_elements.csv")
+DIGITS = 6
 SPACINGS = (0.01, 0.02 / 3)
 COMPARED_LOADS = (0.1, 0.4, 0.8, 1.4)
 ELEMENT_SIZES = (0.02, 0.01)
@@ -112,8 +113,7 @@ def largest_strain(cells: LatticeMesh, u: Floats) -> float:
 
 def read() -> list[Row]:
     """Rows of the table as written."""
-    with TABLE.open(newline="") as file:
-        return [Row(*map(float, line.values())) for line in csv.DictReader(file)]
+    return tables.read(TABLE, Row)
 
 
 DIAGONALS = [[1, 1, 0], [1, -1, 0], [0, 1, 1], [0, 1, -1], [1, 0, 1], [-1, 0, 1]]
@@ -300,22 +300,13 @@ def _against(
 
 def read_compared() -> list[Compared]:
     """Rows of the table against elements as written."""
-    with ELEMENTS_TABLE.open(newline="") as file:
-        return [Compared(*map(float, line.values())) for line in csv.DictReader(file)]
-
-
-def write(table: Path, lines: Sequence[Row] | Sequence[Compared]) -> None:
-    """A table of numbers under the names of their fields."""
-    with table.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(lines[0]._fields)
-        writer.writerows([f"{v:.6g}" for v in line] for line in lines)
+    return tables.read(ELEMENTS_TABLE, Compared)
 
 
 def main() -> None:
     """Write both tables."""
-    write(TABLE, list(rows()))
-    write(ELEMENTS_TABLE, list(compared()))
+    tables.write(TABLE, rows(), DIGITS)
+    tables.write(ELEMENTS_TABLE, compared(), DIGITS)
 
 
 if __name__ == "__main__":

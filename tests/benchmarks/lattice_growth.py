@@ -10,7 +10,6 @@ it was, `of_smallest` is the ratio to the smallest lattice of the same precision
 
 from __future__ import annotations
 
-import csv
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -28,6 +27,7 @@ from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.benchmarks.bench_lattice import LAW, cube, free
 from tests.benchmarks.bench_order import SIZES, SPRINGS_PER_REPEAT
+from tests.benchmarks.tables import write
 
 DATA = Path(__file__).parents[2] / "reports" / "data"
 TURNS = 7
@@ -135,21 +135,10 @@ def whole(
     return Whole(name, precision, size, unknowns, found.step, taken, taken / duration, load())
 
 
-def write(name: str, rows: Iterator[NamedTuple]) -> None:
-    """Write rows as they come, with their fields' names as a head."""
-    with (DATA / name).open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        for number, row in enumerate(rows):
-            if number == 0:
-                table.writerow(row._fields)
-            table.writerow([f"{x:.4g}" if isinstance(x, float) else x for x in row])
-            file.flush()
-
-
 def main() -> None:
     """Measure and write both tables."""
-    write("lattice_growth.csv", steps())
-    write("run_growth.csv", runs())
+    write(DATA / "lattice_growth.csv", steps())
+    write(DATA / "run_growth.csv", runs())
 
 
 if __name__ == "__main__":

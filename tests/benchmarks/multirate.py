@@ -33,9 +33,9 @@ from msm.volume import stiffness_matrix as volume_stiffness
 from study.models.lattice import PreparedLattice
 from study.scene.problem import problem_of
 from tests.benchmarks.corrected_places import TABLE as OTHERS
-from tests.benchmarks.corrected_places import written
 from tests.benchmarks.corrected_runs import scene
 from tests.benchmarks.graded_places import FINEST, lattice
+from tests.benchmarks.tables import write
 
 Floats = NDArray[np.float64]
 
@@ -165,8 +165,7 @@ def costs(one: PreparedLattice) -> tuple[float, list[float]]:
 def main() -> None:
     """Write the table and print it."""
     found = [one for radius in RADII for one in rows(radius)]
-    written(TABLE, found)
-    for one in found:
+    for one in write(TABLE, found):
         sys.stdout.write(f"{one}\n")
 
 

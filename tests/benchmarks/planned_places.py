@@ -13,7 +13,6 @@ measured here, at rest, against the limit of two finer meshes.
 
 from __future__ import annotations
 
-import csv
 import sys
 from dataclasses import replace
 from functools import lru_cache
@@ -33,9 +32,9 @@ from study.plan.prediction import Foresight
 from study.problem.problem import Problem
 from study.scene import Require
 from tests.benchmarks import corrected_places
-from tests.benchmarks.corrected_places import written
 from tests.benchmarks.corrected_runs import base, elements, pressed, under_tool
 from tests.benchmarks.graded_places import known, placed
+from tests.benchmarks.tables import complete, read
 
 Floats = NDArray[np.float64]
 
@@ -128,25 +127,14 @@ def solving(level: int) -> Solve:
 
 
 def kept() -> dict[tuple[float, float], Row]:
-    """Rows of the table that are there."""
-    if not TABLE.exists():
-        return {}
-    with TABLE.open(encoding="utf-8") as file:
-        rows = [
-            Row(**{k: v if k == "chosen" else float(v) for k, v in one.items()})  # type: ignore[arg-type]
-            for one in csv.DictReader(file)
-        ]
-    return {(one.at_x, one.at_z): one for one in rows}
+    """Rows of the table that are there, by place."""
+    return {(one.at_x, one.at_z): one for one in read(TABLE, Row)}
 
 
 def main(places: int = PLACES) -> None:
-    """Write the table, after each place."""
-    rows = kept()
-    for one in known(1)[:places]:
-        key = one["at_x"], one["at_z"]
-        if key not in rows:
-            rows[key] = row(one)
-            written(TABLE, list(rows.values()))
+    """Write what is missing of the table, after each place."""
+    tasks = {(one["at_x"], one["at_z"]): lambda one=one: [row(one)] for one in known(1)[:places]}
+    complete(TABLE, Row, tasks, lambda one: (one.at_x, one.at_z))
 
 
 if __name__ == "__main__":

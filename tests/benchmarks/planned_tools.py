@@ -13,8 +13,6 @@ for that share of the error which it does not have itself at order one.
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
@@ -29,7 +27,7 @@ from study.scene import Require, Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 from tests.benchmarks.corrected_places import TABLE as PLACES
-from tests.benchmarks.corrected_places import written
+from tests.benchmarks.tables import complete
 
 TABLE = PLACES.with_name("planned_tools.csv")
 BRIEF = (
@@ -156,28 +154,10 @@ def _near(runs: Mapping[float, Run], spacing: float) -> Run:
     return runs[found]
 
 
-def kept() -> list[Row]:
-    """Rows of the table that are there."""
-    if not TABLE.exists():
-        return []
-    with TABLE.open(encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
-    texts = {"scene", "quantity"}
-    return [
-        Row(**{k: v if k in texts else float(v) for k, v in one.items()})  # type: ignore[arg-type]
-        for one in lines
-    ]
-
-
 def main() -> None:
     """Write what is missing of the table."""
-    found = kept()
-    for name in SCENES:
-        if name not in {one.scene for one in found}:
-            found += rows(name)
-            written(TABLE, found)
-            sys.stdout.write(f"{name}\n")
-            sys.stdout.flush()
+    tasks = {name: partial(rows, name) for name in SCENES}
+    complete(TABLE, Row, tasks, lambda one: one.scene)
 
 
 if __name__ == "__main__":

@@ -17,11 +17,11 @@ of both, and, as `own`, against the lattice of 5 mm.
 
 from __future__ import annotations
 
-import csv
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,9 +49,10 @@ from study.scene.problem import problem_of
 from study.scene.schema import Waypoint
 from study.system.progress import Silent
 from study.tradeoff.timing import in_turns
-from tests.benchmarks.corrected_places import by_frames, in_frame, written
+from tests.benchmarks.corrected_places import by_frames, in_frame
 from tests.benchmarks.corrected_runs import LEVEL as FINER
 from tests.benchmarks.graded_places import free, known, placed
+from tests.benchmarks.tables import complete, read, write
 
 Floats = NDArray[np.float64]
 
@@ -452,48 +453,31 @@ def ratio(one: Prepared, other: Prepared) -> float:
 
 def kept() -> dict[tuple[float, float, float], Row]:
     """Rows of the table of places that are there."""
-    if not PLACES.exists():
-        return {}
-    with PLACES.open(encoding="utf-8") as file:
-        found = [Row(**{k: _value(v) for k, v in one.items()}) for one in csv.DictReader(file)]
-    return {(one.at_x, one.at_z, one.strain): one for one in found}
-
-
-def _value(text: str) -> float:
-    if text in {"True", "False"}:
-        return text == "True"
-    return int(text) if text.isdigit() else float(text)
-
-
-def kept_graded() -> list[Graded]:
-    """Rows of graded lattices that are there."""
-    if not GRADED.exists():
-        return []
-    with GRADED.open(encoding="utf-8") as file:
-        return [Graded(**{k: _value(v) for k, v in one.items()}) for one in csv.DictReader(file)]
+    return {(one.at_x, one.at_z, one.strain): one for one in read(PLACES, Row)}
 
 
 def main() -> None:
     """Write what is missing of the tables."""
     if not STATIONS.exists():
-        written(STATIONS, list(off()))
+        write(STATIONS, off())
     if not COSTS.exists():
-        written(COSTS, costs())
+        write(COSTS, costs())
     done = kept()
     starts = known(1)
     for start in (starts[n] for n in WHERE):
         missing = [s for s in STRAINS if (start["at_x"], start["at_z"], s) not in done]
         for one in rows(start, missing) if missing else ():
             done[one.at_x, one.at_z, one.strain] = one
-            written(PLACES, list(done.values()))
+            write(PLACES, done.values())
             sys.stdout.write(f"{one}\n")
             sys.stdout.flush()
-    others = kept_graded()
-    for start in (starts[n] for n in WHERE):
-        place = start["at_x"], start["at_z"]
-        if place not in {(one.at_x, one.at_z) for one in others}:
-            others += graded(start, [done[*place, strain] for strain in STRAINS])
-            written(GRADED, others)
+    tasks = {
+        (place := (start["at_x"], start["at_z"])): partial(
+            graded, start, [done[*place, strain] for strain in STRAINS]
+        )
+        for start in (starts[n] for n in WHERE)
+    }
+    complete(GRADED, Graded, tasks, lambda one: (one.at_x, one.at_z))
 
 
 if __name__ == "__main__":

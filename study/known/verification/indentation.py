@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, diags_array
 
+from fem_reference.contact.linear import LinearContact
 from fem_reference.contact.patch import patch
-from fem_reference.contact.reduction import Answered
-from fem_reference.contact.touch import Touch
+from fem_reference.contact.reduction import ContactResponse
 from fem_reference.elasticity import Body, discretise
 from fem_reference.solvers import by_factors
 from fem_reference.stiffness import Stiffness
@@ -92,16 +92,16 @@ def force(tool: RigidTool, tissue: Tissue, element: str, finest: float) -> float
     """Force [N] that presses a quarter of a tool in, elements being `finest` [m] near it."""
     body = held(quarter(tissue, element, finest, flat=tool.shape == PUNCH))
     ways = np.array([0.0, 1.0])
-    touch = Touch.of([patch(body, tool, ways, 0.0)])
+    contact = LinearContact.of([patch(body, tool, ways, 0.0)])
     solve = by_factors(body)
     far = body.support @ far_field(body, tissue)
-    pushes = touch.pushes.toarray()
-    downwards = -pushes[2::3].sum(axis=0)
-    loads = (pushes + np.outer(far, downwards)).T
-    answers = np.column_stack([solve(one) for one in loads])
-    given = Answered(body, touch, solve, answers)
-    grip = given.at_rest(np.zeros(len(body.load)), given.free, ways)
-    return float(touch.on_tools(grip.force)[0] @ -DOWN)
+    nodal_forces = contact.nodal_forces.toarray()
+    downwards = -nodal_forces[2::3].sum(axis=0)
+    loads = (nodal_forces + np.outer(far, downwards)).T
+    responses = np.column_stack([solve(one) for one in loads])
+    given = ContactResponse(body, contact, solve, responses)
+    solution = given.at_rest(np.zeros(len(body.load)), given.free, ways)
+    return float(contact.tool_forces(solution.force)[0] @ -DOWN)
 
 
 def quarter(tissue: Tissue, element: str, finest: float, *, flat: bool) -> Body:
@@ -162,7 +162,7 @@ def is_far(points: Floats) -> NDArray[np.bool_]:
 
 
 def far_field(body: Body, tissue: Tissue) -> Floats:
-    """Displacement [m] (n,) of the far faces for a newton that pushes down on the quarter."""
+    """Displacement [m] (n,) of the far faces for a newton that nodal_forces down on the quarter."""
     x = body.points
     moved = np.zeros_like(x)
     far = is_far(x)

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.contact.balance import Balance, Balanced, Demand
-from fem_reference.contact.finite import Before
-from fem_reference.contact.large_motion import Steps, pressed, touched
+from fem_reference.contact.equilibrium import ContactState, EquilibriumSolver, Increment
+from fem_reference.contact.kinematics import PreviousState
+from fem_reference.contact.large_motion import Integrator, contact_body, contact_problem
 from fem_reference.elasticity import Body, discretise
 from study.known.finding import Finding, number_of
 from study.known.verification import indentation
@@ -85,9 +85,9 @@ def squeezed(tissue: Tissue) -> float:
 
     plate = RigidTool("tool", PLATE, EDGE, np.array([0.0, 0.0, EDGE]), DOWN, travel)
     ways = np.array([0.0, 1.0])
-    given = pressed(body, tissue, (plate,), RayleighDamping(0.0), np.zeros_like, ways)
-    state = Steps(given).peak(1.0, np.zeros(given.body.solid.size))
-    return float(given.on_tools(state)[0] @ DOWN)
+    given = contact_problem(body, tissue, (plate,), RayleighDamping(0.0), np.zeros_like, ways)
+    state = Integrator(given).peak_equilibrium(1.0, np.zeros(given.body.solid.size))
+    return float(given.tool_forces(state)[0] @ DOWN)
 
 
 def small(shape: int, tissue: Tissue, finest: float) -> float:
@@ -98,15 +98,15 @@ def small(shape: int, tissue: Tissue, finest: float) -> float:
     tool = indentation.tool_of(shape, bonded=False)
     size = finest * indentation.TOUCHED
     bare = indentation.quarter(tissue, "taylor-hood", size, flat=shape == PUNCH)
-    given = touched(_framed(bare, [True, True, False]), tissue, (tool,), np.array([0.0, 1.0]))
+    given = contact_body(_framed(bare, [True, True, False]), tissue, (tool,), np.array([0.0, 1.0]))
     exact = indentation.exact_force(shape, tissue, bonded=False)
     start = np.zeros(len(given.free))
     far = indentation.far_field(indentation.held(bare), tissue)
     start[: given.solid.size] = 0.25 * exact * far
-    guess = Balanced(start, np.zeros(len(given.contact.held)))
-    demand = Demand(1.0, 0.0, np.zeros(given.solid.size))
-    state = Balance(given).found(guess, demand)
-    return float(4.0 * given.met(state.w, demand).on_tools(state.force)[0] @ -DOWN)
+    guess = ContactState(start, np.zeros(len(given.contact.bonded)))
+    increment = Increment(1.0, 0.0, np.zeros(given.solid.size))
+    state = EquilibriumSolver(given).solve(guess, increment)
+    return float(4.0 * given.configuration(state.w, increment).tool_forces(state.force)[0] @ -DOWN)
 
 
 def _framed(bare: Body, planes: Sequence[bool]) -> Body:
@@ -139,13 +139,15 @@ def drags(finest: float) -> list[tuple[float, float]]:
     radius = indentation.TOUCHED**2 / indentation.DEPTH
     tool = RigidTool("tool", SPHERE, radius, np.zeros(3), DOWN, travel, friction=FRICTION)
     times = 1.0 + np.arange(len(shares))
-    given = touched(_framed(bare, [False, True, False]), tissue, (tool,), np.append(0.0, times))
-    far, balance, n = indentation.is_far(bare.points), Balance(given), given.solid.size
+    given = contact_body(
+        _framed(bare, [False, True, False]), tissue, (tool,), np.append(0.0, times)
+    )
+    far, solver, n = indentation.is_far(bare.points), EquilibriumSolver(given), given.solid.size
     down, sideways = (
         kind(bare.points[far], tissue) * normal for kind in (point_force, tangential_force)
     )
-    state, before, found = (
-        Balanced(np.zeros(len(given.free)), np.zeros(len(given.contact.held))),
+    state, previous, found = (
+        ContactState(np.zeros(len(given.free)), np.zeros(len(given.contact.bonded))),
         None,
         [],
     )
@@ -154,10 +156,10 @@ def drags(finest: float) -> list[tuple[float, float]]:
         moved = w[:n].reshape(-1, 3)
         moved[far] = down + FRICTION * share * sideways
         moved[np.abs(bare.points[:, 1]) < TOUCHING, 1] = 0.0
-        demand = Demand(float(time), 0.0, np.zeros(n), before)
-        state = balance.found(Balanced(w, state.force), demand)
-        force = given.met(state.w, demand).on_tools(state.force)[0]
-        before = Before(given.given(state.w), float(time))
+        increment = Increment(float(time), 0.0, np.zeros(n), previous)
+        state = solver.solve(ContactState(w, state.force), increment)
+        force = given.configuration(state.w, increment).tool_forces(state.force)[0]
+        previous = PreviousState(given.given(state.w), float(time))
         found.append(float(-(force @ ALONG) / (force @ -DOWN)))
     return list(zip(FRICTION * shares[1:], found[1:], strict=True))
 

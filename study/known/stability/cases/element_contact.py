@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference import model as fem
-from fem_reference.contact.motion import AtPeak, at_peak, run
+from fem_reference.contact.motion import PeakEquilibrium, at_peak, run
 from fem_reference.elasticity import Body
 from fem_reference.external_loads import ExternalLoads, with_external_loads
 from study.known import pressed
@@ -134,7 +134,7 @@ def _seen(duration: float, samples: int, peak: int) -> Observation:
     return Observation(times, TOP[None], (peak, samples - 1), nothing, nothing)
 
 
-def _rest(tool: RigidTool) -> AtPeak:
+def _rest(tool: RigidTool) -> PeakEquilibrium:
     return at_peak(_block(), (tool,), _seen(1.0, 9, 8))
 
 

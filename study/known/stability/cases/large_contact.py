@@ -12,8 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.contact.large_motion import LargeSolution, run
-from fem_reference.contact.large_motion import pressed as under
+from fem_reference.contact.large_motion import LargeSolution, contact_problem, run
 from fem_reference.elasticity import discretise
 from study.known.case import Case, Family
 from study.known.finding import Ending, Finding, at_most
@@ -120,7 +119,7 @@ def _moved(tissue: Tissue, tool: RigidTool, times: Floats, times_g: float) -> La
     if times_g > 0.0:
         borne = body.nodal_mass * np.tile(-9.81 * times_g * DOWN, body.node_count)
     damping, nothing = RayleighDamping(DAMPING), np.zeros((0, 3))
-    given = under(body, tissue, (tool,), damping, np.zeros_like, times, borne)
+    given = contact_problem(body, tissue, (tool,), damping, np.zeros_like, times, borne)
     seen = Observation(times, TOP[None], (len(times) // 3, len(times) - 1), nothing, nothing)
     return run(body, given, seen, 2)
 

@@ -29,7 +29,7 @@ EDGE, CELL = 0.04, 0.02
 FOUNDATION = 1e9
 """[Pa/m], so stiff that the base hardly moves."""
 TISSUE = Tissue(youngs_modulus=5e3, poisson_ratio=0.0)
-GIVES_WAY = 1.0 / (3.0 * np.sqrt(3.0))
+STABILITY_LIMIT = 1.0 / (3.0 * np.sqrt(3.0))
 """Largest pressure over E that St. Venant and Kirchhoff's law can carry."""
 SOLVED = 1e-5
 """Error of the displacement: TOLERANCE, amplified by the softened tangent stiffness."""
@@ -53,12 +53,12 @@ def cases() -> Iterator[Case]:
             quick=True,
         )
     for pressure in (0.2, 0.3, 1.0):
-        title = f"load at giving way, {pressure:g} E asked: st-venant-kirchhoff"
-        resolved = INCREMENTS.smallest * pressure / GIVES_WAY
-        yield FAMILY.case(title, "gives_way", {"pressure": pressure}, resolved, quick=True)
+        title = f"load at loss of stability, {pressure:g} E asked: st-venant-kirchhoff"
+        resolved = INCREMENTS.smallest * pressure / STABILITY_LIMIT
+        yield FAMILY.case(title, "loss_of_stability", {"pressure": pressure}, resolved, quick=True)
     for force in (0.1, 1.0, 10.0, 30.0):
         yield FAMILY.case(
-            f"balance under a tool of {force:g} N", "balance", {"force": force}, TOLERANCE
+            f"equilibrium under a tool of {force:g} N", "equilibrium", {"force": force}, TOLERANCE
         )
     refused: tuple[tuple[str, dict[str, Any], str], ...] = (
         ("a load factor of zero", {"factors": [0.0]}, "load_factors"),
@@ -88,15 +88,15 @@ def stretch(law: str, pressure: float) -> Finding:
     return value(_exact(law, pressure * path.reached), float(found), message)
 
 
-def gives_way(pressure: float) -> Finding:
+def loss_of_stability(pressure: float) -> Finding:
     """Pressure over E at the last stable state, on the path to an inadmissible one."""
     path = solve(_column(pressure), TISSUE, "st-venant-kirchhoff")
     if path.converged:
-        return Finding("error", message="a rest beyond the largest pressure")
-    return value(float(GIVES_WAY), path.reached * pressure, path.failure)
+        return Finding("error", message="an equilibrium beyond the largest pressure")
+    return value(float(STABILITY_LIMIT), path.reached * pressure, path.failure)
 
 
-def balance(force: float) -> Finding:
+def equilibrium(force: float) -> Finding:
     """Residual force over the load, at the last state under a small tool."""
     tool = ToolPatch(np.array([0.5 * EDGE, 0.5 * EDGE, EDGE]), pressed.DOWN, 0.02, force)
     tissue = Tissue(youngs_modulus=5e3, poisson_ratio=0.45)

@@ -1,0 +1,1 @@
+"""Numerical methods that elements and lattices share: paths of equilibria, symmetric factors."""
