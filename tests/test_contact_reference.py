@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial import cKDTree
 
 from fem_reference import model as fem
+from fem_reference.contact import law
 from fem_reference.contact.law import ComplementarityProblem, frictional_forces, frictionless_forces
 from fem_reference.contact.motion import ContactProblem, at_peak, run
 from fem_reference.contact.patch import patch
@@ -310,18 +311,23 @@ def test_friction_of_nothing_is_none():
     assert np.abs(found[:, 1:]).max() == 0.0
 
 
-def test_the_law_of_contact_holds_at_every_area():
+@pytest.mark.parametrize("changes", [law.MOST_ACTIVE_SETS, 0], ids=["active-set", "least-squares"])
+def test_the_law_of_contact_holds_at_every_area(changes, monkeypatch):
+    """By either method; the last area is beside a punch and bears nothing."""
+    monkeypatch.setattr(law, "MOST_ACTIVE_SETS", changes)
     rng = np.random.default_rng(0)
     for _ in range(50):
         A = rng.normal(size=(9, 9))
         A = A @ A.T + 0.1 * np.eye(9)
         offset, held = rng.normal(size=9), np.arange(9) < 2
+        offset[8] = np.inf
         found = frictionless_forces(ComplementarityProblem(A, offset, held), np.zeros(9))
         gap = A @ found + offset
         assert np.abs(gap[held]).max() < 1e-9
         assert found[~held].min() >= 0.0
         assert gap[~held].min() > -1e-9
-        assert abs(found[~held] @ gap[~held]) < 1e-9
+        assert abs(found[2:8] @ gap[2:8]) < 1e-9
+        assert found[8] == 0.0
 
 
 @pytest.mark.parametrize(

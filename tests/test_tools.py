@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from msm.damping import NodalDamping
+from msm.stepper import LatticeStepper
 from study.models.lattice import requested_step
 from study.models.table import model
 from study.scene.file import read_scene
@@ -78,8 +80,6 @@ def test_at_rest_the_support_bears_what_the_tool_does(shape):
 
 
 def stepper_of(prepared, **changed):
-    from msm.stepper import LatticeStepper
-
     assembly = replace(prepared.assembly, **changed)
     material = prepared.springs.material
     return LatticeStepper(assembly, material, prepared.problem.factor)
@@ -139,6 +139,57 @@ def test_a_planted_loss_of_the_tools_impulse_is_seen():
     gained = (mass @ stepper.v - before) / dt
     pushed = -0.99 * stepper.tool_force[0]
     assert gained != pytest.approx(borne + pushed, abs=1e-9 * np.linalg.norm(pushed) + 1e-12)
+
+
+@pytest.mark.parametrize("damping", [NodalDamping(200.0), NodalDamping(0.0, 5e4)])
+def test_what_damping_takes_of_the_momentum_is_not_told_as_the_tools(damping):
+    """In every step m dv = dt (support + tool - c v), by eq. (2) and by eq. (9)."""
+    _, prepared = posed()
+    material = replace(prepared.springs.material, damping=damping)
+    stepper, dt = LatticeStepper(prepared.assembly, material, prepared.problem.factor), 2e-4
+    mass, support = prepared.assembly.mass, prepared.assembly.foundation
+    stepper.advance(400, dt)
+    for _ in range(20):
+        before, borne = mass @ stepper.v, -(support @ stepper.u).sum(axis=0)
+        stepper.advance(1, dt)
+        away = np.linalg.norm(stepper.u, axis=1)
+        drag = (mass * (damping.gamma_0 + damping.gamma_1 * away)) @ stepper.v
+        gained, pushed = (mass @ stepper.v - before) / dt, -stepper.tool_force[0]
+        assert gained == pytest.approx(borne + pushed - drag, abs=1e-3 * np.linalg.norm(pushed))
+
+
+def gaps(prepared, tool, stepper):
+    """Of all points of the surface [m], whether or not the kernels look at them."""
+    loads = prepared.assembly.external_loads
+    weights, _ = prepared.assembly.lattice.interpolation(loads.surface.points)
+    return tool.gap(loads.surface.points + weights @ stepper.u, stepper.t)[0]
+
+
+@pytest.mark.parametrize("shape", ["sphere", "plate"])
+def test_no_point_of_the_surface_is_missed(shape):
+    """By a tool that comes from afar: kernels look at points when it can have reached them."""
+    fast = "tool.clearance=4 mm", "tool.displacement=8 mm", "tool.history.ramp=0.04 s"
+    problem, prepared = posed(f"tool.shape={shape}", "damping.ratio=0", *fast)
+    stepper = stepper_of(prepared)
+    for _ in range(30):
+        stepper.advance(10, 2e-4)
+        assert -gaps(prepared, problem.rigid_tools[0], stepper).min() <= stepper.overlap + 1e-9
+    assert -stepper.tool_force[0] @ problem.rigid_tools[0].axis > 0.1
+    assert stepper.overlap < 1e-3 * 8e-3
+
+
+def test_the_deepest_overlap_is_told_and_a_fifth_of_it_goes_in_a_step():
+    """Of a sphere that starts a tenth of a millimetre inside."""
+    problem, prepared = posed()
+    loads, tool = prepared.assembly.external_loads, problem.rigid_tools[0]
+    inside = replace(tool, tip=tool.tip + 1e-4 * tool.axis)
+    stepper = stepper_of(prepared, external_loads=replace(loads, tools=(inside,)))
+    started = -tool.gap(loads.surface.points - 1e-4 * tool.axis, 0.0)[0].min()
+    stepper.advance(1, 1e-4)
+    assert stepper.overlap == pytest.approx(0.8 * started, rel=1e-3)
+    stepper.advance(20, 1e-4)
+    assert stepper.overlap == pytest.approx(0.8 * started, rel=1e-3)
+    assert -gaps(prepared, inside, stepper).min() < 0.8**20 * started + 1e-9
 
 
 def test_both_paths_of_the_kernels_move_alike():

@@ -9,7 +9,9 @@ A sphere that is then dragged by d sticks in the middle of the contact and slips
 all of it slides. With the normal force N, the coefficient m and the tangential stiffness k, the
 tangential force is m N (1 - (1 - 2 k d / (3 m N))^(3/2)) for an incompressible body (Cattaneo 1938;
 Mindlin 1949, J. Appl. Mech. 16:259; Johnson 1985, eq. 7.42). The formula neglects slip across the
-direction of the tool, so that elements need not converge to it; the limit leaves room for that.
+direction of the tool. Boundary elements with that slip are 0.1 % above it at half the force of
+sliding (`tests/test_partial_slip.py`). The finite elements are 1.8, 0.5 and 0.5 % above it with
+edges of 1/2, 0.35 and 1/4 of the radius of contact, so that what the limit allows is their error.
 """
 
 from __future__ import annotations
@@ -41,11 +43,12 @@ Floats = NDArray[np.float64]
 
 SQUEEZED, PRESSED = (0.3, 0.499), (0.45, 0.4999)
 """Poisson ratios under the plate and under the sphere."""
-EXACT, HERTZ, EDGED, MINDLIN = 1e-4, 1e-2, 1e-2, 2e-2
+EXACT, HERTZ, EDGED, MINDLIN = 1e-4, 1e-2, 1e-2, 1e-2
 """Limits of the errors: that of the plate is the tolerance of equilibrium alone."""
-FINEST, AT_EDGE = 0.5, 1 / 8
-"""Longest edge of the elements, under the sphere over the radius of contact, and at the edge of a
-punch, where the pressure is singular, over its radius."""
+FINEST, IN_SLIP, AT_EDGE = 0.5, 0.35, 1 / 8
+"""Longest edge of the elements, under a sphere over the radius of contact, shorter where it is
+dragged and slips in a ring, and at the edge of a punch, where the pressure is singular, over its
+radius."""
 FRICTION, DRAGGED, DRAGGED_NU = 0.3, (0.5, 1.0), 0.4999
 """Of the sphere that is dragged, and to what fractions of the force at which it slides."""
 ALONG, TOUCHING = np.array([1.0, 0.0, 0.0]), 1e-9
@@ -67,7 +70,7 @@ def findings() -> Iterator[Finding]:
     exact = indentation.exact_force(PUNCH, tissue, bonded=False)
     label = f"force of a sliding punch [N], neo-Hookean, nu {PRESSED[0]:g}"
     yield number_of(label, exact, small(PUNCH, tissue, AT_EDGE), EDGED)
-    for exact, found in drags(FINEST):
+    for exact, found in drags(IN_SLIP):
         label = f"T/N of a dragged sphere at {exact / FRICTION:.0%} of sliding"
         yield number_of(label, exact, found, MINDLIN)
 
