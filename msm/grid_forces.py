@@ -226,27 +226,24 @@ def gradient(lanes: Lanes, at: Ints, a: Floats, d: int, i: int, to_gradient: flo
 
 
 @inner_kernel()
-def scatter(lanes: Lanes, at: Ints, force: Floats, d: int, i: int, x: Any, y: Any, z: Any) -> None:
-    """Subtract the nodal forces along d of stresses with rows (x, y, z), weights included."""
-    c0, c1, c2, c3 = corner_shares(x, y, z)
-    store(force, d, i, load(force, d, i, lanes) + c0)
-    store(force, d, i + at[1], load(force, d, i + at[1], lanes) + c1)
-    store(force, d, i + at[2], load(force, d, i + at[2], lanes) + c2)
-    store(force, d, i + at[3], load(force, d, i + at[3], lanes) + c3)
-    store(force, d, i + at[4], load(force, d, i + at[4], lanes) - c3)
-    store(force, d, i + at[5], load(force, d, i + at[5], lanes) - c2)
-    store(force, d, i + at[6], load(force, d, i + at[6], lanes) - c1)
-    store(force, d, i + at[7], load(force, d, i + at[7], lanes) - c0)
-
-
-@inner_kernel()
 def scatter_pressure(
     lanes: Lanes, at: Ints, force: Floats, i: int, pressure: Any, rows: Any
 ) -> None:
     """Subtract the nodal forces of pressures on the cofactors of cells, weights included."""
-    for d in range(3):
-        x, y, z = rows[d]
-        scatter(lanes, at, force, d, i, pressure * x, pressure * y, pressure * z)
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = rows
+    x0, x1, x2, x3 = corner_shares(pressure * ax, pressure * ay, pressure * az)
+    y0, y1, y2, y3 = corner_shares(pressure * bx, pressure * by, pressure * bz)
+    z0, z1, z2, z3 = corner_shares(pressure * cx, pressure * cy, pressure * cz)
+    # No corner right after its neighbour: along a row, the load would wait for the store that it
+    # overlaps in part.
+    add(lanes, force, i, x0, y0, z0)
+    add(lanes, force, i + at[3], x3, y3, z3)
+    add(lanes, force, i + at[5], -x2, -y2, -z2)
+    add(lanes, force, i + at[6], -x1, -y1, -z1)
+    add(lanes, force, i + at[1], x1, y1, z1)
+    add(lanes, force, i + at[2], x2, y2, z2)
+    add(lanes, force, i + at[4], -x3, -y3, -z3)
+    add(lanes, force, i + at[7], -x0, -y0, -z0)
 
 
 def volume_change(grid: Grid, linear: Small, u: Floats, i: int, to_gradient: float) -> Any:

@@ -32,10 +32,8 @@ Lanes = tuple[float | np.float32, ...]
 
 WIDTHS = (1, 2, 4, 8)
 """Widths of vectors of doubles; vectors of singles are twice as wide."""
-WORD, INDEX = ir.IntType(64), ir.IntType(32)
+INDEX = ir.IntType(32)
 FUSED = ("contract",)
-ROOT_GUESS = 0x5FE6EB50C7B537A9
-"""This minus half the bits of q has the bits of 1 / sqrt(q), within 3.5 %: Lomont 2003."""
 
 
 class Format(NamedTuple):
@@ -64,9 +62,14 @@ def lanes_of(width: int, *, single: bool = False) -> Lanes:
 
 def widest() -> int:
     """Vector width in doubles of the processor that numba compiles for."""
-    features = numba.config.CPU_FEATURES or get_host_cpu_features()
     known = {"+avx512f": 8, "+avx": 4, "+sse2": 2, "+neon": 2}
-    return max((known.get(name, 1) for name in features.split(",")), default=1)
+    return max(known.get(name, 1) for name in _features())
+
+
+def _features() -> list[str]:
+    """Names of what the processor that numba compiles for can do, each after a plus sign."""
+    features: str = numba.config.CPU_FEATURES or get_host_cpu_features()
+    return features.split(",")
 
 
 class LanesType(types.Type):
@@ -240,21 +243,26 @@ def root(_: Any, x: Any) -> Any:
 
 
 @intrinsic
-def root_guess(_: Any, q: Any) -> Any:
-    """1 / sqrt(q) within 3.5 %, for positive normal doubles."""
-    if q.dtype is not types.float64:
-        return None
-    count = q.count
+def root_estimate(_: Any, q: Any) -> Any:
+    """1 / sqrt(q) within 2^-14, not finite for 0; for processors that `_estimates_root` of q."""
 
     def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
-        words = ir.VectorType(WORD, count)
-        bits = builder.bitcast(given[0], words)
-        half = builder.lshr(bits, ir.Constant(words, [1] * count))
-        return builder.bitcast(
-            builder.sub(ir.Constant(words, [ROOT_GUESS] * count), half), given[0].type
-        )
+        vector, mask = given[0].type, ir.IntType(8)
+        kind = ir.FunctionType(vector, [vector, vector, mask])
+        name = f"llvm.x86.avx512.rsqrt14.pd.{64 * q.count}"
+        estimate = cgutils.get_or_insert_function(builder.module, kind, name)
+        every_lane = ir.Constant(mask, 255)
+        return builder.call(estimate, [given[0], given[0], every_lane])
 
     return q(q), code
+
+
+def _estimates_root(q: Any) -> bool:
+    """Whether the processor has an instruction for it, from the numba type of q."""
+    if not isinstance(q, LanesType) or q.dtype is not types.float64:
+        return False
+    needed = {8: "+avx512f", 4: "+avx512vl"}.get(q.count)
+    return needed in _features()
 
 
 @intrinsic
@@ -269,30 +277,30 @@ def where_not_zero(_: Any, x: Any, found: Any, other: Any) -> Any:  # noqa: ARG0
 
 
 def inverse_root(q: Any) -> Any:
-    """1 / sqrt(q) to two units in the last place, infinite for 0; for kernels only."""
+    """1 / sqrt(q) to two units in the last place, not finite for 0; for kernels only."""
     raise NotImplementedError(q)
 
 
 @overload(inverse_root)
 def _inverse_root(q: Any) -> Any:
-    """For doubles, two iterations of high order from a guess, which take a third of the time."""
-    if not isinstance(q, LanesType) or q.dtype is types.float32:
+    return _polished if _estimates_root(q) else _divided
 
-        def plain(q: Any) -> Any:
-            return 1.0 / root(q)
 
-        return plain
-    lanes = lanes_of(q.count)
+def _divided(q: Any) -> Any:
+    # Iterations from a guess occupy the pipelines that the rest of a kernel needs; root and
+    # division have their own.
+    return 1.0 / root(q)
 
-    def polished(q: Any) -> Any:
-        y = root_guess(q)
-        r = 1.0 - q * y * y
-        y = y + y * (r * (0.5 + r * (0.375 + r * (0.3125 + r * 0.2734375))))
-        r = 1.0 - q * y * y
-        y = y + y * (r * (0.5 + r * 0.375))
-        return where_not_zero(q, y, every(float("inf"), lanes))
 
-    return polished
+def _polished(q: Any) -> Any:
+    return polished(q, root_estimate(q))
+
+
+@register_jitable
+def polished(q: Any, y: Any) -> Any:
+    """1 / sqrt(q) from an estimate y within 2^-14, by the series of 1 / sqrt(1 - r)."""
+    r = 1.0 - q * y * y
+    return y + y * (r * (0.5 + r * (0.375 + r * 0.3125)))
 
 
 @intrinsic

@@ -1,5 +1,10 @@
 """Vectors inside kernels: at every width the numbers of plain numpy."""
 
+import os
+import platform
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numba import config
@@ -80,9 +85,51 @@ def test_the_inverse_root_is_that_of_ieee_to_two_units(width):
     special = np.array([[0.0, np.nan, -0.0, 1.0] * 2])
     found = np.empty_like(special)
     roots(lanes_of(width), special, found)
-    assert np.isinf(found[0, [0, 2]]).all()
-    assert np.isnan(found[0, 1])
+    assert not np.isfinite(found[0, :3]).any()
     assert found[0, 3] == 1.0
+
+
+@pytest.mark.parametrize("error", [-(2.0**-14), 0.0, 2.0**-14])
+def test_an_estimate_is_polished_to_the_same_two_units(error):
+    q = np.exp(np.linspace(-500.0, 500.0, 80_000))
+    found = simd.polished(q, (1.0 + error) / np.sqrt(q))
+    assert np.abs(found * np.sqrt(q) - 1.0).max() < 5e-16
+
+
+AVX_512 = """
+import numba
+import numpy as np
+
+from msm.kernel import kernel
+from msm.simd import inverse_root, lanes_of, load, store
+
+
+@kernel()
+def roots(lanes, q):
+    store(q, 0, 0, inverse_root(load(q, 0, 0, lanes)))
+
+
+for width in (4, 8):
+    roots.compile((numba.typeof(lanes_of(width)), numba.float64[:, ::1]))
+    print("vrsqrt14pd" in roots.inspect_asm()[roots.signatures[-1]])
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="another processor")
+def test_the_estimate_of_avx_512_is_compiled_for_processors_that_have_it():
+    """Compiled alone, so that it is tested on all others too; those that have it run it above."""
+    processor = {
+        "NUMBA_CPU_NAME": "x86-64-v4",
+        "NUMBA_CPU_FEATURES": "+avx512f,+avx512vl,+avx,+sse2",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", AVX_512],
+        env=os.environ | processor,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["True", "True"]
 
 
 @pytest.mark.parametrize(
