@@ -25,6 +25,7 @@ from study.models.elements_record import mesh_levels, model_record
 from study.models.errors import (
     DISPLACEMENT_LIMIT,
     VELOCITY_LIMIT,
+    mean_velocity_error,
     step_checks,
     time_step_errors,
 )
@@ -112,6 +113,7 @@ class PreparedElements:
     best: MeshSolution | None = field(default=None, init=False)
     _times: int = field(default=1, init=False)  # factor on the number of own steps
     _force_steps: Floats = field(default_factory=lambda: np.zeros(0), init=False)
+    _mean_velocity: float | None = field(default=None, init=False)
     _looked_at: tuple[Level, Loaded] | None = field(default=None, init=False)
 
     @property
@@ -230,7 +232,7 @@ class PreparedElements:
         record = model_record(
             model.name, model.label, self.problem, model.damping, best, steps, elements
         )
-        checks = (*step_checks(self.model.name, steps), *_subspace_checks(best))
+        checks = (*self._step_checks(steps), *_subspace_checks(best))
         notes = [self._keep_fields(best, watch), note]
         if error is None:
             why = why_unknown(self.problem, best)
@@ -247,13 +249,17 @@ class PreparedElements:
             half = self._halved(coarsest, progress)
             whole = coarsest.found.trajectory
             errors = time_step_errors(ORDER, self.problem.probes, whole, half.trajectory)
-            missed = not all(check.passed for check in step_checks(self.model.name, errors))
+            self._mean_velocity = mean_velocity_error(ORDER, self.problem, whole, half.trajectory)
+            missed = not all(check.passed for check in self._step_checks(errors))
             self._force_steps = force_step_errors(whole, half.trajectory)
             missed = missed or bool((self._force_steps > DISPLACEMENT_LIMIT).any())
             if not (missed and self._may_halve()):
                 return coarsest, errors
             self._times *= 2
             coarsest = replace(coarsest, found=half)
+
+    def _step_checks(self, errors: dict[str, CurveErrors]) -> Iterator[Check]:
+        return step_checks(self.model.name, errors, self._mean_velocity)
 
     def _may_halve(self) -> bool:
         """Whether the steps are the model's own, and could be shorter."""

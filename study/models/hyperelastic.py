@@ -25,7 +25,12 @@ from fem_reference.observation import at_points, evaluation
 from msm.timestep import whole_steps
 from study.models.damping import reference_damping
 from study.models.elements_record import mesh_levels, model_record
-from study.models.errors import step_checks, time_step_errors, tool_force_errors
+from study.models.errors import (
+    mean_velocity_error,
+    step_checks,
+    time_step_errors,
+    tool_force_errors,
+)
 from study.models.finite_elements import (
     FRAME_RATE,
     SUPPORTED_FEATURES,
@@ -193,11 +198,13 @@ class PreparedHyperelastic:
             contact = self.contact_problem(body)
             found = self._moved(body, contact, self.problem.observation, progress)
             if not solved:
-                errors, force_steps = self._by_steps(body, contact, found.trajectory, progress)
+                errors, force_steps, mean = self._by_steps(
+                    body, contact, found.trajectory, progress
+                )
             solved = [*(one.outlined for one in solved), self._solution(level, body, found)]
         self.best = solved[-1]
         record = self._record(solved, errors, force_steps)
-        checks = tuple(step_checks(name, errors)) if errors else ()
+        checks = tuple(step_checks(name, errors, mean)) if errors else ()
         self._keep_fields(body, contact, found, watch)
         return ModelRun(found.trajectory, record, checks, tuple(self._of_overlooked(found)))
 
@@ -211,19 +218,19 @@ class PreparedHyperelastic:
 
     def _by_steps(
         self, body: Body, contact: ContactProblem, found: Trajectory, progress: Progress
-    ) -> tuple[dict[str, CurveErrors], Floats]:
-        """Errors of curves and of the tools' forces (tools,) by the steps; none if it diverged.
+    ) -> tuple[dict[str, CurveErrors], Floats, float | None]:
+        """Errors of curves, tools' forces (tools,) and mean velocity by the steps.
 
-        By how much steps twice as long change them, as if that were of first order: where contact
-        begins and ends, the order of the steps is not seen.
+        None if it diverged. By how much steps twice as long change them, as if that were of first
+        order: where contact begins and ends, the order of the steps is not seen.
         """
         seen, problem = self.problem.observation, self.problem
         if found.status != "finished" or len(seen.times) < FEWEST:
-            return {}, np.zeros(0)
+            return {}, np.zeros(0), None
         thinned = replace(seen, times=seen.times[::2], frames=(0,))
         other = self._moved(body, contact, thinned, progress).trajectory
         if other.status != "finished":
-            return {}, np.zeros(0)
+            return {}, np.zeros(0), None
         own = replace(
             found,
             displacement=found.displacement[::2],
@@ -236,7 +243,9 @@ class PreparedHyperelastic:
             for probe, one in time_step_errors(1, problem.probes, other, own).items()
         }
         of_forces = tool_force_errors(1, names, other, own)
-        return errors, np.array([0.5 * of_forces[name] for name in names])
+        forces = np.array([0.5 * of_forces[name] for name in names])
+        mean = mean_velocity_error(1, problem, other, own)
+        return errors, forces, None if mean is None else 0.5 * mean
 
     def _solution(self, level: Level, body: Body, found: LargeSolution) -> MeshSolution:
         sizes = body.node_count, len(body.mesh.tetrahedra), body.element

@@ -20,6 +20,7 @@ from msm.stepper import LatticeStepper
 from msm.timestep import whole_steps
 from study.mesh.tetrahedra import volumes
 from study.models.errors import (
+    mean_velocity_error,
     place,
     rounding_checks,
     rounding_errors,
@@ -282,7 +283,7 @@ class PreparedLattice:
             record = replace(record, tool_force_errors=forces)
         by_spacing, why = self._by_spacing(found, watch) if finished else (None, ())
         record = replace(record, spacing_errors=by_spacing)
-        checks = (self._mass(), *(step_checks(self.model.name, errors) if finished else ()))
+        checks = (self._mass(), *self._step_checks(found, half, errors))
         if finished and self.single:
             checks += tuple(rounding_checks(self.model.name, rounding))
         bounds = self._bounds(watch)
@@ -351,6 +352,16 @@ class PreparedLattice:
         with watch.progress.stage(f"{name}: halved steps") as advance:
             step = Counts(2 * found.substeps)
             return self._integrate(step, advance, watch, f"{name}-halved").trajectory
+
+    def _step_checks(
+        self, found: Run, half: Trajectory | None, errors: dict[str, CurveErrors]
+    ) -> Iterator[Check]:
+        """Checks of the steps of a finished motion."""
+        if half is None:
+            return
+        order = INTEGRATORS[self.model.lattice.integrator].order
+        mean = mean_velocity_error(order, self.problem, found.trajectory, half)
+        yield from step_checks(self.model.name, errors, mean)
 
     def _by_spacing(self, found: Run, watch: Watch) -> tuple[SpacingErrors | None, tuple[str, ...]]:
         """Discretisation errors from a coarser lattice, or a note on why there are none.

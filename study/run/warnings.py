@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from study.models.errors import VELOCITY_LIMIT
 from study.models.linear_limits import ROTATION_LIMIT, STRAIN_LIMIT
-from study.results.records import Check, ElementsRecord, ModelRecord
+from study.results.records import Check, ElementsRecord, ModelRecord, largest
 from study.scene import Scene
 from study.scene.schema import Tool
 
@@ -72,7 +73,7 @@ def _travel(tool: Tool) -> float:
 
 
 def _tool_warnings(scene: Scene, record: ModelRecord) -> Iterator[str]:
-    """On tools that the body overlaps, and on tools that a lattice is too coarse for."""
+    """On overlaps with tools, a lattice too coarse for them, and velocities that they make jump."""
     for tool in _moved_tools(scene):
         travel, overlap = _travel(tool) or tool.radius, record.tool_overlap_m or 0.0
         if overlap > OVERLAP * travel:
@@ -83,6 +84,14 @@ def _tool_warnings(scene: Scene, record: ModelRecord) -> Iterator[str]:
             )
         if record.lattice is not None and scene.lattice.springs == "lattice":
             yield from _coarse_contact_warnings(scene, tool)
+    error = largest(record.time_step_errors).velocity if record.time_step_errors else 0.0
+    if _moved_tools(scene) and error > VELOCITY_LIMIT:
+        yield (
+            f"The velocity of {record.name} at the samples is in error by {100 * error:.2g} % by "
+            "the time step: it jumps where a tool reaches or leaves a point, and a sample beside a "
+            "jump may miss all of it. Take this error into account in scores of velocity; only "
+            "means between samples are checked."
+        )
 
 
 def _coarse_contact_warnings(scene: Scene, tool: Tool) -> Iterator[str]:
