@@ -32,7 +32,7 @@ Bools = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Norm of the residual relative to that of the load."""
 MOST_ITERATIONS = 12
-"""Iterations that leave more than FAST of the residual; others are near equilibrium and not counted."""
+"""Iterations that leave more than FAST of the residual; faster ones are not counted."""
 FAST = 0.1
 SHORTEST_STEP = 1 / 64
 INCREMENTS = Increments(easy=5, smallest=1 / 64)
