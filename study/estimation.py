@@ -24,7 +24,8 @@ from fuzzy.liver.stiffness import (
 )
 from fuzzy.liver.system import liver_system
 from fuzzy.liver.table1 import AETIOLOGIES
-from fuzzy.systems.kinds import SYSTEMS
+from fuzzy.systems.inference import Inferred, infer
+from fuzzy.systems.kinds import SYSTEMS, check_kind
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
 from study.folders import check_file, check_folder, making, write_bytes
@@ -82,19 +83,23 @@ def answer(request: EstimationRequest) -> Answer:
     for name in request.systems:
         if name not in SYSTEMS:
             raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
+        if request.systems.count(name) > 1:
+            raise ValueError(f"--system {name}: named twice; leave one out")
     _refuse_idle(request)
     if request.figures is not None:
         check_folder(request.figures, "--figures")
     if request.inputs is not None:
         return _table(request, request.inputs)
-    if request.rule_base is not None:
-        raise ValueError("--rule-base: give the readings as a table, --inputs FILE.csv")
     for flag, given in (("--out", request.out), ("--row", request.row)):
         if given is not None:
             raise ValueError(
                 f"{flag}: only with a table of readings; give --inputs or leave it out"
             )
-    return _patient(request)
+    if request.as_json and request.explain:
+        raise ValueError("--explain: is a text; leave out --json")
+    if request.surface is not None and request.figures is None:
+        raise ValueError("--surface: only with --figures; give a folder or leave it out")
+    return _patient(request) if request.rule_base is None else _by_file(request, request.rule_base)
 
 
 def _refuse_idle(request: EstimationRequest) -> None:
@@ -130,13 +135,10 @@ def _patient(request: EstimationRequest) -> Answer:
     found = [estimate(readings, name, settings) for name in request.systems or SYSTEMS]
     lines = [_as_json(found)] if request.as_json else [_line(one) for one in found]
     if request.explain:
-        if request.as_json:
-            raise ValueError("--explain: is a text; leave out --json")
-        lines += _explained(request, patient_system(readings, settings), liver_row(readings)[0])
+        system = patient_system(readings, settings)
+        lines += _explained(request, system, liver_row(readings)[0], tuple(SYSTEMS))
     if request.figures is not None:
         lines += _draw(request.figures, request, readings, settings)
-    elif request.surface is not None:
-        raise ValueError("--surface: only with --figures; give a folder or leave it out")
     notes = dict.fromkeys(note for one in found for note in one.notes)
     return Answer(tuple(lines), tuple(notes))
 
@@ -149,8 +151,11 @@ def _check_plausible(kpa: float, where: str) -> None:
 
 def _line(found: StiffnessEstimate) -> str:
     bounds = [f"{bound / PA_PER_KPA:.2f}" for bound in found.interval or ()]
-    interval = f"   [{', '.join(bounds)}]" if bounds else ""
-    return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval}"
+    return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{_interval(bounds)}"
+
+
+def _interval(bounds: Sequence[str]) -> str:
+    return f"   [{', '.join(bounds)}]" if bounds else ""
 
 
 def _as_json(found: Sequence[StiffnessEstimate]) -> str:
@@ -168,16 +173,84 @@ def _numbers(found: StiffnessEstimate) -> dict[str, object]:
 
 
 def _explained(
-    request: EstimationRequest, system: FuzzySystem, x: NDArray[np.float64]
+    request: EstimationRequest,
+    system: FuzzySystem,
+    x: NDArray[np.float64],
+    kinds: Sequence[str],
 ) -> Iterator[str]:
     from fuzzy.systems.explain import explain
     from fuzzy.systems.explanation_text import explanation_lines
 
     unit = UNIT if request.rule_base is None else ""
     options = settings_of(request.settings).options
-    for name in request.systems or SYSTEMS:
+    for name in kinds if not request.systems else request.systems:
         yield ""
         yield from explanation_lines(explain(system, x, name, options, unit), unit)
+
+
+# --- one patient, by a rule base of the user's -------------------------------------------------
+
+
+def _by_file(request: EstimationRequest, path: Path) -> Answer:
+    """Outputs of a rule base for one reading of each of its inputs, in its own units."""
+    if request.figures is not None:
+        raise ValueError("--figures: only of the liver's rules; leave it out with --rule-base")
+    system, _ = _rule_base(path, request.settings)
+    x = _own_readings(request.readings, system, path)
+    kinds = tuple(request.systems) or tuple(kind for kind in SYSTEMS if _serves(system, kind))
+    options = settings_of(request.settings).options
+    found = {kind: infer(system, x[None], kind, options) for kind in kinds}
+    if request.as_json:
+        lines = [json.dumps({kind: _own_numbers(one) for kind, one in found.items()}, indent=1)]
+    else:
+        lines = [_own_line(kind, one) for kind, one in found.items()]
+    if request.explain:
+        lines += _explained(request, system, x, kinds)
+    return Answer(
+        tuple(lines), tuple(dict.fromkeys(n for one in found.values() for n in one.notes))
+    )
+
+
+def _own_readings(
+    readings: Mapping[str, float], system: FuzzySystem, path: Path
+) -> NDArray[np.float64]:
+    """Readings (inputs,) in the order of the inputs. ValueError for one too many or too few."""
+    names = [variable.name for variable in system.inputs]
+    listed = f"the inputs of {path} are {', '.join(names)}"
+    if not readings:
+        raise ValueError(f"--rule-base: give its readings as a table, --inputs FILE.csv; {listed}")
+    for name in readings:
+        if name not in names:
+            raise ValueError(f"--{name}: {listed}; leave it out")
+    for name in names:
+        if name not in readings:
+            how = f"give --{name}" if name in AETIOLOGIES else "give a table, --inputs FILE.csv"
+            raise ValueError(f"--rule-base: no reading of {name}; {how}; {listed}")
+    return np.array([readings[name] for name in names])
+
+
+def _serves(system: FuzzySystem, kind: str) -> bool:
+    """Whether a rule base can be evaluated as this kind."""
+    try:
+        check_kind(system, kind)
+    except ValueError:
+        return False
+    return True
+
+
+def _own_line(kind: str, found: Inferred) -> str:
+    bounds = [] if found.interval is None else [f"{bound:.6g}" for bound in found.interval[0]]
+    return f"{kind:16s} {found.value[0]:9.6g}{_interval(bounds)}"
+
+
+def _own_numbers(found: Inferred) -> dict[str, object]:
+    numbers: dict[str, object] = {
+        "estimate": float(found.value[0]),
+        "method": found.method,
+        "notes": list(found.notes),
+    }
+    interval = {} if found.interval is None else {"interval": found.interval[0].tolist()}
+    return numbers | interval
 
 
 # --- a table -----------------------------------------------------------------------------------
@@ -199,7 +272,7 @@ def _table(request: EstimationRequest, inputs: Path) -> Answer:
         notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_, blanks)
         lines.append(str(request.out))
     if request.explain:
-        lines += _explained(request, *_table_row(request, inputs, system))
+        lines += _explained(request, *_table_row(request, inputs, system), request.systems)
     return Answer(tuple(lines), notes)
 
 
