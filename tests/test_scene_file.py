@@ -356,11 +356,19 @@ def test_a_key_without_effect_is_told(tmp_path):
     again = read_scene(str(_written(tmp_path, write_scene(scene).encode())))
     assert again.remarks == scene.remarks
     # What a built-in scene has for its own support is not the user's.
-    given = read_scene("liver", ["support.kind=clamped", "tool.history.frequency=2 Hz"])
-    assert given.remarks == ("tool.history.frequency: has no effect in this scene",)
+    asked = read_scene("liver", ["support.kind=clamped", 'tool.history={kind="step", ramp="9 s"}'])
+    assert asked.remarks == ("tool.history.ramp: has no effect in this scene",)
+    planned = read_scene("liver", ['require={error="5 %"}', 'models=["fem"]'])
+    assert [one.partition(":")[0] for one in planned.remarks] == ["models"]
     # Negative control: nothing is told of keys that have an effect, or say what is so anyway.
     held = CLAMPED.replace(b"clamped", b"foundation") + b'[tool]\nshape = "blunt"\n'
     assert read_scene(str(_written(tmp_path, held))).remarks == ()
+
+
+@pytest.mark.parametrize("value", ["true", "nan", '"1.7 m/s"'])
+def test_a_reading_of_a_rule_base_is_a_number(value):
+    with pytest.raises(SceneError, match=r"fuzzy\.inputs\.speed: "):
+        read_scene("liver", [f'fuzzy={{rule_base="own.fis", inputs={{speed={value}}}}}'])
 
 
 def test_what_an_override_gives_is_on_no_line(tmp_path):

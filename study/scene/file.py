@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -53,9 +53,11 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     _replace_organ(table, given)
     _resolve_files(table, Path.cwd())
     scene = validate(table, name, lines)
+    names = set(map(_as_written, _names(table)))
     if name in BUILT_IN:  # its own keys are for whatever the overrides make of it
-        return _suiting_the_rest(_telling_idle(scene, given), given)
-    return _telling_idle(scene, {*lines, *given})
+        names = {key for key in names if any(f"{key}.".startswith(f"{one}.") for one in given)}
+        return _suiting_the_rest(_telling_idle(scene, names), given)
+    return _telling_idle(scene, names)
 
 
 def _refuse_internal_names(table: Table, source: str, lines: Mapping[str, int]) -> None:
@@ -118,9 +120,21 @@ def _telling_idle(scene: Scene, given: Collection[str]) -> Scene:
 
     They are no error: a file may be run with other tools or supports by an override.
     """
-    idle = (_as_written(".".join(map(str, keys))) for keys in unused(scene) if _is_set(scene, keys))
-    said = (f"{key}: has no effect in this scene" for key in idle if key in given)
+    idle = [_as_written(".".join(map(str, keys))) for keys in unused(scene) if _is_set(scene, keys)]
+    said = [f"{key}: has no effect in this scene" for key in idle if key in given]
+    if scene.require is not None and "models" in given:
+        said.append("models: has no effect beside require, whose plan chooses the model")
     return replace(scene, remarks=(*scene.remarks, *said))
+
+
+def _names(table: Table, prefix: str = "") -> Iterator[str]:
+    """Full names of all tables and keys of a table; entries of a list by their numbers from 0."""
+    for key, value in table.items():
+        name = f"{prefix}{key}"
+        yield name
+        entries = dict(enumerate(value)) if isinstance(value, list) else value
+        if isinstance(entries, dict):
+            yield from _names(entries, f"{name}.")
 
 
 def _is_set(scene: Scene, keys: Sequence[str | int]) -> bool:
