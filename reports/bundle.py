@@ -39,6 +39,7 @@ SUMS = "SHA256SUMS"
 LARGEST = 2**31
 """Bytes of an unpacked member beyond which an archive is refused."""
 REPORTS = (manifest.REPORT, manifest.PAGE)
+ENDING = ".zip"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every member: the earliest that a zip file has."""
 MEMBER = re.compile(r"(results|inputs|environment)/[^/\\\0]+|[^/\\\0]+")
@@ -52,10 +53,19 @@ def bundle(folder: Path, out: Path) -> None:
     Reports that are missing are left out. Raises ResultsError for a folder that is not whole, and
     ValueError for inputs that have changed since the run or a place that cannot be written.
     """
+    _check_place(folder, out)
     found = results_folder.read(folder)
     check_file(out)
     _check_inputs(found)
     write_bytes(out, packed(files(folder, found)))
+
+
+def _check_place(folder: Path, out: Path) -> None:
+    """ValueError for another ending, or a place where the next run would refuse the archive."""
+    if out.suffix.lower() != ENDING:
+        raise ValueError(f"--out {out}: end it with {ENDING}")
+    if out.absolute().parent == folder.absolute():
+        raise ValueError(f"--out {out}: a results folder holds nothing else; put it elsewhere")
 
 
 def files(folder: Path, found: Results) -> dict[str, bytes]:
@@ -198,7 +208,7 @@ class Unpacked:
 
 def is_archive(path: Path) -> bool:
     """Whether a path is an archive and no folder."""
-    return path.is_file() and zipfile.is_zipfile(path)
+    return path.is_file() and (path.suffix.lower() == ENDING or zipfile.is_zipfile(path))
 
 
 def unpack(archive: Path, folder: Path) -> Unpacked:

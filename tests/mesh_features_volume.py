@@ -170,6 +170,10 @@ _REFUSED = {
     ),
     "node numbers that are not positive": (after("*NODE", "0, 1., 1., 1."), "line 4: 0 is no node"),
     "an unterminated last line": (str.rstrip, "line 79 is the last one and not ended"),
+    "a file that ends with elements and has many nodes without any": (
+        lambda text: "".join(text.splitlines(keepends=True)[:35]),
+        "the file ends with elements, and 15 of 27 nodes have none: truncated?",
+    ),
     "several instances with a body": (
         part(*_INSTANCE, *_END, "*Instance, name=B, part=Organ", "1.", *_END),
         "2 bodies: instance ORGAN-1 (line 82), instance B (line 84)",

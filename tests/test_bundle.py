@@ -130,6 +130,10 @@ def test_a_cut_archive_is_refused_as_damaged(folder, tmp_path):
     archive.write_bytes(data)
     with pytest.raises(ResultsError):
         bundle.unpack(archive, tmp_path / "out")
+    archive.write_bytes(data[: len(data) // 2])  # no archive by its content any more
+    with pytest.raises(ResultsError, match=r"run\.zip: damaged archive"):
+        report_command(archive, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_of_something_else_is_not_replaced(folder, tmp_path):

@@ -268,7 +268,7 @@ def test_the_lines_say_who_is_better():
 
 @pytest.mark.parametrize("patients", [0, 499])
 def test_too_few_patients_are_refused(patients):
-    with pytest.raises(ValueError, match=f"patients = {patients}: give 500 or more"):
+    with pytest.raises(ValueError, match=f"patients = {patients}: give 500 to"):
         cohort_study(patients, 1)
 
 

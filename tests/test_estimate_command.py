@@ -1,6 +1,8 @@
 """`liver-study estimate` and `rules`, as a person with a rule base of their own uses them."""
 
 import csv
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +130,33 @@ def test_a_reading_out_of_range_is_noted_with_its_line(typed, folder):
     assert refused.returncode == 2
     assert "line 3" in refused.stderr
     assert not (folder / "no.csv").exists()
+
+
+def test_readings_are_those_of_a_rule_bases_inputs_by_name(typed, tmp_path):
+    """MATLAB's tipper with other names: its printed answer for a service of 4 and a food of 5."""
+    service, food = tipper().inputs
+    named = replace(
+        tipper(), inputs=(replace(service, name="hcv"), replace(food, name="ald")), name="own"
+    )
+    write_rule_base(named, tmp_path / "own.fis")
+    given = ("estimate", "--rule-base", "own.fis", "--hcv", "4", "--ald", "5")
+    first, *_ = typed(*given).stdout.splitlines()
+    assert first.split() == ["mamdani", PRINTED[1]]
+    found = json.loads(typed(*given, "--json", "--system", "interval-type-2").stdout)
+    one = found["interval-type-2"]
+    assert f"{one['estimate']:.4f}" == PRINTED[1]
+    low, high = one["interval"]
+    assert low <= one["estimate"] <= high
+    for flags, said in (
+        (given[:-2], "no reading of ald; give --ald; the inputs of own.fis are hcv, ald"),
+        ((*given, "--hbv", "3"), "--hbv: the inputs of own.fis are hcv, ald; leave it out"),
+        (given[:3], "--inputs FILE.csv; the inputs of own.fis are hcv, ald"),
+        ((*given, "--figures", "drawn"), "--figures: only of the liver's rules"),
+        ((*given, "--absent", "normal"), "--absent: shapes the liver's rules only"),
+    ):
+        refused = typed(*flags)
+        assert refused.returncode == 2
+        assert said in refused.stderr
 
 
 @pytest.mark.usefixtures("folder")

@@ -85,7 +85,8 @@ def judge(ended, words, *, spoken=True):
     assert "Traceback" not in ended.err, said
     assert "a defect of the program" not in ended.err, said
     if ended.code in {2, 3} and spoken:
-        last = ended.err.strip().splitlines()[-1]
+        told = [line for line in ended.err.splitlines() if line and not line.startswith("  ")]
+        last = told[-1]  # each of several problems of a scene has a line of its own, set in
         assert last.startswith("liver-study: "), said
         assert len(last) > len("liver-study: "), said
 

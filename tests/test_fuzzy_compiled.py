@@ -332,6 +332,19 @@ def test_a_rule_wrongly_left_out_would_be_seen():
 # Rows and blocks
 
 
+def test_ends_that_differ_by_rounding_alone_are_in_order():
+    """Without a footprint both ends are the centroid, and the answer is not outside them."""
+    system = liver_system(LiverSettings(knowledge="severity", footprint_factor=0.0))
+    for found in (
+        defined(system, INSIDE, "interval-type-2", InferenceOptions()),
+        compiled(system, "interval-type-2", InferenceOptions()).evaluate(INSIDE),
+    ):
+        low, high = found.interval.T
+        assert (low <= found.value).all()
+        assert (found.value <= high).all()
+        np.testing.assert_allclose(low, high, rtol=1e-12)
+
+
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_an_answer_does_not_depend_on_the_rows_beside_it(kind):
     model = compiled(LIVER, kind, InferenceOptions())

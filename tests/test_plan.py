@@ -277,6 +277,18 @@ def test_planned_scene_is_written_and_runs_as_it_is(tmp_path, capsys):
     assert read_scene(str(out)).models == ("superposition",)
 
 
+def test_check_plans_what_run_would(typed):
+    """What no model can meet is refused by both; else the chosen model is described."""
+    small = [word for one in (*SMALL, *AT_TOOL) for word in ("--set", one)]
+    refused = typed("check", "block", *small, "--set", "require.error=0.01 %")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("liver-study: require.error: ")
+    shown = typed("check", "block", *small, "--set", "require.error=50 %")
+    assert shown.returncode == 0, shown.stderr
+    assert "note: Planned: " in shown.stdout
+    assert "models: basafa" not in shown.stdout
+
+
 @pytest.mark.parametrize(
     ("override", "said"),
     [

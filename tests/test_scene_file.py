@@ -59,7 +59,17 @@ def test_all_problems_are_reported_at_once_with_key_and_remedy(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("9.5 kPa", 9.5e3), ("9500", None), ("1e3 N/m^2", 1e3), ("0.01 MPa", 1e4)],
+    [
+        ("9.5 kPa", 9.5e3),
+        ("9500", None),
+        ("1e3 N/m^2", 1e3),
+        ("0.01 MPa", 1e4),
+        ("1e3 N/m²", 1e3),
+        ("1e3 N/m2", 1e3),
+        ("0.001 N/mm**2", 1e3),
+        ("1e3 N·m⁻²", 1e3),
+        ("1e9 µPa", 1e3),
+    ],
 )
 def test_a_pressure_needs_its_unit(text, value):
     pressure = Quantity("Pa", 100, 1e6)
@@ -282,6 +292,17 @@ def _written(folder, data):
     return path
 
 
+TWO_TOOLS = b"""title = ""
+[[tool]]
+force = %b
+
+[[tool]]
+force = %b
+[tool.history]
+kind = "ramp"
+"""
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -298,11 +319,56 @@ def _written(folder, data):
         (PLAIN.replace("force", "froce").encode(), r"did you mean 'force'\? \[line 4\]"),
         (PLAIN.encode() + b"[reference]\nmodes = 3\n", r"reference\.modes: .* \[line 6\]"),
         (b"time = { samples = 3 }\n", r"time\.samples: .* \[line 1\]"),
+        (b"[[further_tools]]\n", r"further_tools: unknown key; write .* \[\[tool\]\] \[line 1\]"),
+        (b"[[weight]]\nmass = 1\n", r"weight\.1\.place: missing; give it \[line 1\]"),
+        (TWO_TOOLS % (b'"1 N"', b'"1 m"'), r"tool\.2\.force: .* \[line 6\]"),
+        (TWO_TOOLS % (b'"1 m"', b'"1 N"'), r"tool\.force: .* \[line 3\]"),
+        (TWO_TOOLS % (b'"1 N"', b'"1 N"\nradius = 9'), r"tool\.2\.history\.kind: .* \[line 9\]"),
     ],
 )
 def test_a_fault_of_a_file_is_told_by_its_line(data, message, tmp_path):
     with pytest.raises(SceneError, match=message):
         read_scene(str(_written(tmp_path, data)))
+
+
+def test_each_of_several_problems_has_a_line_of_its_own(typed, tmp_path):
+    path = _written(tmp_path, b'[tool]\nradius = "1 N"\nplace = { side = "up", at = [2, "x"] }\n')
+    first, *rest = typed("check", path).stderr.splitlines()
+    assert first == f"liver-study: {path}: 4 problems"
+    assert [line.split(":")[0] for line in rest] == [
+        "  tool.place.at.0",
+        "  tool.place.at.1",
+        "  tool.place.side",
+        "  tool.radius",
+    ]
+
+
+CLAMPED = b"""[support]
+kind = "clamped"
+stiffness = "1 MPa/m"
+depth = "40 mm"
+"""
+
+
+def test_a_key_without_effect_is_told(tmp_path):
+    scene = read_scene(str(_written(tmp_path, CLAMPED)))
+    assert scene.remarks == ("support.stiffness: has no effect in this scene",)
+    again = read_scene(str(_written(tmp_path, write_scene(scene).encode())))
+    assert again.remarks == scene.remarks
+    # What a built-in scene has for its own support is not the user's.
+    asked = read_scene("liver", ["support.kind=clamped", 'tool.history={kind="step", ramp="9 s"}'])
+    assert asked.remarks == ("tool.history.ramp: has no effect in this scene",)
+    planned = read_scene("liver", ['require={error="5 %"}', 'models=["fem"]'])
+    assert [one.partition(":")[0] for one in planned.remarks] == ["models"]
+    # Negative control: nothing is told of keys that have an effect, or say what is so anyway.
+    held = CLAMPED.replace(b"clamped", b"foundation") + b'[tool]\nshape = "blunt"\n'
+    assert read_scene(str(_written(tmp_path, held))).remarks == ()
+
+
+@pytest.mark.parametrize("value", ["true", "nan", '"1.7 m/s"'])
+def test_a_reading_of_a_rule_base_is_a_number(value):
+    with pytest.raises(SceneError, match=r"fuzzy\.inputs\.speed: "):
+        read_scene("liver", [f'fuzzy={{rule_base="own.fis", inputs={{speed={value}}}}}'])
 
 
 def test_what_an_override_gives_is_on_no_line(tmp_path):

@@ -14,6 +14,7 @@ SPHERE = (
     "tool.displacement=3 mm",
 )
 TOP = 'support={kind="%s", side="superior", depth="1 mm"}'
+BOTH = 'support=[{kind="sliding", side="%s", depth="1 mm"}, {side="inferior", depth="1 mm"}]'
 ON_TOP = 'place={side="superior", at=[0.5, 0.5]}'
 
 
@@ -26,7 +27,7 @@ def posed(*overrides):
     [
         (TOP % "clamped",),
         # Along its own line a sliding surface does not make way either.
-        (TOP % "sliding", 'further_supports=[{side="inferior", depth="1 mm"}]'),
+        (BOTH % "superior",),
         ('support={kind="clamped", place={side="superior", at=[0.3, 0.5]}, radius="10 mm"}',),
         ("tool.shape=punch", "tool.contact=bonded", "tool.displacement=-1 mm", TOP % "clamped"),
     ],
@@ -46,8 +47,7 @@ def test_a_tool_moved_into_what_cannot_move_is_refused(overrides):
         # Beside a plane of symmetry the surface slides down with the tool.
         (
             "tool.shape=plate",
-            'support={kind="sliding", side="left", depth="1 mm"}',
-            'further_supports=[{side="inferior", depth="1 mm"}]',
+            BOTH % "left",
         ),
     ],
 )

@@ -26,6 +26,7 @@ from fuzzy.systems.sets import Array, membership
 from fuzzy.systems.sugeno import constants
 from fuzzy.systems.system import FuzzySystem, firing_strengths
 
+MOST_PATIENTS = 10_000_000
 FOLDS = 5
 NORMAL_95 = 1.959964
 NOMINAL = 0.9
@@ -446,11 +447,12 @@ class CohortStudy(NamedTuple):
 
 
 def cohort_study(patients: int, seed: int, displacement: Displacement | None = None) -> CohortStudy:
-    """Evaluate every contender on virtual patients. ValueError for too few of them."""
+    """Evaluate every contender on virtual patients. ValueError for too few or too many of them."""
     least = 100 * len(AETIOLOGIES)
-    if patients < least:
+    if not least <= patients <= MOST_PATIENTS:
         raise ValueError(
-            f"patients = {patients}: give {least} or more, for every group to have some"
+            f"patients = {patients}: give {least} to {MOST_PATIENTS}, for every group to have some "
+            "and all to fit in memory"
         )
     drawn = cohort(patients, seed)
     answers = {name: evaluate(drawn) for name, evaluate in contenders().items()}

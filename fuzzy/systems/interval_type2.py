@@ -49,6 +49,7 @@ def evaluate(system: FuzzySystem, X: Array, options: InferenceOptions) -> Output
         upper = union(high_fired, upper_sets, system.operators)
         interval = reducer.ends(quadrature, lower, upper)
         middle = centroid(quadrature, lower + upper)
+    interval = np.sort(interval, axis=-1)  # without a footprint the ends differ by rounding alone
     value = middle if reducer.nie_tan else interval.mean(axis=-1)
     return Output(value, interval, strength)
 

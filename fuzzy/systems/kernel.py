@@ -147,6 +147,9 @@ def interval_type2(
             centroid(grid, upper, n, value, start)
     if not nie_tan:
         value[:] = 0.5 * (left + right)
+    for k in range(len(X)):  # without a footprint the ends differ by rounding alone
+        if left[k] > right[k]:
+            left[k], right[k] = right[k], left[k]
     return value, left, right, strength
 
 

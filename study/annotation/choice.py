@@ -39,7 +39,7 @@ class Choice:
         if not isinstance(value, str) or value not in names:
             quoted = [repr(name) for name in names]
             listed = " or ".join(filter(None, [", ".join(quoted[:-1]), quoted[-1]]))
-            near = difflib.get_close_matches(str(value), names, n=1)
+            near = difflib.get_close_matches(str(value).lower(), names, n=1)
             hint = f", did you mean {near[0]!r}?" if near else ""
             raise ValueError(f"should be {listed}{hint}")
         return value

@@ -19,6 +19,8 @@ _NUMBER = r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)"
 _UNIT = r"[A-Za-z]{1,12}(\^-?[1-4])?"
 _TEXT = re.compile(rf"{_NUMBER}\s*(?P<unit>%|({_UNIT}(\s*[*/]\s*{_UNIT}){{0,3}})?)")
 _COMMA = re.compile(r"[+-]?\d+,\d")
+_POWER = re.compile(r"(?<=[A-Za-z])(?:\*\*)?(⁻?[¹²³⁴]|(?<=\*\*)-?[1-4]|[2-4])(?![A-Za-z0-9])")
+_IN_ASCII = str.maketrans("µμ·⋅⁻¹²³⁴", "uu**-1234")
 _LONGEST_TEXT = 80
 USUAL = {
     "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "um": 1e-6},
@@ -54,7 +56,8 @@ class Quantity:
 
     def read(self, value: object) -> float:
         """SI value of a text with unit or of a bare SI number; ValueError says what is wrong."""
-        number = _parsed(value, self.unit) if isinstance(value, str) else _bare(value, self.unit)
+        given = (self.unit, self._example())
+        number = _parsed(value, *given) if isinstance(value, str) else _bare(value, *given)
         if not math.isfinite(number):
             raise ValueError("must be finite")
         if not self.low <= number <= self.high:
@@ -62,6 +65,12 @@ class Quantity:
             limits = f"must lie between {self.low:g} and {self.high:g} {self.unit}".strip()
             raise ValueError(limits + hint)
         return number
+
+    def _example(self) -> str:
+        """A value in range: 1 in the SI unit, or in the first usual unit in which it is allowed."""
+        units = (self.unit, *USUAL.get(self.unit, ()))
+        allowed = (one for one in units if self.low <= _factor(one, self.unit, "") <= self.high)
+        return f'"1 {next(allowed, self.unit)}"'
 
     def _meant(self, number: float) -> str:
         """For a bare number out of range: the first usual unit that would bring it into range."""
@@ -87,21 +96,28 @@ class Quantity:
         return int(self.read(value))
 
 
-def _bare(value: object, unit: str) -> float:
+def _bare(value: object, unit: str, example: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        example = (
-            f'write a number with its unit, for example "1 {unit}"' if unit else "write a number"
+        raise ValueError(  # noqa: TRY004 - pydantic reports ValueErrors only
+            f"write a number with its unit, for example {example}" if unit else "write a number"
         )
-        raise ValueError(example)  # noqa: TRY004 - pydantic reports ValueErrors only
     try:
         return float(value)
     except OverflowError:
         raise ValueError("must be finite") from None
 
 
-def _parsed(text: str, unit: str) -> float:
-    match = _TEXT.fullmatch(text.strip()) if len(text) <= _LONGEST_TEXT else None
-    example = f'write for example "1 {unit}"' if unit else "write a plain number"
+def _in_ascii(text: str) -> str:
+    """A quantity as it would be typed without µ, raised digits and dots: N/mm², N/mm2 as N/mm^2."""
+    plain = text.strip().replace("−", "-")
+    number = re.match(_NUMBER, plain)
+    end = number.end() if number else 0
+    return plain[:end] + _POWER.sub(r"^\1", plain[end:]).translate(_IN_ASCII)
+
+
+def _parsed(text: str, unit: str, example: str) -> float:
+    match = _TEXT.fullmatch(_in_ascii(text)) if len(text) <= _LONGEST_TEXT else None
+    example = f"write for example {example}" if unit else "write a plain number"
     if match is None:
         comma = "; the decimal sign is a point" if _COMMA.match(text.strip()) else ""
         raise ValueError(f"not one number with a unit{comma}; {example}")
@@ -154,7 +170,7 @@ def _near(name: str, unit: str) -> str:
 
 def _hint(text: str, unit: str) -> str:
     """For a value out of range: the usual unit that differs from its own by the case of letters."""
-    match = _TEXT.fullmatch(text.strip())
+    match = _TEXT.fullmatch(_in_ascii(text))
     name = match["unit"] if match else ""
     usual = tuple(USUAL.get(unit, ()))
     return _near(name, unit) if name not in usual and _differs_by_case(name, usual) else ""

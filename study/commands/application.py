@@ -101,11 +101,11 @@ def _ending(error: BaseException) -> tuple[int, str]:
 
 
 def _refusal(error: ValueError | CycloptsError) -> str:
-    """What is wrong with the input, in one line."""
+    """What is wrong with the input, in one line; each of several problems of a scene in its own."""
     if isinstance(error, UnusedCliTokensError):
         rest = " ".join(error.unused_tokens or ())
         return f"{rest}: the command takes no more; --help lists what it takes"
-    return " ".join(str(error).split())
+    return "\n  ".join(" ".join(line.split()) for line in str(error).split("\n  "))
 
 
 def _show(error: BaseException) -> None:

@@ -21,7 +21,7 @@ def compare(
     first: Path,
     second: Path,
     *others: Path,
-    tolerance: float = 0.0,
+    tolerance: float | None = None,
     errors: Switch = False,
     out: Path | None = None,
 ) -> None:
@@ -50,11 +50,16 @@ def compare(
         .html).
     """
     if others or errors:
+        if tolerance is not None:
+            raise ValueError(
+                "--tolerance: a table is by the errors of the numbers; leave it out, or compare "
+                "two folders without --errors"
+            )
         _by_errors([first, second, *others], out)
         return
     if out is not None:
         raise ValueError("--out: is for the table of --errors; give both")
-    _two(first, second, tolerance)
+    _two(first, second, tolerance or 0.0)
 
 
 def _by_errors(folders: list[Path], out: Path | None) -> None:

@@ -53,7 +53,8 @@ def estimate(
     inputs
         Table of readings (CSV, columns named as the inputs) instead of one patient.
     rule_base
-        Fuzzy system to evaluate the table with (.fis or .json) instead of the liver's.
+        Fuzzy system (.fis or .json) instead of the liver's, for a table, or for the readings given
+        here if its inputs have these names.
     out
         Table to write: that of --inputs with the column estimate, for type-2 also lower and upper.
     system
@@ -67,7 +68,7 @@ def estimate(
     surface
         The two readings of the output surfaces, hcv hbv by default.
     as_json
-        Print JSON in SI units instead of a table.
+        Print JSON in SI units, of a rule base in its own, instead of a table.
     """
     from study.estimation.answer import answer
     from study.estimation.request import EstimationRequest

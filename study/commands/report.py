@@ -39,6 +39,9 @@ def report(
         Draw all figures again.
     """
     if reference:
+        for flag, given in (("--no-html", not html), ("--fresh", fresh)):
+            if given:
+                raise ValueError(f"{flag}: has no effect with --reference; leave it out")
         _reference(target, out)
         return
     if target is None:
@@ -46,6 +49,8 @@ def report(
     from reports.bundle import is_archive
 
     if is_archive(target):
+        if fresh:
+            raise ValueError("--fresh: the figures of a bundle are always drawn anew; leave it out")
         _of_bundle(target, out or Path(target.stem), html=html)
         return
     if out is not None:

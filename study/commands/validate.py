@@ -30,7 +30,7 @@ def validate(
         file.
     models
         Models: linear, neo-hookean (finite elements), springs, volume (springs with the volume
-        term), basafa. All by default.
+        term), basafa. All by default. Not with --data, where the scene names them.
     data
         Folder with your own measurements of the scene (CSV): curves with the columns time_s and
         displacement_m or force_N; markers.csv with x_m, y_m, z_m, ux_m, uy_m, uz_m; with a column
@@ -41,7 +41,7 @@ def validate(
         With --data: override of a scene value, for example tissue.youngs_modulus="4 kPa". May be
         repeated.
     quick
-        Two meshes or spacings of each model instead of three, less than a minute.
+        Two meshes or spacings of each model instead of three, less than a minute. Not with --data.
     out
         Table to write as well (CSV).
     as_json
@@ -51,12 +51,16 @@ def validate(
     from study.system.progress import on_stderr
     from study.validation import request, table
 
+    own, bodies = {"--probe": probe, "--set": overrides}, {"--models": models, "--quick": quick}
+    for flag, value in (own if data is None else bodies).items():
+        if value:
+            needed = "only with --data" if data is None else "only without --data"
+            raise ValueError(f"{flag}: {needed}; leave it out")
     if out is not None:
         check_file(out)
     with on_stderr() as progress:
         if data is not None:
-            own = request.own_comparisons(name, data, overrides or (), probe, progress)
-            found = list(own)
+            found = list(request.own_comparisons(name, data, overrides or (), probe, progress))
         else:
             names = () if name is None else (name,)
             asked = request.ValidationRequest(names=names, kinds=tuple(models or ()), quick=quick)

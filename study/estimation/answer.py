@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fuzzy.liver.table1 import AETIOLOGIES
 from fuzzy.systems.kinds import SYSTEMS
+from study.estimation.by_file import by_file
 from study.estimation.patient import patient
 from study.estimation.request import SHAPES, Answer, EstimationRequest, flag_of
 from study.estimation.table import table
@@ -18,19 +19,23 @@ def answer(request: EstimationRequest) -> Answer:
     for name in request.systems:
         if name not in SYSTEMS:
             raise ValueError(f"--system {name}: use one of {', '.join(SYSTEMS)}")
+        if request.systems.count(name) > 1:
+            raise ValueError(f"--system {name}: named twice; leave one out")
     _refuse_idle(request)
     if request.figures is not None:
         check_folder(request.figures, "--figures")
     if request.inputs is not None:
         return table(request, request.inputs)
-    if request.rule_base is not None:
-        raise ValueError("--rule-base: give the readings as a table, --inputs FILE.csv")
     for flag, given in (("--out", request.out), ("--row", request.row)):
         if given is not None:
             raise ValueError(
                 f"{flag}: only with a table of readings; give --inputs or leave it out"
             )
-    return patient(request)
+    if request.as_json and request.explain:
+        raise ValueError("--explain: is a text; leave out --json")
+    if request.surface is not None and request.figures is None:
+        raise ValueError("--surface: only with --figures; give a folder or leave it out")
+    return patient(request) if request.rule_base is None else by_file(request, request.rule_base)
 
 
 def _refuse_idle(request: EstimationRequest) -> None:

@@ -38,13 +38,10 @@ def patient(request: EstimationRequest) -> Answer:
     found = [estimate(readings, name, settings) for name in request.systems or SYSTEMS]
     lines = [_as_json(found)] if request.as_json else [_line(one) for one in found]
     if request.explain:
-        if request.as_json:
-            raise ValueError("--explain: is a text; leave out --json")
-        lines += explained(request, patient_system(readings, settings), liver_row(readings)[0])
+        system = patient_system(readings, settings)
+        lines += explained(request, system, liver_row(readings)[0], tuple(SYSTEMS))
     if request.figures is not None:
         lines += _draw(request.figures, request, readings, settings)
-    elif request.surface is not None:
-        raise ValueError("--surface: only with --figures; give a folder or leave it out")
     notes = dict.fromkeys(note for one in found for note in one.notes)
     return Answer(tuple(lines), tuple(notes))
 
@@ -57,8 +54,12 @@ def _check_plausible(kpa: float, where: str) -> None:
 
 def _line(found: StiffnessEstimate) -> str:
     bounds = [f"{bound / PA_PER_KPA:.2f}" for bound in found.interval or ()]
-    interval = f"   [{', '.join(bounds)}]" if bounds else ""
-    return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval}"
+    return f"{found.system:16s} {found.estimate / PA_PER_KPA:7.2f} {UNIT}{interval_text(bounds)}"
+
+
+def interval_text(bounds: Sequence[str]) -> str:
+    """The bounds of an estimate beside it; empty where there are none."""
+    return f"   [{', '.join(bounds)}]" if bounds else ""
 
 
 def _as_json(found: Sequence[StiffnessEstimate]) -> str:
@@ -76,15 +77,21 @@ def _numbers(found: StiffnessEstimate) -> dict[str, object]:
 
 
 def explained(
-    request: EstimationRequest, system: FuzzySystem, x: NDArray[np.float64]
+    request: EstimationRequest,
+    system: FuzzySystem,
+    x: NDArray[np.float64],
+    kinds: Sequence[str],
 ) -> Iterator[str]:
-    """Lines that explain each system's answer for a row of readings `x` (inputs,)."""
+    """Lines that explain the answer for a row of readings `x` (inputs,).
+
+    Of the systems that the request names, else of all `kinds`.
+    """
     from fuzzy.systems.explain import explain
     from fuzzy.systems.explanation_text import explanation_lines
 
     unit = UNIT if request.rule_base is None else ""
     options = settings_of(request.settings).options
-    for name in request.systems or SYSTEMS:
+    for name in request.systems or kinds:
         yield ""
         yield from explanation_lines(explain(system, x, name, options, unit), unit)
 

@@ -37,7 +37,7 @@ def table(request: EstimationRequest, inputs: Path) -> Answer:
         notes = evaluate_table(system, inputs, request.out, kind, options, unit, range_, blanks)
         lines.append(str(request.out))
     if request.explain:
-        lines += explained(request, *_table_row(request, inputs, system))
+        lines += explained(request, *_table_row(request, inputs, system), request.systems)
     return Answer(tuple(lines), notes)
 
 

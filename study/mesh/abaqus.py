@@ -18,6 +18,8 @@ from study.mesh.text import NumberedLine, floats
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _OPTION = re.compile(r'((?:[^,"]|"[^"]*"?)+)')
 _KNOWN_OPTIONS = {"NODE": {"NSET", "SYSTEM"}, "ELEMENT": {"TYPE", "ELSET"}}
+UNUSED = 0.2
+"""Share of nodes without elements above which a file that ends with elements is truncated."""
 _NODE_COLUMNS = 7  # number, three coordinates, three components of a normal
 
 
@@ -77,7 +79,9 @@ def read_abaqus(data: bytes) -> RawMesh:
     lines = _LINE_END.split(data.removeprefix(b"\xef\xbb\xbf").decode("latin-1"))
     keywords = _keywords(lines)
     _refuse_cut_off(lines, keywords)
-    return _joined(_model(keywords))
+    pieces, notes = _pieces(_model(keywords))
+    _refuse_cut_between_lines(keywords, pieces)
+    return _joined(pieces, notes)
 
 
 # ---- Grammar -----------------------------------------------------------------------------------
@@ -126,12 +130,40 @@ def _squeezed(text: str) -> str:
 
 
 def _refuse_cut_off(lines: Sequence[str], keywords: Sequence[_Keyword]) -> None:
-    """No count of nodes or elements is announced, so only the last line can show truncation."""
+    """No count of nodes or elements is announced, but the last line shows if it is cut."""
     if lines[-1].strip() and keywords and keywords[-1].name in {"NODE", "ELEMENT"}:
         raise MeshError(
             f"line {len(lines)} is the last one and not ended: truncated? If it is complete, add "
             "a newline"
         )
+
+
+def _refuse_cut_between_lines(keywords: Sequence[_Keyword], pieces: Sequence[_Piece]) -> None:
+    """Refuse a file that ends with elements and leaves many nodes without any.
+
+    A file cut after a whole line looks like that, and would be the mesh of a part of the body. Some
+    nodes without elements are usual, such as the centres of arcs that Gmsh writes.
+    """
+    if not keywords or keywords[-1].name != "ELEMENT" or _has_lines(keywords):
+        return
+    for piece in pieces:
+        used = np.unique(
+            np.concatenate(
+                [np.empty(0, dtype=np.int64), *(np.ravel(rows) for _, rows in piece.blocks)]
+            )
+        )
+        unused = len(piece.points) - len(used)
+        if piece.blocks and unused > UNUSED * len(piece.points):
+            raise MeshError(
+                f"the file ends with elements, and {unused} of {len(piece.points)} nodes have "
+                "none: truncated? If it is complete, remove these nodes"
+            )
+
+
+def _has_lines(keywords: Sequence[_Keyword]) -> bool:
+    """Whether there are elements without area and volume, whose nodes are not kept."""
+    types = (one.options.get("TYPE", "") for one in keywords if one.name == "ELEMENT")
+    return any(cell_type(_squeezed(one))[0] == "line" for one in types)
 
 
 # ---- The model ---------------------------------------------------------------------------------
@@ -310,8 +342,11 @@ class _Piece(NamedTuple):
     notes: list[str]
 
 
-def _joined(model: _Model) -> RawMesh:
-    """The mesh of the whole model; several bodies in contact would be welded."""
+def _pieces(model: _Model) -> tuple[list[_Piece], list[str]]:
+    """The one body of the model and what is beside it, and notes on what is left out.
+
+    Several bodies are refused: in contact they would be welded.
+    """
     left_out = list(_left_out(model))
     free = "the assembly" if model.instances else "the model"
     pieces = [
@@ -324,6 +359,11 @@ def _joined(model: _Model) -> RawMesh:
         ),
     ]
     _refuse_several(pieces)
+    return pieces, left_out
+
+
+def _joined(pieces: Sequence[_Piece], left_out: Sequence[str]) -> RawMesh:
+    """The mesh of all pieces."""
     starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     blocks = [
         (cell, rows + start)

@@ -9,6 +9,7 @@ from pathlib import Path
 from study.results.folder import default_folder, refuse_unwritable
 from study.run.suiting import read_suited
 from study.scene.file import BUILT_IN
+from study.system.progress import Silent
 
 
 def is_scene(target: str) -> bool:
@@ -28,7 +29,16 @@ def describe_scene(name: str, overrides: Sequence[str], out: Path | None = None)
     """
     scene = read_suited(name, overrides)
     refuse_unwritable(out or default_folder(name))
-    lines = [scene.title or name, f"models: {', '.join(scene.models)}"]
+    lines = [scene.title or name]
+    if scene.require is not None:
+        from study.plan.plan import lines as told
+        from study.run.planned import planned
+
+        found = planned(scene, Silent())
+        if not scene.require.moves:
+            return [*lines, *told(found)]
+        scene = found.scene
+    lines.append(f"models: {', '.join(scene.models)}")
     from study.run.preparation import PreparedPointScene, prepare_scene
 
     given = prepare_scene(scene)

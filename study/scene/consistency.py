@@ -70,6 +70,9 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     yield from _damping_contradictions(scene, table)
     yield from _mesh_contradictions(scene, table)
     yield from _rule_base_contradictions(scene, table)
+    for name in scene.control_points:
+        if not name.strip() or not name.isprintable():
+            yield f"control_points: {name!r} is no name; give one of printable characters"
     for name, place in [*_named_points(scene), *_places_of_weights(scene)]:
         if not _one_way(place):
             yield f"{name}: give either side and at, or fraction, or point"

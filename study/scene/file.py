@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -45,6 +45,7 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     _refuse_mesh(name)
     text, base = _load(name)
     table, lines = parsed(text, name), {} if name in BUILT_IN else key_lines(text)
+    _refuse_internal_names(table, name, lines)
     _resolve_files(table, base)
     _split_lists(table)
     given = {_apply(table, override) for override in overrides}
@@ -52,7 +53,22 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     _replace_organ(table, given)
     _resolve_files(table, Path.cwd())
     scene = validate(table, name, lines)
-    return _suiting_the_rest(scene, given) if name in BUILT_IN else scene
+    names = set(map(_as_written, _names(table)))
+    if name in BUILT_IN:  # its own keys are for whatever the overrides make of it
+        names = {key for key in names if any(f"{key}.".startswith(f"{one}.") for one in given)}
+        return _suiting_the_rest(_telling_idle(scene, names), given)
+    return _telling_idle(scene, names)
+
+
+def _refuse_internal_names(table: Table, source: str, lines: Mapping[str, int]) -> None:
+    """SceneError for the tables after the first by the name that they have in a Scene only."""
+    found = [
+        _placed(f"{others}: unknown key; write several as [[{name}]]", lines)
+        for name, others in SEVERAL.items()
+        if others in table
+    ]
+    if found:
+        raise SceneError(_summary(source, found))
 
 
 def _split_lists(table: Table) -> None:
@@ -97,6 +113,38 @@ def _suiting_the_rest(scene: Scene, given: Collection[str]) -> Scene:
     keys = (key for key in SUITED if key not in given and key.partition(".")[0] not in whole)
     suit = tuple(key for key in keys if has_effect(scene, key))
     return replace(scene, organ=replace(scene.organ, suit=cast(tuple[SuitedKey, ...], suit)))
+
+
+def _telling_idle(scene: Scene, given: Collection[str]) -> Scene:
+    """The scene with a remark on each of the `given` keys that has no effect in it.
+
+    They are no error: a file may be run with other tools or supports by an override.
+    """
+    idle = [_as_written(".".join(map(str, keys))) for keys in unused(scene) if _is_set(scene, keys)]
+    said = [f"{key}: has no effect in this scene" for key in idle if key in given]
+    if scene.require is not None and "models" in given:
+        said.append("models: has no effect beside require, whose plan chooses the model")
+    return replace(scene, remarks=(*scene.remarks, *said))
+
+
+def _names(table: Table, prefix: str = "") -> Iterator[str]:
+    """Full names of all tables and keys of a table; entries of a list by their numbers from 0."""
+    for key, value in table.items():
+        name = f"{prefix}{key}"
+        yield name
+        entries = dict(enumerate(value)) if isinstance(value, list) else value
+        if isinstance(entries, dict):
+            yield from _names(entries, f"{name}.")
+
+
+def _is_set(scene: Scene, keys: Sequence[str | int]) -> bool:
+    """Whether a key of a table has another value than its default."""
+    *tables, name = keys
+    item: Any = scene
+    for key in tables:
+        item = item[key] if isinstance(key, int) else getattr(item, key)
+    defaults = {f.name: f.default for f in dataclasses.fields(item)}
+    return bool(tables) and getattr(item, str(name)) != defaults[str(name)]
 
 
 def validate(table: Table, source: str, lines: Mapping[str, int] | None = None) -> Scene:
@@ -234,6 +282,12 @@ def _apply(table: Table, override: str) -> str:
     keys = _matched([key.strip() for key in path.split(".")])
     if not separator or not all(keys):
         raise SceneError(f"--set {override}: write table.key=value, for example tool.force=1 N")
+    for name, others in SEVERAL.items():
+        if keys[0] == others:
+            raise SceneError(
+                f"--set {override}: unknown key; write several as {name}=[{{...}}, {{...}}], or "
+                f"{name}.2.key=value for the second"
+            )
     for depth, name in enumerate(keys[1:-1], 1):
         if name.isdigit() and ".".join(keys[:depth]) in LISTED:
             rest = ".".join(keys[depth + 1 :]) + separator + text
@@ -288,8 +342,14 @@ def _line(problem: ErrorDetails) -> str:
         return f"{key}: unknown key" + (f", did you mean {meant}?" if meant else "; remove it")
     message = problem["msg"].removeprefix("Value error, ").replace("Input should be", "should be")
     message = message.replace("a valid tuple", "a list").replace("a valid dictionary", "a table")
-    if problem["type"] == "dataclass_type":
-        message = "should be a table"
+    match problem["type"]:
+        case "missing":
+            return f"{key}: missing; give it"
+        case "too_long":
+            limits = problem["ctx"]
+            message = f"should have {limits['max_length']} entries, not {limits['actual_length']}"
+        case "dataclass_type":
+            message = "should be a table"
     return f"{key}: {message} (got {_short(problem['input'])})"
 
 
@@ -332,8 +392,9 @@ def _place_fields() -> list[str]:
 
 
 def _summary(source: str, lines: Sequence[str]) -> str:
-    counted = "1 problem" if len(lines) == 1 else f"{len(lines)} problems"
-    return "\n  ".join([f"{source}: {counted}", *lines])
+    if len(lines) == 1:
+        return f"{source}: {lines[0]}"
+    return "\n  ".join([f"{source}: {len(lines)} problems", *lines])
 
 
 def _remove(table: Any, keys: Sequence[str | int]) -> None:

@@ -59,6 +59,20 @@ def refuse_far(places: Mapping[str, Place], surface: SurfaceMesh, offset: Floats
             )
 
 
+def refuse_long(lengths: Mapping[str, float], surface: SurfaceMesh) -> None:
+    """ValueError naming a length [m] of more than twice the organ's size: another unit was meant.
+
+    Beyond that a radius or a depth covers the whole organ, and a tool leaves it.
+    """
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    for key, length in lengths.items():
+        if length > 2.0 * size:
+            raise ValueError(
+                f"{key}: {1e3 * length:.4g} mm is more than twice the organ, which is "
+                f'{1e3 * size:.4g} mm across; shorten it, or give its unit, as in "10 mm"'
+            )
+
+
 def _from_side(
     side: Side, at: tuple[float, float], surface: SurfaceMesh, lower: Floats, upper: Floats
 ) -> tuple[Floats, Floats]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +30,7 @@ from study.problem.supports import (
 from study.problem.tool_travel import full_share
 from study.problem.trajectory import Observation
 from study.scene.obstacles import notes_on_misses, refuse_blocked
-from study.scene.place import OUTWARD, refuse_far, resolve
+from study.scene.place import OUTWARD, refuse_far, refuse_long, resolve
 from study.scene.schema import END_POINT, TOOL_POINT, Organ, Place, Scene, Tool
 from study.scene.schema import Support as SupportTable
 from study.scene.tissue import tissue_of
@@ -53,6 +54,7 @@ def problem_of(scene: Scene) -> Problem:
     geometry = geometry_of(scene.organ, scene.reference.element_size)
     surface = geometry.surface
     refuse_far(dict(_places(scene)), surface, geometry.offset)
+    refuse_long(dict(_lengths(scene)), surface)
     foundation = _support(scene, surface)
     first, *loads = _loads(scene.tool, "tool", surface)
     # The force of a moved tool is a result, and as a load it has none.
@@ -64,7 +66,7 @@ def problem_of(scene: Scene) -> Problem:
     further = tuple(_further_loads(scene, surface, surface_rule))
     weights = tuple(_weights(scene, surface, surface_rule))
     places = _probes(scene, surface, (first, *loads))
-    _check_inside(geometry.mesh, np.array(list(places.values())), tuple(places))
+    _check_inside(geometry.mesh, np.array(list(places.values())), _keys_of_probes(scene, places))
     observation = _observation(scene, first.tool, places, volume_rule, surface)
     rigid = tuple(_rigid(name, one, surface, surface_rule) for name, one in _moved(scene))
     refuse_blocked(rigid, foundation, surface_rule, observation.times)
@@ -118,6 +120,21 @@ def _places(scene: Scene) -> Iterator[tuple[str, Place]]:
     for number, inclusion in enumerate(scene.tissue.inclusion, 1):
         if inclusion.place is not None:
             yield f"tissue.inclusion.{number}.place", inclusion.place
+
+
+def _lengths(scene: Scene) -> Iterator[tuple[str, float]]:
+    """Lengths [m] of tools, supports and weights, by their keys."""
+    for name, tool in zip(_names("tool", len(scene.tools)), scene.tools, strict=True):
+        yield f"{name}.radius", tool.radius
+        yield f"{name}.displacement", abs(tool.displacement or 0.0)
+        yield f"{name}.clearance", tool.clearance
+        for number, point in enumerate(tool.path, 1):
+            yield f"{name}.path.{number}", math.hypot(point.travel or 0.0, *(point.offset or ()))
+    for name, support in zip(_names("support", len(scene.supports)), scene.supports, strict=True):
+        yield f"{name}.depth", support.depth
+        yield f"{name}.radius", support.radius or 0.0
+    for number, weight in enumerate(scene.weight, 1):
+        yield f"weight.{number}.radius", weight.radius
 
 
 def _names(table: str, count: int) -> list[str]:
@@ -301,14 +318,19 @@ def _tool(tool: Tool, name: str, surface: SurfaceMesh) -> ToolPatch:
     return ToolPatch(centre, unit, tool.radius, tool.force, name)
 
 
-def _check_inside(mesh: TetrahedralMesh, probes: Floats, names: tuple[str, ...]) -> None:
+def _keys_of_probes(scene: Scene, names: Iterable[str]) -> list[str]:
+    """Keys of a scene that place its control points; by default those of the tool do."""
+    if scene.control_points:
+        return [f"control_points.{name}" for name in names]
+    return ["tool.place" if name == TOOL_POINT else "tool.path" for name in names]
+
+
+def _check_inside(mesh: TetrahedralMesh, probes: Floats, keys: Sequence[str]) -> None:
     """Refuse control points outside the organ, where the field would be extrapolated."""
     outside = locate(mesh, probes)[1].min(axis=1) < OUTSIDE
     if outside.any():
-        name = names[int(outside.argmax())]
-        raise ValueError(
-            f"control_points.{name}: lies outside the organ; move it, or set snap to true"
-        )
+        key = keys[int(outside.argmax())]
+        raise ValueError(f"{key}: lies outside the organ; move it, or set snap to true")
 
 
 def _check_held(support: Support, rule: SurfaceRule) -> None:

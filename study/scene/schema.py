@@ -20,6 +20,7 @@ Share = Annotated[float, Quantity("", 0.0, 1.0)]
 Reading = Annotated[float, Quantity("Pa", 500.0, 150e3)]
 Coordinate = Annotated[float, Quantity("m", -10.0, 10.0)]
 
+Number = Annotated[float, Quantity("", -1e12, 1e12)]
 Component = Annotated[float, Quantity("", -1.0, 1.0)]
 
 TOOL_POINT, END_POINT = "tool", "tool-end"
@@ -257,7 +258,7 @@ class Fuzzy:
     surface: tuple[Aetiology, Aetiology] = ("hcv", "hbv")
     sensitivity_readings: Annotated[int, Quantity("", 0, 4096)] = 256
     rule_base: str | None = None
-    inputs: dict[str, float] = field(default_factory=dict)
+    inputs: dict[str, Number] = field(default_factory=dict)
     unit: Annotated[str, Choice("study.scene.answer_units:UNITS")] = "kPa"
 
 

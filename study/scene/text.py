@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 from study.scene.consistency import Table
@@ -41,6 +42,7 @@ _WHERE = re.compile(
 )
 _NAME = r"[A-Za-z0-9_-]+(?:\s*\.\s*[A-Za-z0-9_-]+)*"
 _HEADER = re.compile(rf"\s*\[\s*({_NAME})\s*\]")
+_LISTED = re.compile(rf"\s*\[\[\s*({_NAME})\s*\]\]")
 _KEY = re.compile(rf"\s*({_NAME})\s*=")
 
 
@@ -98,18 +100,39 @@ def _said(text: str, source: str, message: str) -> str:
 def key_lines(text: str) -> dict[str, int]:
     """Numbers of the lines of a TOML text that open a table or give a key, by its full name.
 
-    Names in quotes are left out, as are lines within a value of several lines that look like keys.
+    The second [[weight]] is `weight.2`; the first is both `weight.1` and `weight`. Names in quotes
+    are left out, as are lines within a value of several lines that look like keys.
     """
     found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     table = ""
     for number, line in enumerate(text.splitlines(), 1):
-        header, key = _HEADER.match(line), _KEY.match(line)
-        if header is not None:
-            table = f"{_tidy(header[1])}."
-            found.setdefault(table.removesuffix("."), number)
+        listed, header, key = _LISTED.match(line), _HEADER.match(line), _KEY.match(line)
+        if listed is not None:
+            name = _tidy(listed[1])
+            counts[name] = counts.get(name, 0) + 1
+            table = f"{name}.{counts[name]}."
+        elif header is not None:
+            table = _numbered(f"{_tidy(header[1])}.", counts)
+        if listed is not None or header is not None:
+            _note(found, table.removesuffix("."), number)
         elif key is not None:
-            found.setdefault(table + _tidy(key[1]), number)
+            _note(found, table + _tidy(key[1]), number)
     return found
+
+
+def _numbered(table: str, counts: Mapping[str, int]) -> str:
+    """The name of a table with the number of the listed one round it, such as `tool.2.history.`."""
+    for name, count in counts.items():
+        if table.startswith(f"{name}."):
+            return f"{name}.{count}.{table.removeprefix(f'{name}.')}"
+    return table
+
+
+def _note(found: dict[str, int], name: str, line: int) -> None:
+    """Note the line of a key, for the first of a list of tables by its name without number too."""
+    found.setdefault(name, line)
+    found.setdefault(name.replace(".1.", ".", 1).removesuffix(".1"), line)
 
 
 def _tidy(name: str) -> str:
