@@ -109,8 +109,9 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
     moved = [_run(scene, problem, one) for one in spacings]
     runs = [run for run, _ in moved]
     assert scene.require is not None  # noqa: S101 - as something is planned for
-    wanted = partial(_apart, problem, scene.require, measure)
-    seen = replace(moved[-1][1], error=error_of_finest(runs, wanted))
+    apart = partial(difference, problem, scene.require, measure)
+    motions = [run.trajectory for run in runs]
+    seen = replace(moved[-1][1], error=error_of_finest(motions, apart))
     if not _is_correctable(scene):
         return seen
     before, last = (_beyond_linear(scene, problem, spacings[n], runs[n]) for n in (0, -1))
@@ -123,14 +124,16 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
     )
 
 
-def error_of_finest(runs: Sequence[Run], apart: Callable[[Run, Run], float]) -> float:
+def error_of_finest(
+    motions: Sequence[Trajectory], apart: Callable[[Trajectory, Trajectory], float]
+) -> float:
     """Relative error of the last of several lattices of falling spacing, as all of them tell it.
 
     At order one two that are COARSER apart differ by as much as the finer is off. Those that lie
     closer tell of the chance of how cells lie, which nothing makes larger. `apart`: relative
     difference of a lattice from a finer one.
     """
-    return CAUTION * max(apart(one, finer) for one, finer in combinations(runs, 2))
+    return CAUTION * max(apart(one, finer) for one, finer in combinations(motions, 2))
 
 
 def _is_correctable(scene: Scene) -> bool:
@@ -184,17 +187,19 @@ def _settings(scene: Scene, spacing: float) -> Lattice:
     )
 
 
-def _apart(problem: Problem, required: Require, measure: Measure, coarse: Run, fine: Run) -> float:
-    """Largest relative difference of what is wanted."""
-    one, other, found = coarse.trajectory, fine.trajectory, list[float]()
+def difference(
+    problem: Problem, required: Require, measure: Measure, coarse: Trajectory, fine: Trajectory
+) -> float:
+    """Largest relative difference of two motions in any of the required quantities."""
+    found = list[float]()
     if HISTORY in required.quantities:
-        curves = relative_l2_of_curves(one.displacement - other.displacement, other.displacement)
+        curves = relative_l2_of_curves(coarse.displacement - fine.displacement, fine.displacement)
         found += curves[list(measure.probes)].tolist()
     if measure.volumes is not None:
-        found.append(relative_l2(one.volume_field[0], other.volume_field[0], measure.volumes))
+        found.append(relative_l2(coarse.volume_field[0], fine.volume_field[0], measure.volumes))
     if PEAK_FORCE in required.quantities:
         # Over time too, for two lattices may meet in a single number by chance.
-        found += force_differences(problem, one.tool_force, other.tool_force).ravel().tolist()
+        found += force_differences(problem, coarse.tool_force, fine.tool_force).ravel().tolist()
     return max(found)
 
 
