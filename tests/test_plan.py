@@ -16,6 +16,7 @@ from study.commands.plan import plan as plan_command
 from study.commands.run import run
 from study.models.finite_elements import PreparedElements, reference_of
 from study.models.model import SILENT, ModelRun
+from study.models.spacing_error import spacing_errors
 from study.models.table import model
 from study.plan import elements as elements_plan
 from study.plan import moved as moved_plan
@@ -33,7 +34,7 @@ from study.run.rest import rest_of
 from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
-from tests.benchmarks import planned_places
+from tests.benchmarks import planned_places, planned_tools
 from tests.conftest import SMALL
 
 AT_TOOL = ('require.at=["tool"]',)
@@ -380,16 +381,37 @@ def moved_look(*quantities):
     return scene, moved_plan.look(scene, problem, measure(scene.require, problem))
 
 
-def test_the_error_is_twice_the_largest_difference_of_any_two_lattices():
+def test_the_error_is_an_index_of_the_largest_difference_of_any_two_lattices():
     def told(*motions):
         def apart(one, finer):
             return abs(one - finer) / finer
 
         return moved_plan.error_of_finest(motions, apart)
 
-    assert told(6.0, 4.5, 4.0) == pytest.approx(2.0 * 2.0 / 4.0)
-    assert told(4.0, 5.0, 4.0) == pytest.approx(2.0 * 1.0 / 4.0)  # the first and last agree
-    assert told(6.0, 4.0, 5.0) == pytest.approx(2.0 * 2.0 / 4.0)
+    assert told(6.0, 4.5, 4.0) == pytest.approx(3.0 * 2.0 / 4.0)
+    assert told(4.0, 5.0, 4.0) == pytest.approx(3.0 * 1.0 / 4.0)  # the first and last agree
+    assert told(6.0, 4.0, 5.0) == pytest.approx(3.0 * 2.0 / 4.0)
+
+
+def test_a_plan_foretells_no_less_than_the_estimate_of_the_run_that_follows():
+    """Or a run would miss a requirement that its plan kept."""
+    scene, seen = moved_look("history", "peak-force")
+    problem = problem_of(scene)
+    coarse, fine = (
+        planned_tools.moved_by(scene, problem, times * seen.spacing) for times in (2.0, 1.0)
+    )
+    own = spacing_errors(problem, seen.spacing, coarse, fine)
+    found = (*own.displacement.values(), *own.peak_force.values())
+    assert seen.error >= max(found) > 0.0
+
+
+@pytest.mark.parametrize("quantity", ["force", "at the tool", "at all points"])
+def test_foretold_errors_of_lattices_held_under_moved_tools(quantity):
+    rows = [one for one in planned_tools.kept() if one.quantity == quantity and one.found > 1e-3]
+    ratios = np.array([one.found / one.foretold for one in rows])
+    assert len(ratios) > 100
+    assert (ratios <= 1.0).mean() >= 0.95
+    assert np.median(ratios) > 0.1  # or it foretells nothing
 
 
 def test_a_moved_tool_is_planned_by_three_lattices_at_order_one():

@@ -1,11 +1,11 @@
 """The plan of a scene with moved tools, gravity, weights or several loads: by three quick motions.
 
-What a lattice is off by its spacing is told by the motions of three coarse ones, at the order that
-a run assumes too, and so of a tool smaller than their cells rather too much. Errors of contact jump
-with how cells lie, so that two lattices agree by chance now and then, and the largest difference of
-any two is taken. What springs cannot do at any spacing is not looked at. Where corrected lattices
-follow the scene, as under tools that travel, theirs is told by what two of these do beyond
-themselves linear, and by elements on two meshes at rest.
+The discretisation error of a lattice is estimated from motions on three coarse ones, at the order
+and with the safety factor of a run's own estimate. Errors of contact vary irregularly with the
+position of the cells, so that two lattices may agree by chance, and the largest difference of any
+two is taken. The error that springs have at any spacing is not estimated. Where corrected lattices
+support the scene, as under tools that travel, their error is estimated from the nonlinear parts of
+two of these motions, and from finite elements on two meshes at rest.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from msm.model import Counts, Run
 from study.models.finite_elements import PreparedElements
 from study.models.lattice import LatticeModel
 from study.models.remainder import plus
-from study.models.spacing_error import COARSER, ORDER, force_differences
+from study.models.spacing_error import COARSER, INDEX, ORDER, force_differences
 from study.models.table import kind, model
 from study.models.tissue import lacks_poisson_ratio
 from study.plan.candidates import SIZES, SPACINGS, Candidate, on_elements
@@ -127,13 +127,14 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
 def error_of_finest(
     motions: Sequence[Trajectory], apart: Callable[[Trajectory, Trajectory], float]
 ) -> float:
-    """Relative error of the last of several lattices of falling spacing, as all of them tell it.
+    """Relative error of the last of several lattices of falling spacing.
 
-    At order one two that are COARSER apart differ by as much as the finer is off. Those that lie
-    closer tell of the chance of how cells lie, which nothing makes larger. `apart`: relative
-    difference of a lattice from a finer one.
+    A grid convergence index of the largest difference, at order one as if the lattices were COARSER
+    apart, and so never less than a run's own estimate. The order that three lattices show is not
+    used: under tools of the size of a few cells they are not in the asymptotic range. `apart`:
+    relative difference of a motion from one on a finer lattice.
     """
-    return CAUTION * max(apart(one, finer) for one, finer in combinations(motions, 2))
+    return float(INDEX * max(apart(one, finer) for one, finer in combinations(motions, 2)))
 
 
 def _is_correctable(scene: Scene) -> bool:
