@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -15,7 +15,10 @@ from msm.stepper import LatticeStepper
 from study.commands.plan import plan as plan_command
 from study.commands.run import RunFlags, run
 from study.models.finite_elements import PreparedElements, reference_of
-from study.models.model import ModelRun
+from study.models.model import SILENT, ModelRun
+from study.models.spacing_error import spacing_errors
+from study.models.table import model
+from study.plan import elements as elements_plan
 from study.plan import moved as moved_plan
 from study.plan import plan as planning
 from study.plan.candidates import candidates
@@ -31,7 +34,7 @@ from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
 from study.system.progress import Silent
-from tests.benchmarks import planned_places
+from tests.benchmarks import planned_places, planned_tools
 from tests.conftest import SMALL
 
 AT_TOOL = ('require.at=["tool"]',)
@@ -395,16 +398,37 @@ def moved_look(*quantities):
     return scene, moved_plan.look(scene, problem, measure(scene.require, problem))
 
 
-def test_the_error_is_twice_the_largest_difference_of_any_two_lattices():
+def test_the_error_is_an_index_of_the_largest_difference_of_any_two_lattices():
     def told(*motions):
         def apart(one, finer):
             return abs(one - finer) / finer
 
         return moved_plan.error_of_finest(motions, apart)
 
-    assert told(6.0, 4.5, 4.0) == pytest.approx(2.0 * 2.0 / 4.0)
-    assert told(4.0, 5.0, 4.0) == pytest.approx(2.0 * 1.0 / 4.0)  # the first and last agree
-    assert told(6.0, 4.0, 5.0) == pytest.approx(2.0 * 2.0 / 4.0)
+    assert told(6.0, 4.5, 4.0) == pytest.approx(3.0 * 2.0 / 4.0)
+    assert told(4.0, 5.0, 4.0) == pytest.approx(3.0 * 1.0 / 4.0)  # the first and last agree
+    assert told(6.0, 4.0, 5.0) == pytest.approx(3.0 * 2.0 / 4.0)
+
+
+def test_a_plan_foretells_no_less_than_the_estimate_of_the_run_that_follows():
+    """Or a run would miss a requirement that its plan kept."""
+    scene, seen = moved_look("history", "peak-force")
+    problem = problem_of(scene)
+    coarse, fine = (
+        planned_tools.moved_by(scene, problem, times * seen.spacing) for times in (2.0, 1.0)
+    )
+    own = spacing_errors(problem, seen.spacing, coarse, fine)
+    found = (*own.displacement.values(), *own.peak_force.values())
+    assert seen.error >= max(found) > 0.0
+
+
+@pytest.mark.parametrize("quantity", ["force", "at the tool", "at all points"])
+def test_foretold_errors_of_lattices_held_under_moved_tools(quantity):
+    rows = [one for one in planned_tools.kept() if one.quantity == quantity and one.found > 1e-3]
+    ratios = np.array([one.found / one.foretold for one in rows])
+    assert len(ratios) > 100
+    assert (ratios <= 1.0).mean() >= 0.95
+    assert np.median(ratios) > 0.1  # or it foretells nothing
 
 
 def test_a_moved_tool_is_planned_by_three_lattices_at_order_one():
@@ -425,6 +449,69 @@ def test_only_what_is_wanted_of_a_moved_tool_counts():
     force, history = moved_look("peak-force")[1].error, moved_look("history")[1].error
     assert force != history
     assert moved_look("peak-force", "history")[1].error == max(force, history)
+
+
+IN_CONTACT = (*SPHERE, "time.samples=17", "reference.steps_per_sample=1")
+
+
+@cache
+def elements_of(*overrides):
+    """Elements in contact as they are offered for the force under the sphere."""
+    wanted = "require.error=5 %", 'require.quantities=["peak-force"]'
+    scene = read_scene("block", (*IN_CONTACT, *wanted, *overrides))
+    problem = problem_of(scene)
+    points = measure(scene.require, problem)
+    apart = partial(moved_plan.difference, problem, scene.require, points)
+    return scene, elements_plan.elements(scene, problem, apart)
+
+
+def test_an_error_that_no_lattice_keeps_under_a_moved_tool_is_planned_with_elements(monkeypatch):
+    scene, offered = elements_of()
+    exact = replace(offered, prediction=Prediction((Part("elements' mesh", 0.01),)))
+    asked = []
+
+    def given(*_):
+        asked.append(1)
+        return exact
+
+    def planned_for(**required):
+        return plan(replace(scene, require=replace(scene.require, **required)))
+
+    monkeypatch.setattr(planning, "elements", given)
+    found = planned_for(error=0.02)
+    assert found.scene.models == ("hyperelastic",)
+    assert any("coarser mesh" in one.reason for one in found.decisions)
+    with pytest.raises(ValueError, match="by a mesh of 992 neo-Hookean"):
+        planned_for(error=0.005)
+    assert planned_for(error=None).scene.models == ("hyperelastic",)
+    assert len(asked) == 3
+    assert planned_for(error=50.0).scene.models == ("tissue",)
+    with pytest.raises(ValueError, match="by a lattice"):
+        planned_for(error=0.02, rate=60.0)
+    assert len(asked) == 3, (
+        "elements are slower than a lattice that is good enough, and than a rate"
+    )
+
+
+def test_a_run_of_elements_in_contact_keeps_what_is_foretold():
+    scene, offered = elements_of()
+    run = model(offered.scene, "hyperelastic").prepare(problem_of(scene)).run(SILENT)
+    given = replace(scene, require=replace(scene.require, error=offered.prediction.error))
+    (found,) = requirement_checks(given, ("tool", "corner"), {"hyperelastic": run})
+    assert found.passed
+    force = run.record.elements.contact.forces["tool"]
+    assert found.value == pytest.approx(force.by_mesh + force.by_steps)
+    everywhere = replace(given.require, quantities=("history",), at=())
+    (found,) = requirement_checks(
+        replace(given, require=everywhere), ("tool", "corner"), {"hyperelastic": run}
+    )
+    by_mesh, by_steps = run.record.mesh_error.by_probe, run.record.time_step_errors
+    sums = [by_mesh[p].displacement + by_steps[p].displacement for p in ("tool", "corner")]
+    assert found.value == pytest.approx(max(sums))
+
+
+def test_elements_are_not_offered_where_they_cannot_follow():
+    assert elements_of("damping.kind=rayleigh", "damping.stiffness=1 ms")[1] is None
 
 
 def test_gravity_and_further_loads_are_planned_likewise():

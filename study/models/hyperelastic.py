@@ -161,6 +161,11 @@ class PreparedHyperelastic:
         return Simulation(found.trajectory, found.step, largest_strain=found.largest_strain)
 
     @property
+    def time_step(self) -> float:
+        """Length of the model's own steps [s], which are halved where no balance is found."""
+        return float(self.problem.observation.times[1]) / self._per_sample
+
+    @property
     def _per_sample(self) -> int:
         asked = self.model.reference.steps_per_sample
         return asked or -(-OWN_STEPS // (len(self.problem.observation.times) - 1))

@@ -1,11 +1,11 @@
 """The plan of a scene with moved tools, gravity, weights or several loads: by three quick motions.
 
-What a lattice is off by its spacing is told by the motions of three coarse ones, at the order that
-a run assumes too, and so of a tool smaller than their cells rather too much. Errors of contact jump
-with how cells lie, so that two lattices agree by chance now and then, and the largest difference of
-any two is taken. What springs cannot do at any spacing is not looked at. Where corrected lattices
-follow the scene, as under tools that travel, theirs is told by what two of these do beyond
-themselves linear, and by elements on two meshes at rest.
+The discretisation error of a lattice is estimated from motions on three coarse ones, at the order
+and with the safety factor of a run's own estimate. Errors of contact vary irregularly with the
+position of the cells, so that two lattices may agree by chance, and the largest difference of any
+two is taken. The error that springs have at any spacing is not estimated. Where corrected lattices
+support the scene, as under tools that travel, their error is estimated from the nonlinear parts of
+two of these motions, and from finite elements on two meshes at rest.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from msm.model import Counts, Run
 from study.models.finite_elements import PreparedElements
 from study.models.lattice import LatticeModel
 from study.models.remainder import plus
-from study.models.spacing_error import COARSER, ORDER, force_differences
+from study.models.spacing_error import COARSER, INDEX, ORDER, force_differences
 from study.models.table import kind, model
 from study.models.tissue import lacks_poisson_ratio
 from study.plan.candidates import SIZES, SPACINGS, Candidate, on_elements
@@ -109,8 +109,9 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
     moved = [_run(scene, problem, one) for one in spacings]
     runs = [run for run, _ in moved]
     assert scene.require is not None  # noqa: S101 - as something is planned for
-    wanted = partial(_apart, problem, scene.require, measure)
-    seen = replace(moved[-1][1], error=error_of_finest(runs, wanted))
+    apart = partial(difference, problem, scene.require, measure)
+    motions = [run.trajectory for run in runs]
+    seen = replace(moved[-1][1], error=error_of_finest(motions, apart))
     if not _is_correctable(scene):
         return seen
     before, last = (_beyond_linear(scene, problem, spacings[n], runs[n]) for n in (0, -1))
@@ -123,14 +124,17 @@ def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
     )
 
 
-def error_of_finest(runs: Sequence[Run], apart: Callable[[Run, Run], float]) -> float:
-    """Relative error of the last of several lattices of falling spacing, as all of them tell it.
+def error_of_finest(
+    motions: Sequence[Trajectory], apart: Callable[[Trajectory, Trajectory], float]
+) -> float:
+    """Relative error of the last of several lattices of falling spacing.
 
-    At order one two that are COARSER apart differ by as much as the finer is off. Those that lie
-    closer tell of the chance of how cells lie, which nothing makes larger. `apart`: relative
-    difference of a lattice from a finer one.
+    A grid convergence index of the largest difference, at order one as if the lattices were COARSER
+    apart, and so never less than a run's own estimate. The order that three lattices show is not
+    used: under tools of the size of a few cells they are not in the asymptotic range. `apart`:
+    relative difference of a motion from one on a finer lattice.
     """
-    return CAUTION * max(apart(one, finer) for one, finer in combinations(runs, 2))
+    return float(INDEX * max(apart(one, finer) for one, finer in combinations(motions, 2)))
 
 
 def _is_correctable(scene: Scene) -> bool:
@@ -184,17 +188,19 @@ def _settings(scene: Scene, spacing: float) -> Lattice:
     )
 
 
-def _apart(problem: Problem, required: Require, measure: Measure, coarse: Run, fine: Run) -> float:
-    """Largest relative difference of what is wanted."""
-    one, other, found = coarse.trajectory, fine.trajectory, list[float]()
+def difference(
+    problem: Problem, required: Require, measure: Measure, coarse: Trajectory, fine: Trajectory
+) -> float:
+    """Largest relative difference of two motions in any of the required quantities."""
+    found = list[float]()
     if HISTORY in required.quantities:
-        curves = relative_l2_of_curves(one.displacement - other.displacement, other.displacement)
+        curves = relative_l2_of_curves(coarse.displacement - fine.displacement, fine.displacement)
         found += curves[list(measure.probes)].tolist()
     if measure.volumes is not None:
-        found.append(relative_l2(one.volume_field[0], other.volume_field[0], measure.volumes))
+        found.append(relative_l2(coarse.volume_field[0], fine.volume_field[0], measure.volumes))
     if PEAK_FORCE in required.quantities:
         # Over time too, for two lattices may meet in a single number by chance.
-        found += force_differences(problem, one.tool_force, other.tool_force).ravel().tolist()
+        found += force_differences(problem, coarse.tool_force, fine.tool_force).ravel().tolist()
     return max(found)
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from msm.timestep import whole_steps
 from study.models.table import named
 from study.plan import moved
 from study.plan.candidates import Candidate, candidates, resting
+from study.plan.elements import elements
 from study.plan.look import Look, look
 from study.plan.moved import HISTORY, PEAK_FORCE, MovedLook
 from study.plan.prediction import Foresight, Measure
@@ -24,6 +26,12 @@ from study.scene.problem import problem_of
 FIELD = "field"
 """The required quantity that includes the whole organ."""
 
+TOLD_BY = {
+    "tissue": "a lattice of twice the spacing",
+    "corrected": "a lattice of half the spacing, and by meshes and vectors",
+    "hyperelastic": "a coarser mesh and by longer steps",
+}
+"""How a run estimates its error, by its model."""
 NOTHING_REQUIRED = (
     'the scene requires nothing; give it a table require, or for example --set require.error="5 %"'
 )
@@ -86,11 +94,23 @@ def plan(scene: Scene) -> Plan:
 
 
 def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
-    """For moved tools or more than one load: lattices, corrected where that is possible."""
-    seen = moved.look(scene, problem, measure(required, problem))
+    """For moved tools or more than one load: lattices, corrected or else finite elements."""
+    points = measure(required, problem)
+    seen = moved.look(scene, problem, points)
     offered = [*moved.lattices(scene, seen), *moved.corrected(scene, seen)]
+    if problem.rigid_tools and _needs_elements(offered, required):
+        difference = partial(moved.difference, problem, required, points)
+        found = elements(scene, problem, difference)
+        offered += [] if found is None else [found]
     chosen = choose(offered, required)
     return Plan(chosen.scene, tuple(_moved_decisions(scene, seen, chosen, required)), chosen)
+
+
+def _needs_elements(offered: Sequence[Candidate], required: Require) -> bool:
+    """Whether finite elements in contact may be chosen: they are slower than any lattice."""
+    if required.rate is not None:
+        return False
+    return required.error is None or not any(_keeps(one, required) for one in offered)
 
 
 def measure(required: Require, problem: Problem) -> Measure:
@@ -188,9 +208,8 @@ def _moved_decisions(
     )
     yield Decision("model", chosen.name, _why(chosen, required))
     yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
-    half = chosen.scene.models == ("corrected",)
-    other = "half the spacing, of meshes and vectors" if half else "twice the spacing"
-    yield Decision("reference", "none", f"a run tells the error by a lattice of {other}")
+    told_by = TOLD_BY[chosen.scene.models[0]]
+    yield Decision("reference", "none", f"a run estimates its own error by {told_by}")
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
 

@@ -19,13 +19,14 @@ from study.similarity.fields import norm
 
 Floats = NDArray[np.float64]
 
-GEOMETRY, MESH, SPACING, COMPARED, REMAINDER, TRUNCATION = (
+GEOMETRY, MESH, SPACING, COMPARED, REMAINDER, TRUNCATION, STEPS = (
     "large displacements left out",
     "elements' mesh",
     "lattice spacing",
     "elements compared with",
     "large displacements on a coarse lattice",
     "subspace",
+    "time steps",
 )
 NONLINEAR_ORDER = 1.5
 """Order of the nonlinear part of a lattice, observed at 20, 10 and 5 mm on the liver."""
@@ -121,7 +122,8 @@ class Foresight:
     def graded_remainder(self, one: GradedLook) -> float:
         """Error of the nonlinear effect on a graded lattice.
 
-        Due to the radius of its finest cells, against the largest radius, and to their size.
+        Due to its cells, against the lattice with the finest and widest region, and to the finest
+        cells of the latter.
         """
         own, far = map(_nonlinear, (one.lattice, self.look.graded[-1].lattice))
         if own is None or far is None:

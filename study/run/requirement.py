@@ -3,7 +3,8 @@
 These are estimates with their factors of safety, not bounds. A lattice under a single load of given
 force has no error estimate of its own; it is checked by its difference from finite elements that
 have one. Under moved tools or several loads it has an estimate of its discretisation error; the
-error of the spring model itself is then not included.
+error of the spring model itself is then not included. Hyperelastic elements are checked by the
+errors of their mesh and steps, linear ones not at all.
 """
 
 from __future__ import annotations
@@ -46,19 +47,30 @@ def _check(name: str, error: float, required: Require) -> Check:
 
 
 def _force_check(name: str, run: ModelRun, required: Require) -> Iterator[Check]:
-    """A check of the largest force of any tool, where its error by spacing and steps is known."""
-    by_spacing, by_steps = run.record.spacing_errors, run.record.tool_force_errors
+    """A check of the largest force of any tool, where its error is known."""
     lost = run.trajectory.status != "finished"
-    if not lost and (by_spacing is None or not by_steps):
-        return
-    parts = {} if by_spacing is None else by_spacing.peak_force
-    yield Check(
-        name=f"{name}: require.error of the largest force",
-        value=float("inf") if lost else max(e + by_steps[tool] for tool, e in parts.items()),
-        limit=float(required.error or 0.0),
-        meaning="the run's own estimate of the error of a tool's largest force, by the spacing and "
-        "the steps",
-    )
+    errors = _force_errors(run.record)
+    if errors or lost:
+        yield Check(
+            name=f"{name}: require.error of the largest force",
+            value=float("inf") if lost else max(errors),
+            limit=float(required.error or 0.0),
+            meaning="the run's own estimate of the error of a tool's largest force, by the "
+            "spacing or mesh and the steps",
+        )
+
+
+def _force_errors(record: ModelRecord) -> list[float]:
+    """Sum of the estimated errors of each tool's force; none where one of them is unknown."""
+    if record.spacing_errors is not None and record.tool_force_errors:
+        by_steps = record.tool_force_errors
+        return [e + by_steps[tool] for tool, e in record.spacing_errors.peak_force.items()]
+    elements = record.elements
+    if elements is None or elements.law is None or elements.contact is None:
+        return []
+    parts = [(one.by_mesh, one.by_steps) for one in elements.contact.forces.values()]
+    known = [a + b for a, b in parts if a is not None and b is not None]
+    return known if len(known) == len(parts) else []
 
 
 def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) -> dict[str, float]:
@@ -66,6 +78,8 @@ def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) 
     if run.trajectory.status != "finished":
         return dict.fromkeys(probes, float("inf"))
     record = run.record
+    if record.elements is not None and record.elements.law is not None:
+        return _stated(record, None, probes)
     if record.correction is not None:
         return _stated(record, record.correction.remainder_errors, probes)
     if record.spacing_errors is not None:

@@ -17,12 +17,12 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
 
-from msm.model import Run
 from study.models.spacing_error import COARSER, ORDER
 from study.plan import moved
 from study.plan.moved import BETWEEN, HISTORY, PEAK_FORCE, error_of_finest
 from study.plan.prediction import Measure
 from study.problem.problem import Problem
+from study.problem.trajectory import Trajectory
 from study.scene import Require, Scene
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -128,7 +128,8 @@ def rows(name: str) -> Iterator[Row]:
         "at all points": (HISTORY, tuple(range(len(problem.probes)))),
     }
     for quantity, (kind, probes) in wanted.items():
-        apart = partial(moved._apart, problem, Require(quantities=(kind,)), Measure(probes, None))
+        required = Require(quantities=(kind,))
+        apart = partial(moved.difference, problem, required, Measure(probes, None))
         for of_scene in OF_SCENES:
             three = [_near(runs, times * of_scene) for times in (COARSER, BETWEEN, 1.0)]
             by_three = error_of_finest(three, apart)
@@ -142,12 +143,12 @@ def rows(name: str) -> Iterator[Row]:
                 yield Row(name, of_scene, h, quantity, *told, found)
 
 
-def moved_by(scene: Scene, problem: Problem, spacing: float) -> Run:
+def moved_by(scene: Scene, problem: Problem, spacing: float) -> Trajectory:
     """The motion of a lattice. ValueError where it does not reach the end."""
-    return moved._run(scene, problem, spacing)[0]
+    return moved._run(scene, problem, spacing)[0].trajectory
 
 
-def _near(runs: Mapping[float, Run], spacing: float) -> Run:
+def _near(runs: Mapping[float, Trajectory], spacing: float) -> Trajectory:
     """That of a spacing [m], but for rounding."""
     found = min(runs, key=lambda h: abs(h - spacing))
     assert abs(found - spacing) < 1e-9
