@@ -143,20 +143,22 @@ def test_the_nearest_model_is_named_with_the_error_of_the_reference():
     )
     results = replace(results_of(), field_differences=rows)
     assert nearest(results).model.name == "msm-sugeno"
-    assert "Nearest to the finite-element reference is MSM Sugeno" in said(results)
-    assert "20 ± 3 %" in said(results)
+    assert "The model nearest to the finite-element reference is MSM Sugeno" in said(results)
+    assert "a spring lattice with the stiffness that the fuzzy system Sugeno" in said(results)
+    assert "20 ± 3 % in relative L2 (± is the discretisation error" in said(results)
     assert answer(results).numbers[0].value == "20 ± 3 %"
-    assert "cannot tell it apart" not in said(results)
+    assert "Its lead over" not in said(results)
 
 
-def test_models_within_the_error_of_the_reference_are_not_told_apart():
-    assert "This reference cannot tell it apart from" in said(results_of())
+def test_a_lead_within_the_error_of_the_reference_is_not_resolved():
+    found = said(results_of())
+    assert re.search(r"Its lead over MSM .* is not resolved by this reference\.", found)
 
 
 def test_a_difference_below_the_error_of_the_reference_is_not_resolved():
     found = said(with_mesh_error(field_peak=0.5))
-    assert "less than 50.0 %" in found
-    assert "What limits the answer is the reference" in found
+    assert "less than 50.0 % in relative L2, the discretisation error of the reference" in found
+    assert "a more accurate reference (reference.accuracy) is needed" in found
 
 
 def test_a_diverged_model_is_told_and_never_the_nearest():
@@ -175,7 +177,13 @@ def test_where_nothing_finished_the_answer_says_so():
 
 
 def test_without_a_reference_no_error_is_claimed():
-    assert "how wrong one is cannot be said" in said(results_of(["basafa"]))
+    found = said(results_of(["basafa"]))
+    assert "no error can be stated. Add fem to models." in found
+
+
+def test_a_run_of_the_finite_elements_alone_is_not_told_to_add_them():
+    found = said(results_of(["fem"]))
+    assert found == "No finished model is compared with a reference: no error can be stated."
 
 
 def test_of_a_point_the_curves_are_compared_and_called_a_difference_of_two_models():
@@ -183,7 +191,7 @@ def test_of_a_point_the_curves_are_compared_and_called_a_difference_of_two_model
     found = nearest(results)
     assert not found.is_field
     assert found.share == pytest.approx(0.6)  # softness 0.8 beside 2.0
-    assert "it is no error" in said(results)
+    assert "a difference between two models, not an error" in said(results)
 
 
 def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
@@ -196,47 +204,49 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
         for m in MODELS[1:]
     )
     found = said(with_record(results_of(), budgets=budgets))
-    assert "What limits it most is the Poisson ratio, +20.0 % of 40.0 %" in found
+    assert "The largest cause of the difference is the Poisson ratio, +20.0 % of 40.0 %." in found
     assert "lattice.volume_term = true" in found
 
 
 def test_the_error_at_the_tool_is_told_with_the_errors_of_both():
     found = answer(results_of())
-    assert "1.993 ± 0.002 mm at most" in said(results_of())
-    assert "by 1.00 ± 0.01 mm: 1.00 ± 0.01 mm (100 %) more" in said(results_of())
+    assert "control point tool is 1.993 ± 0.002 mm" in said(results_of())
+    assert "reference is 1.00 ± 0.01 mm. The difference is +1.00 ± 0.01 mm" in said(results_of())
     assert found.numbers[1].value == "+1.00 ± 0.01 mm"
 
 
 def test_a_gap_at_the_tool_below_its_errors_is_not_resolved():
     unsure = {name: CurveErrors(displacement=1.2, velocity=1.2) for name in ("tool", "far")}
     found = with_mesh_error(by_probe=unsure)
-    assert "they are apart by less than their errors, 1.2 mm" in said(found)
+    assert "below the sum of their errors, 1.2 mm, and not resolved" in said(found)
     assert answer(found).numbers[1].value == "< 1.2 mm"
 
 
 def test_a_gap_whose_errors_are_not_all_known_has_no_bar():
     found = with_model(results_of(), "basafa", time_step_errors={})
-    assert "1.0 mm (100 %) more, by errors that are not all known" in said(found)
+    assert "+1.0 mm (100 % of the reference); the errors of the two are not all known" in said(
+        found
+    )
 
 
-def test_a_frame_is_told_of_and_the_nearest_that_keeps_up_where_the_nearest_does_not():
-    assert "a frame at 60 Hz takes 8.3 of its 16.7 ms (50 %)" in said(results_of())
-    assert "Of those in time" not in said(results_of())
+def test_the_nearest_real_time_model_is_named_where_the_nearest_is_not_real_time():
+    assert "a frame at 60 Hz takes 8.3 ms of the available 16.7 ms (50 %)" in said(results_of())
+    assert "nearest real-time model" not in said(results_of())
     slow = with_model(results_of(), "basafa", wall_s=2.0)
-    assert "takes 33 of its 16.7 ms, and is not ready in time" in said(slow)
-    assert "Of those in time the nearest is MSM Mamdani: 40.0 % off" in said(slow)
+    assert "takes 33 ms, more than the available 16.7 ms" in said(slow)
+    assert "The nearest real-time model is MSM Mamdani: its difference is 40.0 %" in said(slow)
     hidden = with_model(with_mesh_error(field_peak=0.9), "basafa", wall_s=2.0)
-    assert "how far off is not resolved (< 90.0 %), a frame" in said(hidden)
+    assert "its difference is not resolved (< 90.0 %), and a frame" in said(hidden)
     for name in MODELS:
         slow = with_model(slow, name, wall_s=2.0)
-    assert "No model that finished is ready in time here" in said(slow)
+    assert "No finished model of this run is real time" in said(slow)
 
 
-def test_what_was_measured_before_is_told_of_the_organ_that_it_was_measured_on():
+def test_earlier_measurements_are_quoted_only_for_the_organ_that_they_are_of():
     results = results_of()
-    assert "measured before on the built-in liver" in said(results)
+    assert "measured beforehand on the built-in liver" in said(results)
     block = replace(results.scene, organ=replace(results.scene.organ, shape="block"))
-    assert "measured before" not in said(replace(results, scene=block))
+    assert "measured beforehand" not in said(replace(results, scene=block))
 
 
 def test_the_question_is_not_how_far_the_finite_elements_are_from_themselves():

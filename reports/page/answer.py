@@ -1,4 +1,4 @@
-"""What a run answers, in plain sentences and three numbers with their errors."""
+"""The answer of a run: sentences, and three numbers with their errors."""
 
 from __future__ import annotations
 
@@ -33,34 +33,37 @@ NEGLIGIBLE = 5e-5
 """Relative error below which it shows in none of four digits."""
 PEAK = "field-relative-l2-peak"
 FRAME_RATE = 60.0
-"""Of a display [Hz], by whose frames a cost is told."""
+"""Of a display [Hz]; a cost is stated as a share of its frame."""
 MEASURED_RATE = "60hz"
-"""The same among the rates of the trade-off measured before."""
-GLOSSES = {
-    "reading": ", springs of the stiffness that is read, without a fuzzy system",
-    "tissue": ", springs of the stiffness that the reference has",
-    "basafa": ", the nonlinear mass-spring model of the paper",
+"""The same among the rates of the trade-off measured beforehand."""
+BENCHMARK = ", the nonlinear mass-spring benchmark of the paper"
+SOURCES = {
+    "reading": "the stiffness of the elastography reading, without a fuzzy system",
+    "tissue": "the stiffness of the reference",
 }
-"""What models without a fuzzy system are, by name."""
-CHOOSE = 'What your own machine has time for is told by liver-study recommend SCENE --rate "60 Hz".'
+"""Where the stiffness of models without a fuzzy system is from, by name."""
+CHOOSE = (
+    "To find a configuration for your own scene and machine, run "
+    'liver-study recommend SCENE --rate "60 Hz".'
+)
 REMEDIES = {
     "stiffness": (
-        "another estimate of stiffness (patient, fuzzy.knowledge) changes it; a finer lattice "
-        "does not"
+        "Another estimate of the stiffness (patient, fuzzy.knowledge) changes it; a finer lattice "
+        "does not."
     ),
-    "spring law": "lattice.law changes it",
-    "Poisson ratio": "lattice.volume_term = true frees the Poisson ratio of the springs",
-    "geometric nonlinearity": "the finite elements are linear, and the lattice is not",
-    "lattice spacing": "a smaller lattice.spacing changes it",
-    "time step": "a smaller lattice.step_fraction changes it",
-    "damping": "the constants of damping change it",
+    "spring law": "It depends on lattice.law.",
+    "Poisson ratio": "Setting lattice.volume_term = true corrects the Poisson ratio.",
+    "geometric nonlinearity": "The finite elements are geometrically linear, the lattice is not.",
+    "lattice spacing": "It depends on lattice.spacing; a smaller spacing is the remedy.",
+    "time step": "A smaller lattice.step_fraction reduces it.",
+    "damping": "It depends on the damping constants.",
 }
-"""What to change of a scene, by the largest cause in the budget of a difference."""
+"""What to change in a scene, by the largest cause in the budget of a difference."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the first lines: what it is, as printed with its error, and what the error is."""
+    """A number of the answer: its name, its printed value with error, and what the error is."""
 
     name: str
     value: str
@@ -69,7 +72,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Answer:
-    """Sentences on which model, how wrong, how fast and what limits it; numbers beside them."""
+    """Sentences on the nearest model, its error, cost and largest cause of error; key numbers."""
 
     sentences: tuple[str, ...]
     numbers: tuple[Number, ...]
@@ -77,11 +80,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The model that differs least from a reference, by `share`, and what the reference hides.
+    """The model with the smallest difference from a reference, and those not resolved from it.
 
-    `share` and `error` relative: of the whole field at the peak where `is_field`, else of the
-    displacement curve at the tool. `error`: None where it is not known. `alike`: models that this
-    error does not tell from the nearest.
+    `share` and its `error` are relative: of the whole field at the peak load where `is_field`, else
+    of the displacement curve at the tool. `error`: None where it is not known. `alike`: models
+    whose difference exceeds `share` by no more than `error`.
     """
 
     model: ModelRecord
@@ -93,7 +96,7 @@ class Nearest:
 
 
 def answer(results: Results) -> Answer:
-    """What the run answers, whatever it has: also where a model diverged or nothing is resolved."""
+    """The answer of any run, also where a model diverged or nothing is resolved."""
     found = nearest(results)
     lines = [*_lost(results), *(_answers(results, found) if found else _nothing(results))]
     numbers = tuple(_numbers(results, found)) if found else ()
@@ -163,81 +166,87 @@ def curve_difference(results: Results, model: str, reference: str, probe: str) -
 def _lost(results: Results) -> Iterator[str]:
     for model in results.record.models:
         if model.status == "diverged":
-            yield f"{model.label} {status(model)}, and is not to be used with these settings."
+            yield f"{model.label} {status(model)}: do not use it with these settings."
         elif model.status == "not finished":
-            yield f"{model.label} is not finished: {model.reason}. To have it run, {model.remedy}."
+            yield f"{model.label} did not finish: {model.reason}. Remedy: {model.remedy}."
 
 
 def _nothing(results: Results) -> Iterator[str]:
     if not any(model.status == "finished" for model in results.record.models):
-        yield "No model finished: this run tells neither an error nor a cost."
-    else:
-        yield (
-            "This run compares no model that finished with a reference: how wrong one is cannot "
-            "be said. Add fem to models."
-        )
+        yield "No model finished: this run states neither an error nor a cost."
+        return
+    can_add = finite_elements(results) is None and not results.scene.is_point
+    remedy = " Add fem to models." if can_add else ""
+    yield f"No finished model is compared with a reference: no error can be stated.{remedy}"
 
 
 def _answers(results: Results, found: Nearest) -> Iterator[str]:
-    yield _which(results, found)
+    yield _nearest_sentence(results, found)
     yield from _at_the_tool(results, found)
     yield _cost(results, found.model)
     yield from _in_time(results, found)
     yield from _limit(results, found)
     if found.is_field:
-        yield " ".join([*_measured_before(results), CHOOSE])
+        yield " ".join([*_measured_beforehand(results), CHOOSE])
 
 
-def _which(results: Results, found: Nearest) -> str:
+def _nearest_sentence(results: Results, found: Nearest) -> str:
     named, reference = labels(results), reference_name(results, found.reference)
     what = (
-        "over the whole organ at the peak of the load its displacement"
+        "over the whole organ at the peak load"
         if found.is_field
-        else f"its displacement over time at {words(tool_probe(results))}"
+        else f"over time at the control point {words(tool_probe(results))}"
     )
+    by = "this reference" if found.is_field else "the numerical error of the curves"
     alike = (
-        f" This reference cannot tell it apart from {_listed(named[n] for n in found.alike)}."
+        f" Its lead over {_listed(named[n] for n in found.alike)} is not resolved by {by}."
         if found.alike
         else ""
     )
     caution = (
         ""
         if found.reference in ELEMENTS
-        else " That is a difference of two models: without finite elements it is no error."
+        else " This is a difference between two models, not an error against finite elements."
     )
+    gloss = _gloss(found.model, "spring" if results.scene.is_point else "spring lattice")
     return (
-        f"Nearest to {reference} is {found.model.label}{_gloss(found.model)}: {what} differs by "
-        f"{_difference(found)}, relative L2.{alike}{caution}"
+        f"The model nearest to {reference} is {found.model.label}{gloss}: its displacement {what} "
+        f"differs by {_difference(found)}.{alike}{caution}"
     )
 
 
 def _listed(names: Iterable[str]) -> str:
-    """Names in a row of words, the last after an "or"."""
+    """Names in a row of words, the last after an "and"."""
     *others, last = names
-    return f"{', '.join(others)} or {last}" if others else last
+    return f"{', '.join(others)} and {last}" if others else last
 
 
-def _gloss(model: ModelRecord) -> str:
-    """What a model is, for whoever meets its name here first."""
-    if model.system is None:
-        return GLOSSES.get(model.name, "")
-    return f", springs of the stiffness that the fuzzy system {system_name(model.system)} estimates"
+def _gloss(model: ModelRecord, kind: str) -> str:
+    """What a model of a `kind` is, for a reader who meets its name here first."""
+    if model.name == "basafa":
+        return BENCHMARK
+    source = SOURCES.get(model.name)
+    if model.system is not None:
+        source = f"the stiffness that the fuzzy system {system_name(model.system)} estimates"
+    return f", a {kind} with {source}" if source else ""
 
 
 def _difference(found: Nearest) -> str:
     if found.error is None:
-        return f"{percent(found.share)} (the error of that is not known)"
+        return f"{percent(found.share)} in relative L2 (its error is not known)"
     if found.share < found.error:
-        return f"less than {percent(found.error)}, which is {_whose(found)}"
+        return f"less than {percent(found.error)} in relative L2, {_error_name(found)}"
     small = found.error < NEGLIGIBLE * found.share
-    meant = f"{_whose(found)} is below the last digit" if small else f"± is {_whose(found)}"
-    stated = _stated(100.0 * found.share, 100.0 * found.error)
-    return f"{stated} % ({meant})"
+    name = _error_name(found)
+    meant = f"{name} is below the last digit" if small else f"± is {name}"
+    return f"{_stated(100.0 * found.share, 100.0 * found.error)} % in relative L2 ({meant})"
 
 
-def _whose(found: Nearest) -> str:
-    """What the error of a difference is the error of."""
-    return "the reference's own error" if found.is_field else "the numerical error of both curves"
+def _error_name(found: Nearest) -> str:
+    """Which error a difference has."""
+    if found.is_field:
+        return "the discretisation error of the reference"
+    return "the numerical error of both curves"
 
 
 def _stated(value: float, error: float) -> str:
@@ -250,8 +259,8 @@ def _at_the_tool(results: Results, found: Nearest) -> Iterator[str]:
     if DASH not in {own, theirs}:
         gap = _gap(results, found)
         yield (
-            f"At the control point {words(tool_probe(results))} it moves by {own} mm at most, "
-            f"{reference_name(results, found.reference)} by {theirs} mm: {gap.told}."
+            f"Its largest displacement at the control point {words(tool_probe(results))} is {own} "
+            f"mm; that of {reference_name(results, found.reference)} is {theirs} mm. {gap.sentence}"
         )
     yield from _forces(results, found)
 
@@ -263,14 +272,14 @@ def _forces(results: Results, found: Nearest) -> Iterator[str]:
         pair = [forces.get((name, tool)) for name in (found.model.name, found.reference)]
         own, theirs = ("not known" if one is None else printed_force(one) for one in pair)
         yield (
-            f"The largest force on {words(tool)} is {own} N, of "
-            f"{reference_name(results, found.reference)} {theirs} N."
+            f"The largest force on {words(tool)} is {own} N; that of "
+            f"{reference_name(results, found.reference)} is {theirs} N."
         )
 
 
 @dataclass(frozen=True)
 class _Gap:
-    """How far the largest displacements at the tool are apart, printed with the errors of both."""
+    """Difference of the largest displacements at the tool, printed with the errors of both."""
 
     value: str
     share: str
@@ -279,13 +288,19 @@ class _Gap:
     is_known: bool
 
     @property
-    def told(self) -> str:
-        """As the end of a sentence."""
+    def signed(self) -> str:
+        """With the sign of the model less the reference."""
+        return f"{'+' if self.is_more else '−'}{self.value}"
+
+    @property
+    def sentence(self) -> str:
+        """The difference in a sentence."""
         if not self.is_resolved:
-            return f"they are apart by less than their errors, {self.value}"
-        caution = "" if self.is_known else ", by errors that are not all known"
-        too = "more" if self.is_more else "less"
-        return f"{self.value} ({self.share}) {too}{caution}"
+            return (
+                f"The difference is below the sum of their errors, {self.value}, and not resolved."
+            )
+        caution = "" if self.is_known else "; the errors of the two are not all known"
+        return f"The difference is {self.signed} ({self.share} of the reference){caution}."
 
 
 def _gap(results: Results, found: Nearest) -> _Gap:
@@ -327,13 +342,13 @@ def _cost(results: Results, model: ModelRecord) -> str:
     share = frame_share(model)
     if share is None:
         return f"{model.label} was not timed."
-    factor = significant(1.0 / share, 2)
     workers = results.record.workers
-    beside = f", with {workers} stages at a time on this machine" if workers > 1 else ""
+    beside = f", while {workers} stages ran at a time on the machine" if workers > 1 else ""
     wall, simulated = significant(model.wall_s or 0.0, 2), significant(model.simulated_s)
     return (
-        f"It took {wall} s for {simulated} s of motion, {factor} times as fast as real time: in "
-        f"the mean a frame at 60 Hz takes {_frame(share)}; timed once{beside}."
+        f"{model.label} took {wall} s for {simulated} s of motion, a real-time factor of "
+        f"{significant(1.0 / share, 2)}: on average a frame at 60 Hz takes {_frame(share)}. The "
+        f"time was measured once{beside}."
     )
 
 
@@ -348,16 +363,16 @@ def _two_digits(share: float) -> str:
 
 
 def _frame(share: float) -> str:
-    """The time of a frame at 60 Hz and whether it is ready in time."""
+    """The time of a frame at 60 Hz and whether it is within the period."""
     period = MILLI / FRAME_RATE
-    taken = f"{significant(share * period, 2)} of its {fixed(period, 1)} ms"
+    taken = f"{significant(share * period, 2)} ms"
     if share > 1.0:
-        return f"{taken}, and is not ready in time"
-    return f"{taken} ({_two_digits(share)})"
+        return f"{taken}, more than the available {fixed(period, 1)} ms"
+    return f"{taken} of the available {fixed(period, 1)} ms ({_two_digits(share)})"
 
 
 def _in_time(results: Results, found: Nearest) -> Iterator[str]:
-    """The nearest of the models that keep up, where the nearest of all does not."""
+    """The nearest of the real-time models, where the nearest of all is not one."""
     if (frame_share(found.model) or 0.0) <= 1.0 or not found.is_field:
         return
     shares = {
@@ -366,24 +381,23 @@ def _in_time(results: Results, found: Nearest) -> Iterator[str]:
         if 0.0 < (frame_share(results.model(name)) or 0.0) <= 1.0
     }
     if not shares:
-        yield "No model that finished is ready in time here."
+        yield "No finished model of this run is real time."
         return
     best = min(shares, key=lambda name: shares[name])
     taken = frame_share(results.model(best)) or 0.0
-    off = f"{percent(shares[best])} off"
-    if found.error is not None and shares[best] < found.error:
-        off = f"how far off is {resolved(shares[best], found.error)}"
     yield (
-        f"Of those in time the nearest is {labels(results)[best]}: {off}, a frame takes "
-        f"{_frame(taken)}."
+        f"The nearest real-time model is {labels(results)[best]}: its difference is "
+        f"{resolved(shares[best], found.error)}, and a frame takes {_frame(taken)}."
     )
 
 
 def _limit(results: Results, found: Nearest) -> Iterator[str]:
     if found.error is not None and found.share < found.error:
         yield (
-            "What limits the answer is the reference: a finer one (reference.accuracy) would tell "
-            "how wrong the model is."
+            "The error of the model is below that of the reference: a more accurate reference "
+            "(reference.accuracy) is needed to resolve it."
+            if found.is_field
+            else "The difference of the models is below the numerical error of their curves."
         )
         return
     for one in results.record.budgets:
@@ -393,42 +407,48 @@ def _limit(results: Results, found: Nearest) -> Iterator[str]:
         largest = max(parts, key=lambda part: part.contribution, default=None)
         if largest is not None and largest.contribution > budget.SMALL:
             cause = budget.cause_name(largest.cause, one.reference)
-            remedy = REMEDIES.get(largest.cause)
-            yield (
-                f"What limits it most is the {cause}, {budget.signed(largest.contribution)} of "
-                f"{percent(one.total)}{': ' + remedy if remedy else ''}{_left(results, largest)}."
+            found_remedy = [REMEDIES[largest.cause]] if largest.cause in REMEDIES else []
+            yield " ".join(
+                [
+                    f"The largest cause of the difference is the {cause}, "
+                    f"{budget.signed(largest.contribution)} of {percent(one.total)}.",
+                    *found_remedy,
+                    *_left(results, largest),
+                ]
             )
 
 
-def _measured_before(results: Results) -> Iterator[str]:
-    """What other settings reached at the rate of frames, of the organ measured then."""
+def _measured_beforehand(results: Results) -> Iterator[str]:
+    """The most accurate configuration at the frame rate, of those measured on the same organ."""
     free = [one for one in tradeoff.timed(tradeoff.configurations()) if one.any_load]
     chosen = tradeoff.best(free, MEASURED_RATE)
     if chosen is None or not is_built_in_liver(results.scene):
         return
     yield (
-        "Of other settings, measured before on the built-in liver, the most accurate in time at "
-        f"60 Hz under any load is {chosen.name}: off by {chosen.stated_error}, in "
-        f"{percent(tradeoff.share(chosen, MEASURED_RATE), 2)} of the frame."
+        "Of the configurations measured beforehand on the built-in liver, the most accurate in "
+        f"real time at 60 Hz under any load is {chosen.name}: its error is {chosen.stated_error}, "
+        f"and a frame takes {percent(tradeoff.share(chosen, MEASURED_RATE), 2)} of the period."
     )
 
 
-def _left(results: Results, part: BudgetPart) -> str:
-    """What freeing the Poisson ratio leaves, where that is the cause and was tried."""
+def _left(results: Results, part: BudgetPart) -> Iterator[str]:
+    """The difference with a correct Poisson ratio, where that is the cause and was computed."""
     limits = results.record.lattice_limits
     if part.cause != "Poisson ratio" or limits is None:
-        return ""
+        return
     left = limits.relative_l2_with_volume_term
-    if left is None:
-        return ""
-    return f", and leaves {resolved(left, own_error(results))} at rest and with the exact modulus"
+    if left is not None:
+        yield (
+            "At rest and with the exact modulus, the difference with this term is "
+            f"{resolved(left, own_error(results))}."
+        )
 
 
 # --- numbers -------------------------------------------------------------------------------------
 
 
 def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
-    what = "over the organ at the peak" if found.is_field else "at the control point, over time"
+    what = "of the field at the peak load" if found.is_field else "at the control point over time"
     if found.error is None:
         yield Number(f"difference {what}", percent(found.share), "error not known")
     elif found.share < found.error:
@@ -436,7 +456,8 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
     else:
         value = f"{_stated(100.0 * found.share, 100.0 * found.error)} %"
         is_seen = found.error >= NEGLIGIBLE * found.share
-        kind = f"± is {_whose(found)}" if is_seen else f"{_whose(found)} is below the last digit"
+        name = _error_name(found)
+        kind = f"± is {name}" if is_seen else f"{name} is below the last digit"
         yield Number(f"difference {what}", value, kind)
     if DASH not in {_peak(results, name) for name in (found.model.name, found.reference)}:
         yield _number_at_the_tool(results, found)
@@ -444,27 +465,25 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
 
 
 def _number_at_the_tool(results: Results, found: Nearest) -> Number:
-    """How far the largest displacement is off that of the reference."""
+    """Difference of the largest displacement from that of the reference."""
     gap, probe = _gap(results, found), tool_probe(results)
-    name = f"largest displacement at {words(probe)}, off by"
+    name = f"difference of the largest displacement at {words(probe)}"
     theirs = _peak(results, found.reference)
     if not gap.is_resolved:
         return Number(name, f"< {gap.value}", f"not resolved, of {theirs} mm")
-    sign = "+" if gap.is_more else "−"
     kind = "" if gap.is_known else "; errors not all known"
-    return Number(name, f"{sign}{gap.value}", f"{gap.share} of {theirs} mm{kind}")
+    return Number(name, gap.signed, f"{gap.share} of {theirs} mm{kind}")
 
 
 def _third(results: Results, model: ModelRecord) -> Iterator[Number]:
-    """How fast, or of a point, which is not timed, how stiff."""
+    """The cost of a frame, or the stiffness of a point, which is not timed."""
     share = frame_share(model)
     if share is not None:
         period = MILLI / FRAME_RATE
-        value = f"{significant(share * period, 2)} ms of {fixed(period, 1)}"
-        kept = "in time" if share <= 1.0 else "not in time"
-        yield Number(
-            "a frame at 60 Hz", value, f"{kept}, in the mean; timed once, spread not known"
-        )
+        value = f"{significant(share * period, 2)} of {fixed(period, 1)} ms"
+        kept = "real time" if share <= 1.0 else "not real time"
+        kind = f"{kept} on average; measured once, spread not known"
+        yield Number("time of a frame at 60 Hz", value, kind)
         return
     estimates = results.record.fuzzy.systems
     if model.system in estimates:
@@ -479,10 +498,19 @@ def _third(results: Results, model: ModelRecord) -> Iterator[Number]:
 
 
 def question(results: Results) -> str:
-    """What the run asked, of every model but the finite elements."""
+    """The question of the run, on every model but the finite elements."""
     compared_with = finite_elements(results)
-    models = ", ".join(one.label for one in results.record.models if one is not compared_with)
+    models = [one.label for one in results.record.models if one is not compared_with]
     if not models:
-        return "How does this organ move by finite elements, and how fast are they?"
-    reference = "the finite elements" if compared_with else "each other"
-    return f"How far from {reference} are these models of the same scene, and how fast: {models}?"
+        return "How does this organ move according to finite elements, and what do they cost?"
+    if compared_with:
+        return (
+            "How large is the error of each model against finite elements of the same scene, and "
+            f"what does it cost: {', '.join(models)}?"
+        )
+    if len(models) == 1:
+        return f"How does the scene move according to {models[0]}, and what does it cost?"
+    return (
+        "How much do these models of the same scene differ, and what do they cost: "
+        f"{', '.join(models)}?"
+    )
