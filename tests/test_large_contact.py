@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from fem_reference.contact import large_motion
 from fem_reference.contact.balance import UnbalancedError
-from fem_reference.contact.large_motion import Steps, pressed, run, touched
+from fem_reference.contact.large_motion import Moving, Steps, pressed, run, touched
 from fem_reference.contact.motion import at_peak
 from fem_reference.elasticity import discretise
 from study.known.verification.finite_strain import uniaxial
@@ -192,6 +192,19 @@ def test_the_tools_work_is_stored_or_damped(cycle):
 def test_halved_steps_change_the_force_little(cycle):
     whole, half = (one[1].trajectory.tool_force for one in cycle[0])
     assert 0.0 < np.linalg.norm(whole - half) < 0.1 * np.linalg.norm(half)
+
+
+def test_a_guess_goes_on_from_two_states_unless_elements_of_it_are_inside_out():
+    """Compressed evenly by 0.4 in a second: by 0.6 after one and a half, by 1.2 after three."""
+    body = block()
+    given = pressed(body, TISSUE, (steady(3e-3),), DAMPING, np.zeros_like, np.array([0.0, 1.0]))
+    steps, none, size = Steps(given), given.nothing, given.body.solid.size
+    start, w = Moving(0.0, none.w, np.zeros(size), none.force), none.w.copy()
+    w[:size] = (-0.4 * body.points * -DOWN).ravel()
+    now = start._replace(time=1.0, w=w)
+    assert steps._onward(start, now, 1.5).w == pytest.approx(1.5 * w)
+    assert (steps._onward(start, now, 3.0).w == w).all()
+    assert (steps._onward(now, now, 1.5).w == w).all()
 
 
 def test_what_a_tool_hits_moves_with_the_tool():

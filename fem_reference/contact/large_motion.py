@@ -317,12 +317,12 @@ class Steps:
     def _step(self, goal: float, now: Moving, before: Moving) -> Moving:
         step = goal - now.time
         length, n = GAMMA * step, self.pressed.body.solid.size
-        guess = _onward(before, now, now.time + length)
+        guess = self._onward(before, now, now.time + length)
         since = self.pressed.since(now)
         first = self._stage(now.time + length, length, now.w[:n], now.v, guess, since)
         acceleration = (first.v - now.v) / length
         rest = step - length
-        guess = _onward(now, first, goal)
+        guess = self._onward(now, first, goal)
         base = now.w[:n] + rest * first.v
         since = self.pressed.since(first)
         last = self._stage(goal, length, base, now.v + rest * acceleration, guess, since)
@@ -344,19 +344,22 @@ class Steps:
         inertia = 1.0 / length**2 + self.pressed.drag / length
         given = self.pressed.load(time)
         load = given + body.mass @ (inertia * place + speed / length)
-        if body.solid.volume_ratio(guess.w).min() <= 0.0:
-            raise UnbalancedError("elements would turn inside out")
         scale = float(np.linalg.norm(given))
         found = self._kept_out(guess, Demand(time, inertia, load, since), scale)
         return Moving(time, found.w, (found.w[:n] - place) / length, found.force, since)
 
+    def _onward(self, before: Moving, now: Moving, time: float) -> Balanced:
+        """A guess at a time [s], on the line through two states.
 
-def _onward(before: Moving, now: Moving, time: float) -> Balanced:
-    """A guess at a time [s], on the line through two states."""
-    if now.time <= before.time:
-        return Balanced(now.w, now.force)
-    share = (time - now.time) / (now.time - before.time)
-    return Balanced(now.w + share * (now.w - before.w), now.force)
+        It is the later state where elements of the line are inside out: tissue that is drawn under
+        the edge of a punch moves at once, by as much in a short step as in a long one.
+        """
+        last = Balanced(now.w, now.force)
+        if now.time <= before.time:
+            return last
+        share = (time - now.time) / (now.time - before.time)
+        w = now.w + share * (now.w - before.w)
+        return last._replace(w=w) if self.pressed.body.solid.volume_ratio(w).min() > 0.0 else last
 
 
 @dataclass(frozen=True, eq=False)
