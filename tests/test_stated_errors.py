@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fem_reference.elements import ELEMENTS
+from fem_reference.error_estimate import SAFETY, SAFETY_GRADED
+from fem_reference.superposition import CurveChange
 from study.models.errors import (
     DISPLACEMENT_LIMIT,
     VELOCITY_LIMIT,
@@ -16,7 +19,13 @@ from study.models.errors import (
     time_step_errors,
     tool_force_errors,
 )
-from study.models.mesh_error import LARGEST_JUMP, is_too_coarse, next_size
+from study.models.mesh_error import (
+    LARGEST_JUMP,
+    MeshSolution,
+    is_too_coarse,
+    mesh_error,
+    next_size,
+)
 from study.models.model import ModelRun
 from study.models.remainder import relative_sizes
 from study.problem.trajectory import Trajectory
@@ -218,3 +227,52 @@ def test_the_part_of_the_time_step_is_that_of_the_whole_step(integrator, order):
     (part,) = _time_step_part(run)
     assert part.field == pytest.approx(BY_STEP[0, 0] * EXACT[:1, 0], abs=1e-12)
     assert not list(_time_step_part(replace(run, halved=None)))
+
+
+# --- the error of the finest mesh -----------------------------------------------------------------
+
+SIZES = 0.4, 0.2, 0.1
+POSED = SimpleNamespace(
+    probes=PROBES,
+    tissue=SimpleNamespace(poisson_ratio=0.45),
+    volume_rule=SimpleNamespace(weights=np.ones(1)),
+)
+
+
+def meshes(element="p2", status="finished"):
+    """Solutions whose errors fall with the element's order of the size; the last in a subspace."""
+    order = ELEMENTS[element].formal_order
+    return [
+        MeshSolution(
+            SimpleNamespace(size=size),
+            None,
+            SimpleNamespace(
+                element=element,
+                trajectory=motion(size, order, status),
+                truncation=CurveChange(3e-5, 4e-4) if size == SIZES[-1] else None,
+            ),
+        )
+        for size in SIZES
+    ]
+
+
+@pytest.mark.parametrize(("graded", "safety"), [(False, SAFETY), (True, SAFETY_GRADED)])
+def test_the_error_of_a_mesh_is_that_of_the_finest_and_of_its_vectors(graded, safety):
+    found, order = mesh_error(POSED, meshes(), graded=graded), ELEMENTS["p2"].formal_order
+    errors = BY_STEP[:, 0] * SIZES[-1] ** order
+    assert found.field_peak == pytest.approx(safety * errors[0] / (1.0 + errors[0]))
+    for name, u in zip(PROBES, errors, strict=True):
+        v, told = OF_VELOCITY * u, found.by_probe[name]
+        assert told.displacement == pytest.approx(np.hypot(safety * u / (1.0 + u), 3e-5))
+        assert told.velocity == pytest.approx(np.hypot(safety * v / (1.0 + v), 4e-4))
+    seen = None if graded else pytest.approx(order)
+    assert (found.field_order, found.order_by_probe["far"].velocity) == (seen, seen)
+    assert found.formal_order == order
+
+
+def test_a_mesh_alone_one_that_locks_and_a_motion_that_ended_early_tell_no_error():
+    assert mesh_error(POSED, meshes()[2:]) is None
+    assert mesh_error(POSED, meshes("p1")) is None
+    assert mesh_error(POSED, meshes(status="diverged")) is None
+    soft = SimpleNamespace(**vars(POSED) | {"tissue": SimpleNamespace(poisson_ratio=0.4)})
+    assert mesh_error(soft, meshes("p1")) is not None
