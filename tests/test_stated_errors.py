@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from fem_reference.elements import ELEMENTS
-from fem_reference.error_estimate import SAFETY, SAFETY_GRADED
+from fem_reference.error_estimate import (
+    ASSUMED_ORDER,
+    SAFETY,
+    SAFETY_ASSUMED,
+    SAFETY_GRADED,
+)
 from fem_reference.superposition import CurveChange
 from study.models.errors import (
     DISPLACEMENT_LIMIT,
@@ -268,6 +273,15 @@ def test_the_error_of_a_mesh_is_that_of_the_finest_and_of_its_vectors(graded, sa
     seen = None if graded else pytest.approx(order)
     assert (found.field_order, found.order_by_probe["far"].velocity) == (seen, seen)
     assert found.formal_order == order
+
+
+def test_two_meshes_tell_an_error_by_the_assumed_order():
+    found, order = mesh_error(POSED, meshes()[1:]), ELEMENTS["p2"].formal_order
+    change = BY_STEP[0, 0] * (SIZES[1] ** order - SIZES[2] ** order)
+    whole = 1.0 + BY_STEP[0, 0] * SIZES[2] ** order
+    error = SAFETY_ASSUMED * change / whole / ((SIZES[1] / SIZES[2]) ** ASSUMED_ORDER - 1.0)
+    assert found.field_peak == pytest.approx(error)
+    assert found.field_order is None
 
 
 def test_a_mesh_alone_one_that_locks_and_a_motion_that_ended_early_tell_no_error():
