@@ -3,13 +3,16 @@
 import csv
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from fem_reference.certified import Bound
 from fem_reference.subspace import ritz_subspace, superposition
 from reports import report
 from reports.certified import certified_rows
+from study.models import certified as summary
 from study.models import superposition as model
 from study.models.model import SILENT
 from study.results.folder import read, write
@@ -69,6 +72,42 @@ def test_the_record_sums_the_bound_up(found):
         largest = max(row.displacement_bound_m for row in rows)
         assert certified.largest_m[probe] == pytest.approx(largest, rel=1e-10)
     assert certified.displacement["tool"] < 0.5
+
+
+class Planted:
+    """A motion whose bounds are known after each step; the largest energy is between samples."""
+
+    energies, norms = (0.0, 5.0, 1.0, 2.0, 3.0), (0.0, 1.0, 4.0, 8.0, 2.0)
+
+    def __init__(self, _given, _damping, _factor, step):
+        self.taken, self.step = 0, step
+
+    def take_step(self):
+        self.taken += 1
+
+    @property
+    def bound(self):
+        return Bound(self.energies[self.taken], self.taken * self.step * np.array([1e-3, 2e-3]))
+
+    @property
+    def energy_norm(self):
+        return self.norms[self.taken]
+
+
+def test_the_record_is_that_of_planted_bounds(monkeypatch):
+    """Of curves over time, of the energy at any step, and of the largest of either."""
+    monkeypatch.setattr(summary, "CertifiedMotion", Planted)
+    seen = SimpleNamespace(times=np.array([0.0, 0.2, 0.4]))
+    problem = SimpleNamespace(observation=seen, factor=None, probes=("tool", "far"))
+    given = SimpleNamespace(squares=np.ones(7), error_at_rest=0.01, rounding=0.02)
+    curves = np.array([[[0.0, 0.0, 0.0]] * 2, [[3.0, 0.0, 0.0]] * 2, [[0.0, 0.0, 4.0]] * 2])
+    record, bounds = summary.certified(given, None, problem, 2, curves)
+    assert bounds == pytest.approx(np.outer([0.0, 0.2, 0.4], [1e-3, 2e-3]))
+    assert (record.vectors, record.rest, record.rounding) == (7, 0.01, 0.02)
+    assert record.energy == pytest.approx(5.0 / 8.0)
+    share = np.hypot(0.2, 0.4) * 1e-3 / 5.0
+    assert record.displacement == pytest.approx({"tool": share, "far": 2.0 * share})
+    assert record.largest_m == pytest.approx({"tool": 4e-4, "far": 8e-4})
 
 
 def test_results_keep_it_and_the_report_prints_it_apart(found, tmp_path):

@@ -152,6 +152,14 @@ def test_more_friction_drags_more_until_all_of_it_sticks(body):
     )
 
 
+def test_what_friction_remembers_converges_with_the_stations(body):
+    """At first order at least, of a sphere that is dragged aside and back: slip counts by steps."""
+    there_and_back = tool(SPHERE, 0.3, along=(1.5e-3, 0.0))
+    found = [forces(body, there_and_back, stations)[-1][0] for stations in (4, 8, 16)]
+    off = np.abs(np.array(found[:2]) / found[2] - 1.0)
+    assert 0.0 < off[1] < 0.6 * off[0] < 0.6e-3
+
+
 def test_friction_at_small_strains_is_that_of_the_linear_reference(body):
     """Stations alike, up to what the volume's stiffness at each point costs on so coarse a mesh."""
     one = tool(PLATE, 0.3, depth=3e-5, along=(3e-5,))

@@ -323,12 +323,12 @@ class Integrator:
     def _step(self, goal: float, now: MotionState, previous: MotionState) -> MotionState:
         step = goal - now.time
         length, n = GAMMA * step, self.problem.body.solid.size
-        guess = _extrapolated(previous, now, now.time + length)
+        guess = self._extrapolated(previous, now, now.time + length)
         reference = self.problem.as_previous(now)
         first = self._stage(now.time + length, length, now.w[:n], now.v, guess, reference)
         acceleration = (first.v - now.v) / length
         rest = step - length
-        guess = _extrapolated(now, first, goal)
+        guess = self._extrapolated(now, first, goal)
         base = now.w[:n] + rest * first.v
         reference = self.problem.as_previous(first)
         last = self._stage(goal, length, base, now.v + rest * acceleration, guess, reference)
@@ -350,19 +350,23 @@ class Integrator:
         inertia = 1.0 / length**2 + self.problem.damping_rate / length
         given = self.problem.load(time)
         load = given + body.mass @ (inertia * place + speed / length)
-        if body.solid.volume_ratio(guess.w).min() <= 0.0:
-            raise NoEquilibriumError("the start of the iteration inverts an element")
         scale = float(np.linalg.norm(given))
         found = self._equilibrium(guess, Increment(time, inertia, load, previous), scale)
         return MotionState(time, found.w, (found.w[:n] - place) / length, found.force, previous)
 
+    def _extrapolated(self, previous: MotionState, now: MotionState, time: float) -> ContactState:
+        """Linear extrapolation of two states to a time [s], with the contact forces of the last.
 
-def _extrapolated(previous: MotionState, now: MotionState, time: float) -> ContactState:
-    """Linear extrapolation of two states to a time [s], with the contact forces of the last."""
-    if now.time <= previous.time:
-        return ContactState(now.w, now.force)
-    share = (time - now.time) / (now.time - previous.time)
-    return ContactState(now.w + share * (now.w - previous.w), now.force)
+        The last state itself if elements of the extrapolation are inverted: tissue drawn under the
+        edge of a punch moves at once, by as much in a short step as in a long one.
+        """
+        last = ContactState(now.w, now.force)
+        if now.time <= previous.time:
+            return last
+        share = (time - now.time) / (now.time - previous.time)
+        w = now.w + share * (now.w - previous.w)
+        inverted = self.problem.body.solid.volume_ratio(w).min() <= 0.0
+        return last if inverted else last._replace(w=w)
 
 
 @dataclass(frozen=True, eq=False)
