@@ -706,6 +706,7 @@ def test_a_table_of_another_locale_is_answered_in_its_own(tmp_path, tipper):
 
 TABLE_FLAWS = {
     "no such column": ("service,Food\n1,2", 1, "no column 'food' among .* did you mean 'Food'"),
+    "a column with its unit": ("service,food [1]\n1,2", 1, r"did you mean 'food \[1\]'\? Rename"),
     "no column alike": ("service,x\n1,2", 1, "no column 'food' among 'service', 'x'; add it"),
     "a column twice": ("food,service,food\n1,2,3", 1, "column 'food' stands there twice"),
     "decimal commas between commas": (
@@ -792,6 +793,10 @@ def test_the_table_itself_and_unwritable_places_are_refused(tmp_path, tipper):
     source.write_bytes(b"service,food,n\xe4me\n2,1,x\n")
     with pytest.raises(TableError, match="is not UTF-8 text"):
         evaluate_table(tipper, source, tmp_path / "out.csv", "mamdani")
+    for workbook in (b"PK\x03\x04" + bytes(60), b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"):
+        source.write_bytes(workbook)
+        with pytest.raises(TableError, match=r"is a workbook, not a table; save the sheet as CSV"):
+            evaluate_table(tipper, source, tmp_path / "out.csv", "mamdani")
     assert source.exists()
 
 

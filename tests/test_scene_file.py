@@ -393,6 +393,8 @@ def test_what_an_override_gives_is_on_no_line(tmp_path):
         ("tool.force=nan", "must be finite"),
         ("tool.force=-inf", "must be finite"),
         ("models=3", "should be a list"),
+        ("tissue.poisson_ratio=45", 'did you mean "45 %"'),
+        ("tool.place.at=[50, 50]", 'did you mean "50 %"'),
         ("lattice=3", "should be a table"),
     ],
 )

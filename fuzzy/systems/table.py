@@ -185,7 +185,8 @@ def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int
         return names.index(name.strip())
     # Never another input's column: two diseases may have names alike.
     folded = {present.casefold(): present for present in names if present not in inputs}
-    closest = difflib.get_close_matches(name.casefold(), folded, 1)
+    longer = [one for one in folded if re.match(rf"{re.escape(name.casefold())}[\W_]", one)]
+    closest = longer or difflib.get_close_matches(name.casefold(), folded, 1)  # "hcv [kPa]"
     hint = f"; did you mean {folded[closest[0]]!r}? Rename it" if closest else "; add it"
     present = ", ".join(repr(one) for one in names)
     raise table.fault(table.header_line, f"no column {name!r} among {present}{hint}")

@@ -77,7 +77,8 @@ class Quantity:
         for unit in USUAL.get(self.unit, ()):
             if unit != self.unit and self.low <= number * _factor(unit, self.unit, "") <= self.high:
                 return f', did you mean "{number:g} {unit}"?'
-        return ""
+        percent = not self.unit and self.high <= 1.0 < number and self.low <= number / 100.0
+        return f', did you mean "{number:g} %"?' if percent and number / 100.0 <= self.high else ""
 
     def text(self, value: float) -> str:
         """The value as text that `read` restores exactly."""

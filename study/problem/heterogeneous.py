@@ -167,6 +167,11 @@ def of_tetrahedra(mesh: TetrahedralMesh, tissue: Tissue | None) -> Composition |
     return composition(tissue, len(corners), lambda cells: inside @ corners[cells])
 
 
+def mapped_mean(size: Floats, made: Composition) -> float:
+    """Harmonic mean of Young's modulus [Pa] where a map gives it, by the volumes (m,) of cells."""
+    return float(size @ made.mapped_share) / max(float(size @ made.mapped), 1e-300)
+
+
 def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
     """Notes on the volume share of heterogeneous tissue."""
     made = of_tetrahedra(mesh, tissue)
@@ -179,11 +184,10 @@ def notes_of(mesh: TetrahedralMesh, tissue: Tissue) -> tuple[str, ...]:
         for region, share in zip(tissue.regions, made.share.T, strict=True)
     ]
     if tissue.mapped is not None:
-        part = float(size @ made.mapped_share)
-        modulus = part / max(float(size @ made.mapped), 1e-300)
+        part = float(size @ made.mapped_share) / float(size.sum())
         found.append(
-            f"tissue.stiffness_map: {100 * part / size.sum():.0f} % of the organ, Young's modulus "
-            f"{modulus / 1e3:.3g} kPa in the mean (harmonic); the rest is as around"
+            f"tissue.stiffness_map: {100 * part:.0f} % of the organ, Young's modulus "
+            f"{mapped_mean(size, made) / 1e3:.3g} kPa in the mean (harmonic); the rest is as around"
         )
     return tuple(found)
 

@@ -44,6 +44,8 @@ NEAREST, DIFFERENCES, INDICES, FINER, RANGES = FILES = (
     "organ_finer.csv",
     "organ_unknowns.csv",
 )
+FINER_BY, COARSER_BY = 10.0, 2.0
+"""How far a given spacing may be from the usual one, of which a body has five to its size."""
 POINTS_APART = 2
 """Number of points of a row that share no unknown."""
 
@@ -90,8 +92,17 @@ class OrganRequest:
 
     @cached_property
     def about(self) -> float:
-        """Spacing [m] about which the lattices' are drawn."""
-        return self.spacing or usual_spacing(scene_problem(**self.given).problem)
+        """Spacing [m] about which the lattices' are drawn. ValueError if it does not suit."""
+        usual = usual_spacing(scene_problem(**self.given).problem)
+        if self.spacing is None:
+            return usual
+        low, high = usual / FINER_BY, usual * COARSER_BY
+        if not low <= self.spacing <= high:
+            raise ValueError(
+                f"spacing: {1e3 * self.spacing:.3g} mm does not suit the organ; give "
+                f"{1e3 * low:.2g} to {1e3 * high:.2g} mm, or leave it out for {1e3 * usual:.2g} mm"
+            )
+        return self.spacing
 
     def tasks(self) -> list[Task]:
         """A task per row of the design. ValueError unless the size is a power of two."""

@@ -14,8 +14,12 @@ from study.system.progress import Silent
 
 def is_scene(target: str) -> bool:
     """Whether a name is that of a scene, and not of a mesh file."""
+    from study.mesh.load import ENDINGS
+
     if target in BUILT_IN or target.lower().endswith(".toml"):
         return True
+    if Path(target).suffix.lower() in ENDINGS:
+        return False
     try:
         return not Path(target).exists()
     except OSError:  # the name is too long for a file

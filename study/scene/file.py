@@ -350,6 +350,8 @@ def _line(problem: ErrorDetails) -> str:
             message = f"should have {limits['max_length']} entries, not {limits['actual_length']}"
         case "dataclass_type":
             message = "should be a table"
+        case "tuple_type":
+            message = "should be a list, in square brackets, with text in quotes"
     return f"{key}: {message} (got {_short(problem['input'])})"
 
 

@@ -21,6 +21,7 @@ from study.problem.heterogeneous import (
     Ellipsoid,
     HeterogeneousTissue,
     Region,
+    mapped_mean,
     of_tetrahedra,
 )
 from study.problem.tissue import Tissue
@@ -41,6 +42,8 @@ FEWEST = 8
 """Points that tell shares of elements, in an inclusion: with fewer its volume is chance."""
 RANGE = (10.0, 1e9)
 """Young's moduli [Pa] that a map may have."""
+MEAN_RANGE = (100.0, 1e6)
+"""Those that it may have in the mean, as a tissue without a map."""
 
 
 def tissue_of(table: OrganTissue, geometry: Geometry) -> Tissue:
@@ -138,6 +141,14 @@ def _check(tissue: HeterogeneousTissue, table: OrganTissue, mesh: TetrahedralMes
         raise ValueError(
             "tissue.stiffness_map: no voxel with a value lies in the organ; its affine, or "
             "organ.axes and organ.unit, are of another frame"
+        )
+    mean = mapped_mean(volumes(mesh), made)
+    low, high = MEAN_RANGE
+    if not low <= mean <= high:
+        raise ValueError(
+            f"tissue.stiffness_map.unit: in {table.stiffness_map.unit} Young's modulus is "
+            f"{mean:.3g} Pa in the mean over the organ, and that of a tissue is {low:g} to "
+            f"{high:g}; give the unit of the image"
         )
     if table.stiffness_map.elsewhere == "refused" and (made.around > 0.0).any():
         share = float(volumes(mesh) @ made.around) / float(volumes(mesh).sum())

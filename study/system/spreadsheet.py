@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 from study.system.folders import NO_PLACE, write_text
 
+WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx and .ods, and of .xls."""
 DELIMITERS = ",;\t"
 _ANNOUNCED = re.compile(r"sep=([,;\t])\r?\n")
 
@@ -59,6 +61,9 @@ def read_table(path: Path) -> Table:
 
 def _text(path: Path) -> str:
     try:
+        with path.open("rb") as file:
+            if file.read(4) in WORKBOOKS:
+                raise TableError(f"{path}: is a workbook, not a table; save the sheet as CSV")
         with path.open(newline="", encoding="utf-8-sig") as file:
             return file.read()
     except OSError as error:

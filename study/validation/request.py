@@ -64,6 +64,8 @@ def _refuse_unknown(names: Sequence[str], known: Iterable[str], what: str) -> No
     for name in names:
         if name not in known:
             raise ValueError(f"{what}: {name} is not one of {', '.join(known)}")
+        if names.count(name) > 1:
+            raise ValueError(f"{what}: {name} is named twice; leave one out")
 
 
 def all_answered(found: Sequence[Comparison]) -> bool:
