@@ -4,9 +4,10 @@ Each function is its namesake's equal to rounding and takes well under a millise
 whole arrays take several. Motions are (samples,) on the same uniform times and finite.
 
 The measures are written twice so that a score does not rest on one hand's work: there they read as
-their definitions do, on whole arrays, here they are loops. Loops over plain numbers,
-for what numba puts in the place of numpy's sorting, interpolation and array arithmetic takes longer
-to compile than all that is here.
+their definitions do, on whole arrays, here they are mostly loops. Compilation is kept short: loops
+are over plain numbers, for what numba puts in the place of numpy's sorting, interpolation and array
+arithmetic takes longer to compile than all that is here; arrays are made in Python; and it calls
+each measure, since each level of compiled functions compiles those below once more.
 """
 
 from __future__ import annotations
@@ -43,24 +44,25 @@ COLUMNS = (
     ("phase-plane", "pcm"),
 )
 """Curve and measure of each score that `scores` gives, in its order."""
-
-
 GAPS = (701, 301, 132, 57, 23, 10, 4, 1)
 """Of Shell's sort, after Ciura 2001."""
+ROOM = 512
+"""Crossings for which there is room at first: more than most pairs of curves have."""
 
 
-def _compiled(*, inner: bool = True) -> Callable[[Any], Any]:
-    """Compile a function and keep it on disk; one that is `inner` has no way in from Python."""
-    return njit(cache=True, error_model="numpy", no_cpython_wrapper=inner, no_cfunc_wrapper=True)
+def _compiled(*, inner: bool = False) -> Callable[[Any], Any]:
+    """Compile a function that makes no array, and keep it on disk.
+
+    One that is `inner` has no way in from Python.
+    """
+    options = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": True, "_nrt": False}
+    return njit(cache=True, error_model="numpy", **options)
 
 
 def scores(
     displacement: Floats, velocity: Floats, true_displacement: Floats, true_velocity: Floats
 ) -> Floats:
-    """Scores (7,) of a motion against a reference that moves, in the order of COLUMNS.
-
-    Put together in Python: each level of compiled functions compiles those below once more.
-    """
+    """Scores (7,) of a motion against a reference that moves, in the order of COLUMNS."""
     pairs = (displacement, true_displacement), (velocity, true_velocity)
     found = [measure(*pair) for pair in pairs for measure in (relative_l2, iso_18571)]
     x, y = (float(np.abs(true).max()) for _, true in pairs)
@@ -69,12 +71,11 @@ def scores(
 
 
 def compile_measures() -> None:
-    """Compile all measures where they are not kept on disk, some ten seconds' work."""
+    """Compile all measures where they are not kept on disk, some seconds' work."""
     ramp = np.linspace(0.0, 1.0, 8)
     scores(ramp, ramp, 0.9 * ramp, 1.1 * ramp)
 
 
-@_compiled(inner=False)
 def plane_scores(
     displacement: Floats,
     velocity: Floats,
@@ -84,20 +85,19 @@ def plane_scores(
     y: float,
 ) -> Floats:
     """Scores (3,) of the phase plane, its axes divided by x [m] and y [m/s]."""
-    own, other = np.empty((POINT_COUNT, 2)), np.empty((POINT_COUNT, 2))
-    resample(displacement, velocity, x, y, own)
-    resample(true_displacement, true_velocity, x, y, other)
-    length, true_length = _arc_length(own), _arc_length(other)
-    found = np.empty(3)
-    found[0] = 1.0 / (1.0 + frechet(own, other))
-    found[1] = 1.0 / (1.0 + area(own, other))
-    if length[-1] > true_length[-1]:
-        own, length, other, true_length = other, true_length, own, length
-    found[2] = 1.0 / (1.0 + partial_mapping(own, length, other, true_length))
-    return found
+    own, other = np.empty((2, POINT_COUNT, 2))
+    lengths, room = np.empty((2, POINT_COUNT)), np.empty(len(displacement))
+    resample(displacement, velocity, x, y, room, own)
+    resample(true_displacement, true_velocity, x, y, room, other)
+    for points, length in zip((own, other), lengths, strict=True):
+        arc_length(points, length)
+    distances = frechet(own, other, np.empty(len(other))), area(own, other)
+    curves = sorted(zip((own, other), lengths, strict=True), key=lambda curve: curve[1][-1])
+    mapping = partial_mapping(*curves[0], *curves[1])
+    return 1.0 / (1.0 + np.array((*distances, mapping)))
 
 
-@_compiled(inner=False)
+@_compiled()
 def relative_l2(c: Floats, r: Floats) -> float:
     """max(0, 1 - ||c - r|| / ||r||)."""
     apart, size = 0.0, 0.0
@@ -107,33 +107,30 @@ def relative_l2(c: Floats, r: Floats) -> float:
     return max(0.0, 1.0 - math.sqrt(apart / size))
 
 
-@_compiled()
-def _reach(r: Floats) -> float:
-    """Largest size."""
-    reach = 0.0
-    for x in r:
-        reach = max(reach, abs(x))
-    return reach
-
-
 def iso_18571(c: Floats, r: Floats) -> float:
     """Overall rating, see `study.similarity.iso18571`."""
     corridor, phase, magnitude, slope = iso_18571_parts(c, r)
     return 0.4 * corridor + 0.2 * (phase + magnitude + slope)
 
 
-@_compiled(inner=False)
 def iso_18571_parts(c: Floats, r: Floats) -> tuple[float, float, float, float]:
     """Corridor, phase, magnitude and slope of the rating, each in [0, 1]."""
-    n, shift = len(r), _best_shift(c, r)
+    n, shift = len(r), best_shift(c, r)
     count, late, early = n - abs(shift), max(shift, 0), max(-shift, 0)
     cs, rs = c[late : late + count], r[early : early + count]
-    apart, size = _slope_sums(cs, rs)
+    width = math.ceil(WARPING_WINDOW * count) - 1
+    steps = np.empty((count, 2 * width + 1), np.uint8)
+    gap, size = magnitude(cs, rs, width, steps, *np.empty((2, count + 1)))
+    slope_gap, slope_size = slope(cs, rs, np.empty((2, count + 1)), np.empty((2, count)))
     phase = _part(float(abs(shift)), float(n), SHIFT_LIMIT)
-    return _corridor(c, r), phase, _magnitude(cs, rs), _part(apart, size, SLOPE_LIMIT)
+    return (
+        corridor(c, r),
+        phase,
+        _part(gap, size, MAGNITUDE_LIMIT),
+        _part(slope_gap, slope_size, SLOPE_LIMIT),
+    )
 
 
-@_compiled()
 def _part(error: float, size: float, limit: float) -> float:
     if error == 0.0:
         return 1.0
@@ -141,15 +138,18 @@ def _part(error: float, size: float, limit: float) -> float:
 
 
 @_compiled()
-def _corridor(c: Floats, r: Floats) -> float:
-    reach, total = _reach(r), 0.0
+def corridor(c: Floats, r: Floats) -> float:
+    """Rating of the distance of the motions at each time, relative to the largest displacement."""
+    reach, total = 0.0, 0.0
+    for x in r:
+        reach = max(reach, abs(x))
     for i in range(len(r)):
         inside = (OUTER_CORRIDOR - abs(c[i] - r[i]) / reach) / (OUTER_CORRIDOR - INNER_CORRIDOR)
         total += min(max(inside, 0.0), 1.0) ** 2
     return total / len(r)
 
 
-@_compiled()
+@_compiled(inner=True)
 def _correlation(x: Floats, y: Floats) -> float:
     mx, my, raw_x, raw_y, xx, yy, xy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
@@ -169,7 +169,8 @@ def _correlation(x: Floats, y: Floats) -> float:
 
 
 @_compiled()
-def _best_shift(c: Floats, r: Floats) -> int:
+def best_shift(c: Floats, r: Floats) -> int:
+    """Number of samples by which c is late that makes the two most alike."""
     n, best, highest = len(r), 0, _correlation(c, r)
     for m in range(1, math.floor(SHIFT_LIMIT * n) + 1):
         late, early = _correlation(c[m:], r[: n - m]), _correlation(c[: n - m], r[m:])
@@ -181,12 +182,14 @@ def _best_shift(c: Floats, r: Floats) -> int:
 
 
 @_compiled()
-def _magnitude(c: Floats, r: Floats) -> float:
-    """Part of the magnitude after warping within a band of the length, whose steps are kept."""
-    n = len(r)
-    w = math.ceil(WARPING_WINDOW * n) - 1
-    steps = np.empty((n, 2 * w + 1), np.uint8)  # of cell (i, j) at column j - i + w
-    before, row = np.empty(n + 1), np.empty(n + 1)
+def magnitude(
+    c: Floats, r: Floats, w: int, steps: NDArray[np.uint8], before: Floats, row: Floats
+) -> tuple[float, float]:
+    """Sums of the gaps and of the sizes after warping within w samples.
+
+    The steps (n, 2 w + 1) of the warping are kept; `before`, `row` (n + 1,): to work in.
+    """
+    n = len(r)  # the step of cell (i, j) is at column j - i + w
     for j in range(n + 1):
         before[j] = row[j] = np.inf
     before[0] = 0.0
@@ -204,9 +207,9 @@ def _magnitude(c: Floats, r: Floats) -> float:
     return _warped(c, r, steps, w)
 
 
-@_compiled()
-def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> float:
-    """The part along the path of these steps, traced back from the ends."""
+@_compiled(inner=True)
+def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> tuple[float, float]:
+    """The sums along the path of these steps, traced back from the ends."""
     i = j = len(r) - 1
     apart, size = abs(c[i] - r[j]), abs(r[j])
     while i > 0 or j > 0:
@@ -214,13 +217,12 @@ def _warped(c: Floats, r: Floats, steps: NDArray[np.uint8], w: int) -> float:
         i, j = i - (step != 1), j - (step != 0)
         apart += abs(c[i] - r[j])
         size += abs(r[j])
-    return _part(apart, size, MAGNITUDE_LIMIT)
+    return apart, size
 
 
-@_compiled()
-def _slope(y: Floats) -> Floats:
+@_compiled(inner=True)
+def _slope(y: Floats, total: Floats, smooth: Floats) -> None:
     n = len(y)
-    total = np.empty(n + 1)
     total[0] = 0.0
     for i in range(n):
         if i == 0:
@@ -230,28 +232,35 @@ def _slope(y: Floats) -> Floats:
         else:
             slope = 0.5 * (y[i + 1] - y[i - 1])
         total[i + 1] = total[i] + slope
-    smooth = np.empty(n)
     for i in range(n):
         half = min(4, i, n - 1 - i)
         smooth[i] = (total[i + half + 1] - total[i - half]) / (2 * half + 1)
-    return smooth
 
 
 @_compiled()
-def _slope_sums(c: Floats, r: Floats) -> tuple[float, float]:
-    sc, sr = _slope(c), _slope(r)
+def slope(c: Floats, r: Floats, total: Floats, smooth: Floats) -> tuple[float, float]:
+    """Sums of the gaps and of the sizes of the smoothed slopes.
+
+    `total` (2, n + 1), `smooth` (2, n): to work in.
+    """
+    _slope(c, total[0], smooth[0])
+    _slope(r, total[1], smooth[1])
     apart, size = 0.0, 0.0
     for i in range(len(r)):
-        apart += abs(sc[i] - sr[i])
-        size += abs(sr[i])
+        apart += abs(smooth[0, i] - smooth[1, i])
+        size += abs(smooth[1, i])
     return apart, size
 
 
 @_compiled()
-def resample(x: Floats, y: Floats, by_x: float, by_y: float, points: Floats) -> None:
-    """Set points (200, 2) at equal steps of arc length on axes divided by these."""
+def resample(
+    x: Floats, y: Floats, by_x: float, by_y: float, length: Floats, points: Floats
+) -> None:
+    """Set points (200, 2) at equal steps of arc length on axes divided by these.
+
+    `length` (n,): to work in.
+    """
     n = len(x)
-    length = np.empty(n)
     length[0] = 0.0
     for i in range(1, n):
         dx, dy = x[i] / by_x - x[i - 1] / by_x, y[i] / by_y - y[i - 1] / by_y
@@ -269,10 +278,9 @@ def resample(x: Floats, y: Floats, by_x: float, by_y: float, points: Floats) -> 
 
 
 @_compiled()
-def frechet(a: Floats, b: Floats) -> float:
-    """Discrete Frechet distance of two curves (200, 2)."""
-    n, m = len(a), len(b)
-    row = np.empty(m)  # squared, as the order of gaps is that of their squares
+def frechet(a: Floats, b: Floats, row: Floats) -> float:
+    """Discrete Frechet distance of two curves (200, 2); `row` (200,): to work in."""
+    n, m = len(a), len(b)  # gaps are squared, which keeps their order
     for i in range(n):
         corner = 0.0
         for j in range(m):
@@ -288,54 +296,36 @@ def frechet(a: Floats, b: Floats) -> float:
     return math.sqrt(row[-1])
 
 
-@_compiled()
 def area(a: Floats, b: Floats) -> float:
     """Area between two curves (200, 2), see `study.similarity.enclosed_area`."""
     edges = _edges(a, b)
-    crossings = _crossings(edges)
-    n, m = len(edges), len(crossings)
-    levels, rank = np.empty(2 * n + m), np.empty(2 * n + m, np.int64)
-    for i in range(n):
-        levels[i], levels[n + i] = edges[i, 1], edges[i, 3]
-    for i in range(m):
-        levels[2 * n + i] = crossings[i]
-    _sort(levels, rank, len(levels))
-    return _between(edges, levels)
+    found = np.empty(ROOM)
+    count = crossings(edges, found)
+    if count > len(found):
+        found = np.empty(count)
+        crossings(edges, found)
+    levels = np.sort(np.concatenate((edges[:, 1], edges[:, 3], found[:count])))
+    return float(between(edges, levels, np.empty(len(edges), np.int64), np.empty(len(edges))))
 
 
-@_compiled()
 def _edges(a: Floats, b: Floats) -> Floats:
     """Rows x, y of the lower and of the upper end and the sense, 1 up, of each edge not level.
 
     Of the way along one curve and back along the other. By their lower ends, so that the edges at
     some height are found without looking at all.
     """
-    n, count = len(a) + len(b), 0
-    found, low, rank = np.empty((n, 5)), np.empty(n), np.empty(n, np.int64)
-    for i in range(n):
-        j = (i + 1) % n
-        p = a[i] if i < len(a) else b[n - 1 - i]
-        q = a[j] if j < len(a) else b[n - 1 - j]
-        if p[1] == q[1]:
-            continue
-        up = p[1] < q[1]
-        found[count, 0], found[count, 1] = (p[0], p[1]) if up else (q[0], q[1])
-        found[count, 2], found[count, 3] = (q[0], q[1]) if up else (p[0], p[1])
-        found[count, 4] = 1.0 if up else -1.0
-        low[count], rank[count] = found[count, 1], count
-        count += 1
-    _sort(low, rank, count)
-    edges = np.empty((count, 5))
-    for i in range(count):
-        for k in range(5):
-            edges[i, k] = found[rank[i], k]
-    return edges
+    start = np.concatenate((a, b[::-1]))
+    end = np.roll(start, -1, axis=0)
+    sense = np.sign(end[:, 1:] - start[:, 1:])
+    low, high = np.where(sense > 0.0, start, end), np.where(sense > 0.0, end, start)
+    edges = np.concatenate((low, high, sense), axis=1)[sense[:, 0] != 0.0]
+    return edges[np.argsort(edges[:, 1])]
 
 
 @_compiled()
-def _crossings(edges: Floats) -> Floats:
-    """Ordinates at which two of the edges cross."""
-    count, found = 0, np.empty(64)
+def crossings(edges: Floats, found: Floats) -> int:
+    """Number of crossings of two of the edges; their ordinates, as many as there is room for."""
+    count = 0
     for i in range(len(edges)):
         x, y, high = edges[i, 0], edges[i, 1], edges[i, 3]
         dx, dy = edges[i, 2] - x, high - y
@@ -349,26 +339,18 @@ def _crossings(edges: Floats) -> Floats:
             ax, ay = edges[j, 0] - x, edges[j, 1] - y
             share, other = (ax * ey - ay * ex) / turn, (ax * dy - ay * dx) / turn
             if 0.0 < share < 1.0 and 0.0 < other < 1.0:
-                if count == len(found):
-                    found = _enlarged(found)
-                found[count] = y + share * dy
+                if count < len(found):
+                    found[count] = y + share * dy
                 count += 1
-    return found[:count]
+    return count
 
 
 @_compiled()
-def _enlarged(a: Floats) -> Floats:
-    """The same numbers with room for as many more."""
-    made = np.empty(2 * len(a))
-    for i in range(len(a)):
-        made[i] = a[i]
-    return made
+def between(edges: Floats, levels: Floats, here: Ints, at: Floats) -> float:
+    """Integral of the winding number's size over the slabs between levels.
 
-
-@_compiled()
-def _between(edges: Floats, levels: Floats) -> float:
-    """Integral of the winding number's size over the slabs between levels."""
-    here, at = np.empty(len(edges), np.int64), np.empty(len(edges))
+    `here`, `at` (edges,): to work in.
+    """
     total, active, waiting = 0.0, 0, 0
     for k in range(len(levels) - 1):
         low, high = levels[k], levels[k + 1]
@@ -396,7 +378,7 @@ def _between(edges: Floats, levels: Floats) -> float:
     return total
 
 
-@_compiled()
+@_compiled(inner=True)
 def _sort(keys: Floats, with_them: Ints, count: int) -> None:
     """Sort the first of some keys, and what goes with them, after Shell."""
     for gap in GAPS:
@@ -420,7 +402,7 @@ def partial_mapping(shorter: Floats, own: Floats, longer: Floats, other: Floats)
     return least / other[-1]
 
 
-@_compiled()
+@_compiled(inner=True)
 def _gaps(shorter: Floats, own: Floats, longer: Floats, other: Floats, offset: float) -> float:
     """Integral of the gap over the longer curve, the shorter's ends held."""
     last, total, before, k = len(own) - 1, 0.0, 0.0, 0
@@ -440,10 +422,9 @@ def _gaps(shorter: Floats, own: Floats, longer: Floats, other: Floats, offset: f
 
 
 @_compiled()
-def _arc_length(points: Floats) -> Floats:
-    length = np.empty(len(points))
+def arc_length(points: Floats, length: Floats) -> None:
+    """Set the lengths (200,) of a curve (200, 2) up to each point."""
     length[0] = 0.0
     for i in range(1, len(points)):
         step = math.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
         length[i] = length[i - 1] + step
-    return length
