@@ -550,14 +550,40 @@ def _graded_gains(places: list[Line], costs: list[Line]) -> Iterator[tuple[str, 
     """As `_gains`, with graded corrected lattices, at the places where there are any."""
     found = {(one["at_x"], one["at_z"]): one for one in places}
     both = [found[at] | one for one in measured("corrected_places") if (at := _at(one)) in found]
-    price = _prices(costs)
+    price, cells = _prices(costs), measured("graded_cells")
+    yield "graded-cells-count", str(len({_at(one) for one in cells}))
+    yield "graded-cells", table(CELLS_HEAD, map(_cells, cells))
     for words, (_, above, up_to) in zip(("small", "large"), STRAINS, strict=True):
         chosen = [one for one in both if above < float(one["strain"]) <= up_to]
         for kind in ("uniform", "own"):
-            gains = [gain for one in chosen if (gain := _gain(one, price, kind)) is not None]
+            known = (_gain(one, price, kind, _at_place(cells, one, price)) for one in chosen)
+            gains = [gain for gain in known if gain is not None]
             yield f"graded-gain-{words}-{kind}", f"{min(gains):.0f}"
             yield f"graded-gain-{words}-{kind}-median", f"{median(gains):.0f}"
         yield f"graded-gain-{words}-met", str(len(gains))
+
+
+CELLS_HEAD = (
+    *("largest strain", "radius of the tool", "finest cells", "as far as", "nodes", "error"),
+    *("predicted", "gain"),
+)
+
+
+def _cells(one: Line) -> list[str]:
+    """A grading at a place: lengths in mm."""
+    lengths = [f"{1e3 * float(one[key]):.3g} mm" for key in ("radius_m", "finest_m", "reach_m")]
+    errors = [percent(float(one[key])) for key in ("error", "foretold")]
+    strain = percent(float(one["strain"]))
+    return [strain, *lengths, one["nodes"], *errors, f"{float(one['gain']):.0f}"]
+
+
+def _at_place(
+    cells: list[Line], place: Line, price: dict[tuple[str, float, float], float]
+) -> list[float]:
+    """Costs [s] of graded corrected lattices within the tolerance, measured at a place."""
+    finest = price["uniform", 0.005, 0.0]
+    kept = [one for one in cells if _at(one) == _at(place) and float(one["error"]) <= TOLERANCE]
+    return [finest / float(one["gain"]) for one in kept]
 
 
 PREDICTED = {
@@ -740,10 +766,16 @@ GRADED_PRICED = (0.015, 0.025)
 """Radii [m] of those whose cost is known; a smaller one counts as the next larger."""
 
 
-def _gain(line: Line, price: dict[tuple[str, float, float], float], kind: str) -> float | None:
+def _gain(
+    line: Line,
+    price: dict[tuple[str, float, float], float],
+    kind: str,
+    further: Sequence[float] = (),
+) -> float | None:
     """None where no corrected lattice is; at least so much where no lattice alone is.
 
-    Graded ones count where their error was measured.
+    Graded ones count where their error was measured. `further`: costs [s] of others within the
+    tolerance.
     """
     errors = {name: float(line.get(f"{kind}_{name}", 0.0)) for name in ALONE} | {"5": 0.0}
     alone = [price["uniform", ALONE[name], 0.0] for name, e in errors.items() if e <= TOLERANCE]
@@ -757,6 +789,7 @@ def _gain(line: Line, price: dict[tuple[str, float, float], float], kind: str) -
         for name, reach in GRADED.items()
         if name in line and float(line[name]) <= TOLERANCE
     ]
+    both += further
     return min(alone) / min(both) if both else None
 
 

@@ -12,7 +12,7 @@ from study.problem.rigid import SPHERE, RigidTool
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
-from tests.benchmarks import graded_places
+from tests.benchmarks import graded_cells, graded_places
 
 BLOCK = (
     'organ.size=["60 mm", "40 mm", "30 mm"]',
@@ -295,3 +295,13 @@ def test_on_the_liver_a_graded_correction_beats_one_of_more_nodes():
     assert np.median(gain) > 2.0
     assert max(one.graded_error for one in rows) < max(one.corrected_10 for one in rows)
     assert max(one.graded_nodes for one in rows) < 2525
+
+
+def test_on_the_liver_gradings_of_a_plan_keep_what_it_foretells_at_a_tenth_of_the_cost():
+    rows = graded_cells.kept()
+    places = {row[:2] for row in rows}
+    assert len(places) >= 2
+    assert all(row.error <= row.foretold for row in rows)
+    for place in places:
+        met = [row.gain for row in rows if row[:2] == place and row.error <= 0.02]
+        assert max(met) > 10.0

@@ -236,7 +236,7 @@ def region(scene: Scene, look: Look, one: GradedLook) -> Candidate:
     """One of the solved graded lattices, stepped explicitly, and its cost."""
     seen = one.lattice
     plain = lattice(scene, look, scene.lattice.spacing)
-    graded = replace(scene.region, spacing=seen.spacing, radius=one.radius)
+    graded = replace(scene.region, spacing=seen.spacing, radius=one.radius, levels=one.levels)
     return replace(
         plain,
         name=f"lattice of {1e3 * seen.spacing:.3g} mm to {1e3 * one.radius:.3g} mm from the tool "

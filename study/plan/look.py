@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,28 @@ Floats = NDArray[np.float64]
 
 SPACINGS = (2.0, 1.5, 1.0)
 """Spacings of the lattices, over that of the scene."""
-FINEST, REACHES = 0.5, (0.6, 1.0, 1.5)
-"""For graded lattices: edge of their finest cells over the scene's spacing, and their radii.
 
-The radii are in radii of the tool; the others are compared with the last.
-"""
+
+class Grading(NamedTuple):
+    """Sizes of the cells of a graded lattice.
+
+    `finest`: their least edge, over the scene's spacing; `levels`: number of sizes; `reach`: radius
+    of the finest cells, over that of the tool.
+    """
+
+    finest: float
+    levels: int
+    reach: float
+
+
+GRADINGS = (
+    Grading(1.0, 2, 1.0),
+    Grading(2.0 / 3.0, 3, 1.5),
+    Grading(0.5, 3, 0.6),
+    Grading(0.5, 3, 1.0),
+    Grading(0.5, 3, 1.5),
+)
+"""The graded lattices; the others are compared with the last."""
 LEVELS = (-1, 0, 1)
 MOST_UNKNOWNS = 30_000
 """Largest coarse mesh, which takes a few seconds; one is solved whatever its size."""
@@ -75,8 +93,12 @@ class LatticeLook:
 
 @dataclass(frozen=True)
 class GradedLook:
-    """A graded lattice at rest, the radius [m] of its finest cells, and its step time [s]."""
+    """A graded lattice of so many `levels` at rest.
 
+    `radius` [m]: of its finest cells; `step_wall`: its step time [s].
+    """
+
+    levels: int
     radius: float
     lattice: LatticeLook
     step_wall: float
@@ -123,19 +145,21 @@ def look(scene: Scene, problem: Problem) -> Look:
 
 
 def _graded_at_rest(scene: Scene, problem: Problem) -> Iterator[GradedLook]:
-    """From the smallest fine region to the largest; none for settings without support."""
+    """Those of GRADINGS; none for settings without support."""
     if any(unfit(scene.lattice)):
         return
     region = model(scene, "region")
     assert isinstance(region, LatticeModel)  # noqa: S101 - it is one by its kind
-    finest = FINEST * scene.lattice.spacing
-    for reach in REACHES:
-        radius = reach * scene.tool.radius
+    for finest, levels, reach in GRADINGS:
+        spacing, radius = finest * scene.lattice.spacing, reach * scene.tool.radius
         prepared = region.varied(
-            spacing=finest, radius=radius, volume_term=lacks_poisson_ratio(scene)
+            spacing=spacing,
+            levels=levels,
+            radius=radius,
+            volume_term=lacks_poisson_ratio(scene),
         ).prepare(problem)
-        seen = replace(lattice_at_rest(prepared), spacing=finest)
-        yield GradedLook(radius, seen, _step_wall(prepared))
+        seen = replace(lattice_at_rest(prepared), spacing=spacing)
+        yield GradedLook(levels, radius, seen, _step_wall(prepared))
 
 
 def _elements(scene: Scene, problem: Problem) -> tuple[tuple[ElementsLook, ...], float]:

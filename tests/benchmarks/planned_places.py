@@ -92,7 +92,7 @@ def row(one: dict[str, float]) -> Row:
         *(one[key] for key in ("at_x", "at_z", "radius_m", "strain", "force_n")),
         foresight.geometry,
         *(foresight.remainder(h) for h in (0.02, 0.015, 0.01)),
-        *(foresight.graded_remainder(graded) for graded in seen.graded[:2]),
+        *(foresight.graded_remainder(graded) for graded in seen.graded[-3:-1]),
         foresight.graded(seen.graded[-1]),
         *(foresight.spacing(h) for h in (0.01, 0.005)),
         foresight.mesh(size.size),
