@@ -1,4 +1,4 @@
-"""Several runs beside each other as one page, which asks no network for anything."""
+"""Comparison of several runs as one page, which makes no network request."""
 
 from __future__ import annotations
 
@@ -28,13 +28,15 @@ def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[C
     names = [words(short(name, 24)) for name in names]
     labels = shared_models(runs)
     text = Template(part("several.html")).substitute(
-        title=markup.escape(f"Several runs: {', '.join(names)}"),
+        title=markup.escape(f"Comparison of runs: {', '.join(names)}"),
         style=part("page.css"),
         said=markup.escape(several.said(names, runs, rows)),
         height=f"{ROW * -(-len(labels) // COLUMNS)}rem",
         words=markup.escape(alternative(names, runs), quote=True),
         table=table(
-            [*several.HEADER, *names, "verdict"], several.cells(rows), "What differs first"
+            [*several.HEADER, *names, "verdict"],
+            several.cells(rows),
+            "Those that differ by more than their errors first",
         ),
         data=inert({"traces": list(_traces(names, runs, labels)), "layout": _layout(labels)}),
         plotly=plotly(),
