@@ -1,12 +1,14 @@
-"""The error budgets of a run as waterfalls: from the whole difference down to nothing."""
+"""The error budgets of a run as waterfalls: from the whole difference down to zero."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from reports import canvas
 from reports.appearance import looks
-from reports.budget import by_reference, cause_name, signed
+from reports.budget import SMALL, by_reference, cause_name, signed
 from reports.digits import percent
 from study.results.folder import Results
 
@@ -34,14 +36,15 @@ def budget_figure(results: Results) -> bytes | None:
             waterfall(axes, budget)
             axes.set_title(seen[budget.model].label)
             axes.set_xlabel("relative L2 difference [%]")
+        panels[0].set_xlim(_limits(found))  # of all, as they share the axis
         return figure
 
     return canvas.drawn(draw)
 
 
 def waterfall(axes: Axes, budget: ErrorBudget) -> None:
-    """Draw each contribution where those before it ended; a black mark is what is left."""
-    names = ["whole", *(cause_name(part.cause, budget.reference) for part in budget.parts)]
+    """Draw each contribution where those before it ended; a black mark is what remains."""
+    names = ["total", *(cause_name(part.cause, budget.reference) for part in budget.parts)]
     axes.barh(0, 100 * budget.total, height=0.7, color=WHOLE)
     _label(axes, 0, 100 * budget.total, percent(budget.total))
     at = budget.total
@@ -55,8 +58,17 @@ def waterfall(axes: Axes, budget: ErrorBudget) -> None:
         at = after
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(0.0, 135 * budget.total)
+    axes.set_xlim(_limits([budget]))
     axes.grid(visible=False, axis="y")
+
+
+def _limits(budgets: Sequence[ErrorBudget]) -> tuple[float, float]:
+    """Ends [%] of the axis: contributions may exceed the total; with room for the numbers."""
+    ends = [0.0, *(part.left for one in budgets for part in one.parts)]
+    for one in budgets:
+        ends += accumulate((-part.contribution for part in one.parts), initial=one.total)
+    low, high = min(ends), max(ends)
+    return 105.0 * low if low < -SMALL else 0.0, 100.0 * high + 35.0 * (high - low)
 
 
 def _label(axes: Axes, y: int, end: float, text: str) -> None:

@@ -1,7 +1,6 @@
-"""A summary of credibility in the terms of ASME V&V 40 (2018), of a run's own figures.
+"""A summary of credibility of a run in the terms of ASME V&V 40 (2018).
 
-The standard asks for more than a program can know: model risk, and whether the evidence is enough
-for it, are left to the reader and said to be.
+Model risk, and whether the evidence is sufficient for it, are left to the reader and stated so.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ def credibility(results: Results) -> str:
         "Question of interest": [question(results)],
         "Context of use": list(_context(results)),
         "Model risk": [
-            "Left to the reader: how much a decision would rest on these models, and what follows "
-            "from a wrong one, are no matter of this run. The levels of rigour below are therefore "
-            "stated, not judged to be enough."
+            "Left to the reader: the influence of these models on a decision and the consequence "
+            "of a wrong decision are not known to this program. The rigour of the evidence below "
+            "is stated, but not judged to be sufficient."
         ],
-        "What the run answers": list(answer(results).sentences),
+        "Answer of the run": list(answer(results).sentences),
         "Verification of the code": list(_code()),
         "Verification of the calculation": list(_calculation(results)),
         "Validation": list(_validation(results)),
@@ -66,19 +65,19 @@ def _code() -> Iterator[str]:
     )
     lines = read("verification")
     if not lines:
-        yield "No table of verification was delivered with this version."
+        yield "This version comes without a table of verification results."
         return
     yield (
-        f"The finite elements on problems with exact solutions: {outcomes(lines)}. Not of this "
-        "run: measured before; `liver-study verify` repeats it."
+        f"Finite elements on problems with exact solutions: {outcomes(lines)}. This was computed "
+        "beforehand, not in this run; `liver-study verify` repeats it."
     )
 
 
 def _calculation(results: Results) -> Iterator[str]:
     yield (
-        "Use error: inputs are refused before anything is computed where they cannot be meant "
-        "(`liver-study check`); inputs/ has the scene as it was run, with every default, and no "
-        "number of this summary was typed by hand."
+        "Use error: invalid inputs are refused before the computation (`liver-study check`). "
+        "inputs/ contains the scene of the run with every default. All numbers of this summary "
+        "are read from the results."
     )
     probe = tool_probe(results)
     for model in results.record.models:
@@ -93,7 +92,7 @@ def _calculation(results: Results) -> Iterator[str]:
         )
     error = own_error(results)
     if error is not None:
-        yield f"Finite elements: error of the field at the peak by the mesh, {percent(error)}."
+        yield f"Finite elements: discretisation error of the field at the peak, {percent(error)}."
     passed = sum(check.passed for check in results.record.checks)
     yield f"Checks of the run: {passed} of {len(results.record.checks)} passed."
     for check in results.record.checks:
@@ -108,21 +107,22 @@ def _parts(model: ModelRecord) -> str:
 
 
 def _validation(results: Results) -> Iterator[str]:
-    yield "No experiment is compared with in this run: the comparator is another model."
+    yield "This run is not compared with an experiment: the comparator is another model."
     measured = validation()
     if measured is not None:
         yield (
-            f"Beside measurements on bodies of silicone at rest {measured['within']} differences "
-            "lie within twice the measurement's uncertainty and the model's own error. Not of this "
-            "run, and none is liver: `liver-study validate` repeats it."
+            f"Compared with static measurements on silicone bodies, {measured['within']} "
+            "differences are within twice the uncertainty of the measurement plus the error of "
+            "the model. This was computed beforehand, and no body is liver; `liver-study "
+            "validate` repeats it."
         )
     if finite_elements(results) is None:
-        yield "It has no finite elements either: differences of its models are no errors."
+        yield "It has no finite elements: differences between its models are not errors."
         return
     yield (
         "Comparator: the finite elements of the same scene. Organ, support, tools, load and "
-        "damping are the same inputs; the modulus is the scene's own in the finite elements, and "
-        "in the other models what they are tuned by."
+        "damping are the same inputs. The finite elements use the modulus of the scene, the other "
+        "models that of their estimate or law."
     )
     named, own = labels(results), own_error(results)
     rows = [
@@ -145,25 +145,25 @@ def _uncertainty(results: Results) -> Iterator[str]:
             value = fixed(one.estimate_pa / PA_PER_KPA, 2)
             yield (
                 f"Stiffness by {system_name(system)}: {value} kPa, interval {low} to {high} kPa, "
-                "carried through to the motion."
+                "propagated to the motion."
             )
     if results.sensitivity:
         row = max(results.sensitivity, key=lambda row: abs(row.change_at_readings_pa))
         yield (
-            f"Largest change of an estimate by another choice on the fuzzy side: "
+            f"Largest change of an estimate by an open choice of the fuzzy systems: "
             f"{fixed(row.change_at_readings_pa / PA_PER_KPA, 2)} kPa ({row.choice}: "
             f"{row.base} to {row.alternative}, {system_name(row.system)})."
         )
     if results.score_errors:
         yield "Each score has an interval over blocks of the motion: score_errors.csv."
     if not (found or results.sensitivity or results.score_errors):
-        yield "None is quantified: the run has neither fuzzy systems nor scores."
+        yield "Not quantified: the run has neither fuzzy systems nor scores."
 
 
 def _applicability(results: Results) -> Iterator[str]:
     yield (
-        "Relevance to the context of use: the quantities are those compared; the comparison holds "
-        "for this organ, support, tools, load and duration, and is no evidence for others."
+        "Relevance to the context of use: the compared quantities are the quantities of interest. "
+        "The comparison holds for this organ, support, tools, load and duration only."
     )
     model, limit = finite_elements(results), results.record.strain_limit
     is_linear = model is not None and model.elements is not None and model.elements.law is None
@@ -171,7 +171,7 @@ def _applicability(results: Results) -> Iterator[str]:
         side = "below" if model.largest_strain < limit else "not below"
         yield (
             f"Largest strain of the finite elements: {percent(model.largest_strain)}, {side} the "
-            f"{percent(limit)} up to which linear strain is trusted here."
+            f"limit of {percent(limit)} assumed for linear strain."
         )
     for text in results.record.assumptions:
         yield f"Assumed: {symbols(text)}"

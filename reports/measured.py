@@ -1,4 +1,4 @@
-"""What was measured beforehand, of no run, as a document of its own: `report --reference`."""
+"""Measurements made beforehand, independent of any run, as a document: `report --reference`."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from study.system.folders import write_bytes
 NAME = "liver-study-reference.pdf"
 TEMPLATE = "measured.typ"
 ALTERNATIVES = {
-    "validation": "Models beside measurements on silicone: force on cylinders, tip of a beam, "
-    "beads in a cube; the numbers are in the two tables that follow",
+    "validation": "Models compared with measurements on silicone: force on cylinders, tip of a "
+    "beam, beads in a cube; the numbers are in the two tables that follow",
     "tradeoff": "Error of the displacement field over the cost of a simulated second, and over the "
-    "time of a frame; the answers are in the table that follows",
-    "stability": "Counts of how the cases ended, by family, and the share of its tolerance that "
-    "each used up; the sentences above sum it up",
-    "critical_step": "Longest stable step measured by bisection over the one predicted, less one, "
+    "time of a frame; the best configurations are in the table that follows",
+    "stability": "Number of cases by family and outcome, and the fraction of its tolerance that "
+    "each used; the sentences above summarise it",
+    "critical_step": "Largest stable step measured by bisection over the one predicted, less one, "
     "by case: points within the tolerance, which is shaded",
-    "ranking": "Share of draws in which each fuzzy system is nearest to the benchmark, and total "
+    "ranking": "Share of samples in which each fuzzy system is nearest to the benchmark, and total "
     "Sobol' indices of the unknowns; shares are in the table that follows",
     "ranking_spacing": "The nearest system by measure over the reference spacing, and two scores "
     "over it",
-    "organ_ranking": "Share of draws on an organ in which each is nearest to the benchmark, and "
+    "organ_ranking": "Share of samples of an organ in which each is nearest to the benchmark, and "
     "total Sobol' indices; shares are in the table that follows",
 }
-"""For whoever does not see a figure, by its place."""
+"""Alternative text of each figure, by its place."""
 
 
 def make_measured(path: Path) -> None:

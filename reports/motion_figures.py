@@ -142,8 +142,10 @@ def _draw(axes: Axes, one: ProbeMotion, x: int, y: int) -> None:
 
 
 def _limit(axes: Axes, found: list[ProbeMotion], x: int, y: int) -> None:
-    """Limits by the models that finished: one that diverged must not flatten the others."""
-    shown = [one.motion for one in found if one.finished] or [one.motion for one in found]
+    """Limits by the models and ends of intervals that finished: those that diverged are larger."""
+    finished = [one for one in found if one.finished] or found
+    shown = [one.motion for one in finished]
+    shown += [b for one in finished for b in one.bounds if b.shape == one.motion.shape]
     for index, set_limits in ((x, axes.set_xlim), (y, axes.set_ylim)):
         low = min((float(motion[index].min()) for motion in shown), default=0.0)
         high = max((float(motion[index].max()) for motion in shown), default=0.0)

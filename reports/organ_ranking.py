@@ -18,7 +18,7 @@ NEAREST, DIFFERENCES, INDICES, FINER, UNKNOWNS = (
     "organ_finer",
     "organ_unknowns",
 )
-NAMES = {**SYSTEM_NAMES, "reading": "the reading as it is"}
+NAMES = {**SYSTEM_NAMES, "reading": "the reading"}
 
 
 def organ_ranking(folder: Traversable | None = None) -> dict[str, object] | None:
@@ -69,8 +69,8 @@ def _winners(lines: Sequence[Line]) -> str:
     ]
     tied = _range(sorted({float(line["tied"]) for line in lines}))
     return (
-        f"In {count(int(lines[0]['draws']))} draws of an organ that have no unknown in common, "
-        f"nearest to the benchmark is, by measure, {', '.join(parts)} (no one in {tied})."
+        f"In {count(int(lines[0]['draws']))} independent samples of an organ, nearest to the "
+        f"benchmark is, depending on the measure, {', '.join(parts)} (no difference in {tied})."
     )
 
 
@@ -84,23 +84,24 @@ def _apart(lines: Sequence[Line]) -> str:
     printed = abs(float(pair[0]["paper"]))
     widest = max(max(abs(float(line[key])) for key in ("p05", "p95")) for line in pair)
     return (
-        f"{NAMES[CLAIM]} and Mamdani lie no further apart than in the paper, {fixed(printed, 4)}, "
-        f"in {_range(within)} of them by measure, and in nine of ten no further than "
-        f"{fixed(widest, 4)}."
+        f"The scores of {NAMES[CLAIM]} and Mamdani differ by no more than in the paper, "
+        f"{fixed(printed, 4)}, in {_range(within)} of the samples depending on the measure, and by "
+        f"no more than {fixed(widest, 4)} in nine of ten."
     )
 
 
 def _coarse(lines: Sequence[Line]) -> str:
     if not lines:
         return (
-            "What coarse lattices do to this ranking is not known: no draw was repeated (--again)."
+            "The effect of the coarse lattice on this ranking is not known: no sample was repeated "
+            "(--again)."
         )
     changed = [float(line["changed"]) for line in lines]
     most = max(lines, key=lambda line: float(line["changed"]))
     times = fixed(float(lines[0]["times"]), 0)
     return (
-        f"On lattices {times} times as fine another is nearest in {_range(changed)} of "
-        f"{spread(sorted({line['draws'] for line in lines}, key=int))} draws repeated, by measure "
-        f"(the most {share(most, 'changed')} by {column(most)}): so much of the ranking is of the "
-        "coarse lattice."
+        f"On lattices {times} times as fine, another is nearest in {_range(changed)} of "
+        f"{spread(sorted({line['draws'] for line in lines}, key=int))} repeated samples, depending "
+        f"on the measure (largest: {share(most, 'changed')}, {column(most)}). This share of the "
+        "ranking is due to the coarse lattice."
     )

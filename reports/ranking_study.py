@@ -130,9 +130,10 @@ def _winners(lines: Sequence[Line]) -> str:
     }
     most = max(of_system, key=lambda system: sum(of_system[system]))
     return (
-        f"Of {count(int(lines[0]['draws']))} draws of all that the paper leaves open, "
-        f"{system_name(CLAIM)}, the paper's best, is nearest to the benchmark in {percent(low[0])} "
-        f"({low[1]}) to {percent(high[0])} ({high[1]}); most often it is {system_name(most)}, in "
+        f"In {count(int(lines[0]['draws']))} samples of all parameters that the paper leaves open, "
+        f"{system_name(CLAIM)}, first in the paper, is nearest to the benchmark in "
+        f"{percent(low[0])} ({low[1]}) to {percent(high[0])} ({high[1]}); most often nearest is "
+        f"{system_name(most)}, in "
         f"{percent(min(of_system[most]))} to {percent(max(of_system[most]))}."
     )
 
@@ -143,9 +144,10 @@ def _apart(lines: Sequence[Line]) -> str:
     printed = abs(TABLE_III[CLAIM] - TABLE_III["mamdani"])
     signs = [float(line["paper_sign"]) for line in pair]
     return (
-        f"The two best of the paper lie {fixed(printed, 4)} apart; in {percent(min(shares))} to "
-        f"{percent(max(shares))} of the draws, by measure, ours lie no further apart, and in "
-        f"{percent(min(signs))} to {percent(max(signs))} in the paper's order."
+        f"The two highest scores of the paper differ by {fixed(printed, 4)}. In "
+        f"{percent(min(shares))} to {percent(max(shares))} of the samples, depending on the "
+        f"measure, the difference is not larger, and in {percent(min(signs))} to "
+        f"{percent(max(signs))} the order is that of the paper."
     )
 
 
@@ -154,12 +156,12 @@ def _reproduced(lines: Sequence[Line]) -> str:
     best = min(lines, key=lambda line: float(line["nearest"]))
     close, draws = sum(int(line["within_005"]) for line in lines), int(lines[0]["draws"])
     verb = "reproduces" if exact < 2 else "reproduce"
-    number = "No draw" if exact == 0 else count(exact)
+    number = "No sample" if exact == 0 else count(exact)
     return (
         f"{number} of {count(draws)} {verb} Table III to its four digits by any of the "
-        f"{len(lines)} measures; the nearest is off by {significant(float(best['nearest']), 2)} "
-        f"({column(best)}), and {count(close)} of {count(draws * len(lines))} scores of all three "
-        f"systems are within 0.005 of it."
+        f"{len(lines)} measures; the smallest difference is "
+        f"{significant(float(best['nearest']), 2)} ({column(best)}), and {count(close)} of "
+        f"{count(draws * len(lines))} scores of all three systems are within 0.005 of it."
     )
 
 
@@ -183,15 +185,15 @@ def movers(lines: Sequence[Line], draws: int, output: str, name: str) -> str:
     known = {unknown: of for unknown, of in found.items() if _width(of) <= WIDEST}
     if draws < 2 * FEWEST or not known:
         return (
-            f"What moves {_lower(name)} is not told by so few draws: Sobol' indices need {FEWEST} "
-            f"rows of the design or more, and 95 % intervals no wider than {WIDEST:g}."
+            f"{name}: too few samples to estimate its Sobol' indices, which need at least {FEWEST} "
+            f"rows of the design and 95 % intervals no wider than {WIDEST:g}."
         )
     named = sorted(known, key=lambda unknown: -_mean(known[unknown], "total"))[:MOST_NAMED]
     parts = ", ".join(f"{words(one.replace('_', ' '))} {_index(known[one])}" for one in named)
     lost = len(found) - len(known)
-    most = "most by" if lost == 0 else "among others by"
+    most = "mainly on" if lost == 0 else "among others on"
     return (
-        f"{name} is moved {most} (total Sobol' index and its 95 % interval, means over measures): "
+        f"{name} depends {most} (total Sobol' index and its 95 % interval, means over measures): "
         f"{parts}{_untold(lost)}."
     )
 
@@ -199,11 +201,7 @@ def movers(lines: Sequence[Line], draws: int, output: str, name: str) -> str:
 def _untold(unknowns: int) -> str:
     if unknowns == 0:
         return ""
-    return f"; of {count(unknowns)} more it is not told, their intervals are wider than {WIDEST:g}"
-
-
-def _lower(name: str) -> str:
-    return name[0].lower() + name[1:]
+    return f"; the intervals of {count(unknowns)} more are wider than {WIDEST:g}"
 
 
 def _width(lines: Sequence[Line]) -> float:
@@ -229,8 +227,8 @@ def _over_spacing(lines: Sequence[Line]) -> Iterator[str]:
     found = sorted(set(wins.values()))
     parts = "; ".join(f"{system_name(system)} {_where(wins, system)}" for system in found)
     yield (
-        f"With the reference spacing alone between {fixed(low, 1)} and {fixed(high, 1)} mm and all "
-        f"else as in the paper scene, the nearest system changes: {parts}."
+        f"If only the reference spacing of the paper scene is varied, from {fixed(low, 1)} to "
+        f"{fixed(high, 1)} mm, the nearest system changes: {parts}."
     )
 
 

@@ -97,7 +97,7 @@ def draw_shares(
     axes.barh(
         range(len(names)), 1.0 - start, left=start, height=0.8, color=TIED, label="no difference"
     )
-    axes.set(xlim=(0.0, 1.0), xlabel="share of draws in which it is nearest")
+    axes.set(xlim=(0.0, 1.0), xlabel="share of samples in which it is nearest")
 
 
 def draw_indices(axes: Axes, lines: Sequence[Line], names: Sequence[str]) -> None:

@@ -1,7 +1,7 @@
-"""The benchmark's unit of length on the first page: which system it makes the nearest one.
+"""How the reference spacing of the benchmark decides which system is nearest, in a sentence.
 
 The paper does not print the reference spacing h_0 at which its Table II holds, and the ranking
-hangs on it.
+depends on it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ MILLI = 1e3
 
 
 def reference_spacing(results: Results, folder: Traversable | None = None) -> str | None:
-    """The sentence of the first page; None for a run without benchmark, or without the table."""
+    """The sentence; None for a run without the benchmark, or where the table is missing."""
     lines = read(SPACING, folder)
     if not lines or not is_ranked(results):
         return None
     own = results.scene.damping.reference_spacing
     modulus = 2.5 * results.scene.basafa.k1 / own**2
     return (
-        "Against which benchmark? The paper does not print the reference spacing h₀ at which its "
-        "Table II holds, and the benchmark's modulus goes as 1/h₀²: here h₀ is "
-        f"{fixed(MILLI * own, 1)} mm and the modulus {fixed(modulus / 1e3, 1)} kPa, by choice. In "
-        f"the paper's scene, with all else as it is, {_spans(lines)}. The paper's order rests on "
-        f"margins of {_margins()}."
+        "Reference spacing of the benchmark: the paper does not print the spacing h₀ at which its "
+        "Table II holds, and the benchmark's modulus is proportional to 1/h₀². This scene sets h₀ "
+        f"to {fixed(MILLI * own, 1)} mm, which gives a modulus of {fixed(modulus / 1e3, 1)} kPa. "
+        f"In the paper's scene with other spacings, computed beforehand, {_spans(lines)}. The "
+        f"margins of the paper's ranking are {_margins()}."
     )
 
 

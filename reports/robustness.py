@@ -41,7 +41,7 @@ def _measured(conditions: tradeoff.Conditions | None) -> str:
         return ""
     machine = f"on {words(conditions.processor)}, " if conditions.processor else ""
     return (
-        f"Measured {machine}in {conditions.repeats} turns, against finite elements of "
-        f"{count(conditions.unknowns)} unknowns, whose own error is "
+        f"Measured {machine}with {conditions.repeats} repeats, against finite elements with "
+        f"{count(conditions.unknowns)} unknowns, whose estimated error is "
         f"{percent(conditions.field_error)}."
     )

@@ -1,4 +1,4 @@
-"""Several runs beside each other: which of their numbers differ by more than their errors."""
+"""Comparison of several runs: which numbers differ by more than their errors."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _numbers(run: Results) -> Iterator[tuple[Key, Measured]]:
             yield key, Measured(1e3 * largest, error)
         share_off = errors.get((model.name, elements(run)), {}).get(PEAK)
         if share_off is not None:
-            key = ("field off the finite elements at the peak", model.label, "%")
+            key = ("field difference from the finite elements", model.label, "%")
             yield key, Measured(100.0 * share_off, None if own is None else 100.0 * own)
     for system, one in run.record.fuzzy.systems.items():
         key = ("estimated Young's modulus", system_name(system), "kPa")
@@ -104,8 +104,8 @@ def said(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Compared]
     """How many numbers differ, and which models have none, in sentences."""
     apart = sum(row.differs is True for row in rows)
     text = (
-        f"{apart} of {len(rows)} numbers differ by more than their errors; ± is numerical "
-        "(mesh, time steps, quadrature), not that of a model."
+        f"{apart} of {len(rows)} numbers differ by more than the sum of their errors. ± is the "
+        "numerical error (mesh, time steps, quadrature), without the error of the model."
     )
     lost = [
         f"{model.label} in {name} ({model.status})"
@@ -113,7 +113,7 @@ def said(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Compared]
         for model in run.record.models
         if model.status != "finished"
     ]
-    return f"{text} Without numbers: {', '.join(lost)}." if lost else text
+    return f"{text} Models without results: {', '.join(lost)}." if lost else text
 
 
 def cells(rows: Iterable[Compared]) -> list[list[str]]:

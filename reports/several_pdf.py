@@ -1,4 +1,4 @@
-"""Several runs beside each other as a PDF: curves over each other, and what differs."""
+"""Comparison of several runs as a PDF: overlaid curves, and a table of differences."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def several_pdf(names: Sequence[str], runs: Sequence[Results], rows: Sequence[Co
     table = several.cells(rows)
     names = [words(short(name, 24)) for name in names]
     content: dict[str, object] = {
-        "title": "several runs",
+        "title": "comparison of runs",
         "names": names,
         "header": [*several.HEADER, *names, "verdict"],
         "rows": [[words(cell) for cell in row] for row in table[:MOST_ROWS]],

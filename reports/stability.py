@@ -17,7 +17,7 @@ OUTCOMES = {
     "value": "value right",
     "bounded": "bounded",
     "diverged": "diverged as predicted",
-    "refused": "refused, saying why",
+    "refused": "refused with reason",
 }
 """How a case ends, and what that is where it ends as expected."""
 CRITICAL_STEP = "critical step"
@@ -128,7 +128,7 @@ def sentences(found: Sequence[StabilityCase]) -> list[str]:
         told.append(_predicted(steps))
     where = [_broken(boundary) for boundary in boundaries(found)]
     if where:
-        told.append(f"Where a series of cases breaks: {'; '.join(where)}.")
+        told.append(f"Limits found in series of cases: {'; '.join(where)}.")
     return told
 
 

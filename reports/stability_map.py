@@ -1,4 +1,4 @@
-"""How cases at the extremes ended by family, and what was measured beside what was predicted."""
+"""Outcomes of the stability cases by family, and measured over predicted critical steps."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _draw_shares(axes: Axes, found: Sequence[StabilityCase], families: Sequence[
     axes.set(xscale="log", xlim=(LEAST / 1.5, 3.0))
     ticks = [LEAST, 1e-4, 1e-2, 1.0]
     axes.set_xticks(ticks, [f"≤ {LEAST:g}", "0.0001", "0.01", "limit"])
-    axes.set_xlabel("difference from what was predicted ÷ its tolerance")
+    axes.set_xlabel("difference from prediction ÷ tolerance")
     axes.tick_params(axis="y", length=0, labelleft=False)
 
 

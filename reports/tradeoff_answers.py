@@ -32,11 +32,11 @@ def _sentence(
     chosen = best(free, rate)
     if chosen is None:
         nearest = min(free, key=lambda one: share(one, rate))
-        told = f"nothing that follows any load is in time; the nearest is {_told(nearest, rate)}"
+        told = f"no configuration for any load is real time; the fastest is {_told(nearest, rate)}"
     else:
         told = (
-            "the most accurate that follows any load in time, as far as the reference can tell, is "
-            f"{_told(chosen, rate)}; {_next(free, rate, chosen)}"
+            "the most accurate real-time configuration for any load, within the error of the "
+            f"reference, is {_told(chosen, rate)}; {_next(free, rate, chosen)}"
         )
     return f"At {rate_name(rate)} {told}{_known_load(found, rate, chosen)}."
 
@@ -53,8 +53,8 @@ def _told(one: MeasuredConfiguration, rate: str) -> str:
 def _next(free: list[MeasuredConfiguration], rate: str, chosen: MeasuredConfiguration) -> str:
     better = next_better(free, rate, chosen)
     if better is None:
-        return "none is more accurate by more than the reference's own error"
-    return f"the next better is {_told(better, rate)}"
+        return "none is more accurate by more than the error of the reference"
+    return f"the next more accurate is {_told(better, rate)}"
 
 
 def _known_load(
@@ -66,7 +66,8 @@ def _known_load(
         return ""
     setup = significant(bound.timing.setup, 2)
     return (
-        f"; where the load's place is known beforehand, {_told(bound, rate)}, set up in {setup} s"
+        f"; if the place of the load is known beforehand, it is {_told(bound, rate)}, with "
+        f"{setup} s of set-up"
     )
 
 

@@ -129,7 +129,7 @@ def _draw_rate(
     for one in shown:
         look = looks[one.contender] | ({} if is_in_time(one, rate) else HOLLOW | {"alpha": 0.6})
         axes.plot(share(one, rate), _height(one), linestyle="", markersize=3.4, **look)
-    axes.set(xscale="log", title=rate_name(rate), xlabel="slow frame ÷ period")
+    axes.set(xscale="log", title=rate_name(rate), xlabel="p95 frame ÷ period")
     axes.xaxis.set_major_formatter(_plain)
     left, right = axes.get_xlim()
     axes.set_xlim(left, max(right, 2.0))
@@ -179,8 +179,8 @@ def _legend(shown: Iterable[MeasuredConfiguration], looks: Styles) -> list[Line2
     ]
     return [
         *found,
-        Line2D([], [], linestyle="-", label="front, any load", **FRONT),
-        Line2D([], [], linestyle=":", label="front, with known loads", **FRONT),
+        Line2D([], [], linestyle="-", label="Pareto front, any load", **FRONT),
+        Line2D([], [], linestyle=":", label="Pareto front, known loads", **FRONT),
     ]
 
 

@@ -107,5 +107,5 @@ def _cube(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
     axes.axhspan(0.0, spread, color=BAND, zorder=0)
     axes.set_xticks(range(len(cases)), cases)
     axes.set_xlabel("nominal compression of the cube")
-    axes.set_ylabel("beads, rms left [mm]")
+    axes.set_ylabel("beads, rms residual [mm]")
     axes.set_ylim(bottom=0.0)

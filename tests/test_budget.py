@@ -5,10 +5,13 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
+from matplotlib.figure import Figure
 
 from fuzzy.liver.stiffness import StiffnessEstimate
 from reports import budget as printed
+from reports.budget_figure import waterfall
 from study.models.estimates import FuzzyResults
+from study.results.records import BudgetPart, ErrorBudget
 from study.run import budget as causes
 from study.run import study
 from study.scene.file import read_scene
@@ -98,6 +101,22 @@ def test_a_benchmark_has_a_budget_of_modulus_damping_and_law():
         causes.REMAINDER,
     ]
     assert sum(part.contribution for part in found.parts) == pytest.approx(found.total, rel=1e-9)
+
+
+def test_contributions_that_exceed_the_total_are_within_the_axes():
+    """A stiffness that doubles the difference and a damping that removes all of it."""
+    parts = tuple(
+        BudgetPart(cause=cause, size=3.0, contribution=share, left=left, error=None)
+        for cause, share, left in (("stiffness", -2.0, 3.0), ("damping", 3.5, 0.5))
+    )
+    found = ErrorBudget(model="m", reference="basafa", total=1.0, total_error=None, parts=parts)
+    axes = Figure().add_subplot()
+    waterfall(axes, found)
+    low, high = axes.get_xlim()
+    ends = [x for bar in axes.patches for x in (bar.get_x(), bar.get_x() + bar.get_width())]
+    assert (min(ends), max(ends)) == pytest.approx((-50.0, 300.0))
+    assert low < -50.0
+    assert high > 300.0
 
 
 def test_a_budget_is_printed_as_it_was_found():

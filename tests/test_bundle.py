@@ -208,7 +208,7 @@ def test_the_summary_has_the_terms_of_the_standard_and_leaves_the_risk_to_the_re
 
 def test_its_figures_are_those_of_the_run():
     text = credibility(with_mesh_error(field_peak=0.0421))
-    assert "error of the field at the peak by the mesh, 4.2 %" in text
+    assert "discretisation error of the field at the peak, 4.2 %" in text
     assert "1 of 2 passed" in text
     assert "Failed: step, 0.0200 of at most 0.01" in text
     assert "interval 12.50 to 16.00 kPa" in text
@@ -217,4 +217,6 @@ def test_its_figures_are_those_of_the_run():
 def test_a_diverged_model_and_a_run_without_finite_elements_are_said_to_be_so():
     lost = with_model(results_of(), "basafa", status="diverged", ended_at_s=0.5)
     assert "Basafa benchmark: diverged at 0.500 s; no error is estimated" in credibility(lost)
-    assert "no errors" in credibility(results_of(["basafa", "msm-sugeno"]))
+    assert "differences between its models are not errors" in credibility(
+        results_of(["basafa", "msm-sugeno"])
+    )

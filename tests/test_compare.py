@@ -210,7 +210,7 @@ def test_a_model_that_is_lost_in_a_run_is_named():
     rows = several.compared(runs)
     assert at_tool("Basafa benchmark") not in {(row.quantity, row.model) for row in rows}
     said = several.said(["a", "b"], runs, rows)
-    assert said.endswith("Without numbers: Basafa benchmark in b (diverged).")
+    assert said.endswith("Models without results: Basafa benchmark in b (diverged).")
     assert "Without" not in several.said(["a", "a"], [whole(), whole()], rows)
 
 

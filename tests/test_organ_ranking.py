@@ -261,7 +261,7 @@ def test_a_study_of_an_organ_is_kept_and_told(tmp_path, capsys):
     assert "3 from before" in again.err
     assert again.out == first.out
     assert tables == {name: (out / name).read_bytes() for name in organ_request.FILES}
-    assert "not told by so few draws" in first.out
+    assert "too few samples to estimate its Sobol' indices" in first.out
     with (out / organ_request.RANGES).open(newline="") as file:
         assert [row["unknown"] for row in csv.DictReader(file)] == list(OrganDraw._fields)
 
@@ -299,12 +299,12 @@ def test_indices_that_mean_nothing_are_not_printed():
     lines = [index("mass", 0.5, 0.4, 0.6), index("span", 0.9, 0.1, 2.0)]
     output = "mamdani - interval-type-2", "The lead"
     few = movers(lines, 2 * FEWEST - 2, *output)
-    assert "not told by so few draws" in few
+    assert "too few samples to estimate its Sobol' indices" in few
     assert "0.5" not in few
     enough = movers(lines, 2 * FEWEST, *output)
-    assert "mass 0.50 (0.40–0.60); of 1 more it is not told" in enough
+    assert "mass 0.50 (0.40–0.60); the intervals of 1 more are wider than" in enough
     assert "0.90" not in enough
-    assert "not told" in movers(lines[1:], 2 * FEWEST, *output)
+    assert "too few samples" in movers(lines[1:], 2 * FEWEST, *output)
 
 
 def test_sentences_name_the_numbers_of_the_tables(tmp_path):
@@ -327,13 +327,13 @@ def test_sentences_name_the_numbers_of_the_tables(tmp_path):
     ):
         write_table(tmp_path / f"{name}.csv", kind, found)
     winners, near, moved, coarse = told.sentences(tmp_path)
-    assert "In 250 draws" in winners
+    assert "In 250 independent samples" in winners
     assert "Sugeno in 52.0 %" in winners
-    assert "the reading as it is in 7.0 % (no one in 7.0 %" in winners
+    assert "the reading in 7.0 % (no difference in 7.0 %" in winners
     assert "0.0018, in 71.0 %" in near
-    assert "no further than 0.0600" in near
+    assert "by no more than 0.0600" in near
     assert "support 0.30 (0.20–0.40)" in moved
-    assert "2 times as fine another is nearest in 12.9 % of 31 draws" in coarse
+    assert "2 times as fine, another is nearest in 12.9 % of 31 repeated samples" in coarse
     assert told.organ_ranking(tmp_path)["nearest"] == [
         [
             "displacement, relative L2",
@@ -346,7 +346,7 @@ def test_sentences_name_the_numbers_of_the_tables(tmp_path):
         ]
     ]
     (tmp_path / f"{told.FINER}.csv").unlink()
-    assert "not known: no draw was repeated" in list(told.sentences(tmp_path))[-1]
+    assert "not known: no sample was repeated" in list(told.sentences(tmp_path))[-1]
 
 
 def test_scenes_keep_their_own_damping_and_models(scene):

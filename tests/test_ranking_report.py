@@ -72,24 +72,24 @@ def test_every_column_of_the_tables_is_in_its_place(folder):
 
 def test_the_sentences_name_the_numbers_of_the_tables(folder):
     winners, apart, reproduced, movers, spacing = told.sentences(folder)
-    assert "640 draws" in winners
+    assert "640 samples" in winners
     assert "23.0 % (displacement, relative L2) to 27.0 % (phase plane, Fréchet)" in winners
-    assert "most often it is Sugeno, in 52.0 % to 56.0 %" in winners
-    assert "0.0018 apart; in 71.0 % to 71.0 %" in apart
+    assert "most often nearest is Sugeno, in 52.0 % to 56.0 %" in winners
+    assert "differ by 0.0018. In 71.0 % to 71.0 %" in apart
     assert "2 of 6\u202f720 reproduce" in reproduced or "2 of 6 720 reproduce" in reproduced
-    assert "off by 0.012" in reproduced
+    assert "smallest difference is 0.012" in reproduced
     assert "rest length 0.80 (0.70–1.00), mass 0.30 (0.20–0.50)" in movers
     assert "Sugeno from 2.0 to 2.0 mm" in spacing
     assert "Mamdani from 4.0 to 4.0 mm" in spacing
 
 
-def test_the_first_page_says_which_reference_spacing_makes_whom_the_nearest(folder):
+def test_the_findings_state_which_system_is_nearest_at_which_reference_spacing(folder):
     results = results_of()
     found = reference_spacing(results, folder)
     own = 1e3 * results.scene.damping.reference_spacing
-    assert f"here h₀ is {own:.1f} mm" in found
+    assert f"sets h₀ to {own:.1f} mm" in found
     assert "Sugeno is nearest by 1 of 1 measures at h₀ of 2.0 to 2.0 mm, Mamdani" in found
-    assert "margins of 0.0018 and 0.0031" in found
+    assert "margins of the paper's ranking are 0.0018 and 0.0031" in found
     assert reference_spacing(results_of(["fem"]), folder) is None
     (folder / f"{told.SPACING}.csv").unlink()
     assert reference_spacing(results, folder) is None

@@ -48,7 +48,7 @@ def numbers(name, column):
 
 def test_the_document_prints_the_figures_of_the_tables():
     texts = set(printed_beforehand())
-    assert "None of these figures is of a run of yours." in texts
+    assert "They are not results of your scene." in texts
     assert list(found()) == NAMES
     for name, column in (
         ("field_error", "error"),

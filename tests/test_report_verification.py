@@ -86,7 +86,7 @@ def test_growth_has_one_row_per_mesh():
 @pytest.mark.usefixtures("folder")
 def test_the_document_prints_them_and_says_that_they_are_of_no_run():
     texts = printed_beforehand()
-    assert texts.count("None of these figures is of a run of yours.") == 1
+    assert texts.count("They are not results of your scene.") == 1
     assert {"Sphere", "frequency, p2", "2.5012", "noted", "calculix", "4.5", "320"} <= set(texts)
     assert "Some processor, 2 cores" in " ".join(texts)
 

@@ -457,8 +457,8 @@ def command(monkeypatch, tmp_path, capsys):
 def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_path):
     code, said = command("recommend", "block", *OVERRIDES, "--error", "30 %")
     assert code == 0, said
-    assert "as promised" in said
-    assert "own modulus" in said
+    assert "as expected" in said
+    assert "modulus of the tissue" in said
     scene = read_scene(str(tmp_path / "block-30percent.toml"))
     assert scene.lattice.volume_term
     assert scene.time == read_scene("block", SMALL).time
@@ -478,8 +478,8 @@ def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
     assert code == EXIT_FAILED_CHECK, said
     code, said = command(*words, "--known-place")
     assert code == 0, said
-    assert "this place of the load, or its way, only" in said
-    assert "MB kept while it steps" in said
+    assert "valid for this place or path of the load only" in said
+    assert "MB of memory during the steps" in said
     scene = read_scene(str(tmp_path / "block-10percent.toml"))
     assert scene.models[-1] in {"superposition", "corrected", "region"}
 
@@ -516,7 +516,7 @@ def test_a_table_of_candidates_says_whose_frames_are_late():
     head, first, second = advice.table_of([cheap, accurate], taken=cheap)
     assert "95 % of its frames" in head
     assert "4 ms, in time" in first
-    assert "<- taken" in first
+    assert "<- selected" in first
     assert "30 ms, late" in second
 
 
@@ -543,7 +543,7 @@ def test_only_what_none_is_cheaper_and_better_than_stands_in_the_table():
     assert lines[1].startswith("     0.1 s   20.0")
     same = candidate(0.08, 0.2, single=True)
     marked = list(advice.table_of([MIDDLE, same], "field", MIDDLE))
-    assert [line.endswith("<- taken") for line in marked[1:]] == [False, True]
+    assert [line.endswith("<- selected") for line in marked[1:]] == [False, True]
     assert list(advice.table_of([])) == []
 
 

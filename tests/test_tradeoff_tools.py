@@ -199,9 +199,9 @@ def test_what_is_recommended_says_what_its_errors_are_of_and_against():
     chosen = Candidate(of(1.0), Promise(0.2, 0.05), cost, None)
     found = Recommended(chosen, True, measured, None, 0.01, (chosen,), "a finer one")
     text = "\n".join(lines(found))
-    assert "force error promised 20.0 +- 5.0 %, measured 20.0 %, as promised" in text
+    assert "force error expected 20.0 +- 5.0 %, measured 20.0 %, as expected" in text
     assert "errors are against a finer one" in text
-    assert "measured beside it: of the largest force 30.0 %, of the displacement over" in text
+    assert "other measured errors: of the largest force 30.0 %, of the displacement over" in text
     assert "finest lattice" not in text
     other = replace(found, measured=replace(measured, discretisation=0.4))
     assert "the finest lattice of the same springs 40.0 %" in "\n".join(lines(other))

@@ -164,10 +164,12 @@ def curve_difference(results: Results, model: str, reference: str, probe: str) -
 
 
 def _lost(results: Results) -> Iterator[str]:
+    diverged = [one for one in results.record.models if one.status == "diverged"]
+    if diverged:
+        told = _listed(f"{model.label} {status(model)}" for model in diverged)
+        yield f"{told}: do not use {'it' if len(diverged) == 1 else 'them'} with these settings."
     for model in results.record.models:
-        if model.status == "diverged":
-            yield f"{model.label} {status(model)}: do not use it with these settings."
-        elif model.status == "not finished":
+        if model.status == "not finished":
             yield f"{model.label} did not finish: {model.reason}. Remedy: {model.remedy}."
 
 
@@ -410,8 +412,8 @@ def _limit(results: Results, found: Nearest) -> Iterator[str]:
             found_remedy = [REMEDIES[largest.cause]] if largest.cause in REMEDIES else []
             yield " ".join(
                 [
-                    f"The largest cause of the difference is the {cause}, "
-                    f"{budget.signed(largest.contribution)} of {percent(one.total)}.",
+                    f"The largest cause of the difference is the {cause}, which contributes "
+                    f"{budget.signed(largest.contribution)} to a total of {percent(one.total)}.",
                     *found_remedy,
                     *_left(results, largest),
                 ]

@@ -202,7 +202,7 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """Configurations measured before on the built-in liver, and where."""
+    """Configurations measured beforehand on the built-in liver, and where."""
 
     configurations: tuple[Configuration, ...]
     conditions: str
@@ -479,4 +479,4 @@ def _tradeoff() -> Tradeoff:
         )
         for one in found
     )
-    return Tradeoff(points, f"Not of this run: measured before on the built-in liver{where}.")
+    return Tradeoff(points, f"Not of this run: measured beforehand on the built-in liver{where}.")

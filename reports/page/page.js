@@ -177,7 +177,7 @@
       ["model", "displacement [mm]", "velocity [mm/s]", "largest displacement [mm]"],
       found.map((one) => {
         const over = state.sample >= one.rows[0].length;
-        const now = over ? ["lost", "lost"] : [1, 2].map((i) => fixed(one.rows[i][state.sample], one.decimals[i - 1]));
+        const now = over ? ["ended", "ended"] : [1, 2].map((i) => fixed(one.rows[i][state.sample], one.decimals[i - 1]));
         const peak = one.rows[1].reduce((most, u) => Math.max(most, Math.abs(u)), 0);
         return [label(one.model), ...now, fixed(peak, one.decimals[0])];
       }));
@@ -305,7 +305,7 @@
 
   function drawOrgan() {
     const lost = SIDES.map(chosen).filter((name) => displacement(name) === null).map(label);
-    if (lost.length) { tellOrgan(`${[...new Set(lost)].join(" and ")} diverged before this time and has no surface.`); return; }
+    if (lost.length) { tellOrgan(`${[...new Set(lost)].join(" and ")} diverged before this time: no surface to show.`); return; }
     const { values, limits, against } = shown(), push = data.organ.push, { half } = organ.box;
     SIDES.forEach((side, k) => {
       const name = chosen(side), u = displacement(name), view = organ.views[k];
@@ -342,8 +342,8 @@
 
   function tellOrgan(why) {
     const time = longest[state.sample];
-    const at = Number.isFinite(time) ? ` Control points (orange) stand where their curves have them at ${time.toFixed(3)} s, along the push, whose line is red.` : "";
-    $("organ-note").textContent = `${why} The surface is kept at ${data.organ.samples.length} times and moves linearly in between. Blue dots: supports, red dots: where the surface is loaded${organ.ways.length ? "; dashed: the way of the tool, on the organ at rest" : ""}. Displacements are drawn ${factor().toPrecision(3)} times as large.${at} Drag, or use the buttons or the arrow keys, to turn both; point at the surface to read it.`.trim();
+    const at = Number.isFinite(time) ? ` Control points (orange) are at the position of their curves at ${time.toFixed(3)} s, along the push (red line).` : "";
+    $("organ-note").textContent = `${why} The surface is stored at ${data.organ.samples.length} times and interpolated linearly in between. Blue dots: supports, red dots: where the surface is loaded${organ.ways.length ? "; dashed: path of the tool, on the organ at rest" : ""}. Displacements are exaggerated ${factor().toPrecision(3)} times.${at} Drag, or use the buttons or the arrow keys, to rotate both; point at the surface to read its value.`.trim();
     $("organ-factor-out").value = `× ${factor().toPrecision(3)}`;
     $("organ-time-out").value = Number.isFinite(time) ? `${time.toFixed(3)} s` : "";
   }
@@ -355,8 +355,8 @@
       const off = against && name !== of ? largest(lengths(u, against)).toPrecision(3) : "–";
       return [label(name), largest(lengths(u)).toPrecision(3), off];
     });
-    fill($("organ-table"), `At the vertices of the surface, which may miss the control points, at ${(longest[state.sample] || 0).toFixed(3)} s`, ["model", "largest displacement [mm]",
-      of ? `largest difference to ${label(of)} [mm]` : "difference"], body);
+    fill($("organ-table"), `At the vertices of the surface, which need not include the control points, at ${(longest[state.sample] || 0).toFixed(3)} s`, ["model", "largest displacement [mm]",
+      of ? `largest difference from ${label(of)} [mm]` : "difference"], body);
   }
 
   function turn(around, upwards) {
@@ -392,10 +392,10 @@
   }
 
   function startOrgan() {
-    if (!organ) { absent($("organ"), "There is no surface to show: a single control point has none, nor a model that was lost before the peak."); return; }
+    if (!organ) { absent($("organ"), "There is no surface to show: the scene is a single control point, or no model reached the peak load."); return; }
     organ.box = box();
     organ.views = SIDES.map((side) => organView.make($(`organ-${side}-plot`), organ.triangles, data.scale, organ.box.centre, organ.box.half));
-    if (organ.views.includes(null)) { absent($("organ"), "This browser has no WebGL 2, which draws the organ."); organ.views = null; return; }
+    if (organ.views.includes(null)) { absent($("organ"), "This browser does not support WebGL 2, which is needed to draw the organ."); organ.views = null; return; }
     const names = [...organ.films.keys()], of = data.organ.reference;
     for (const side of SIDES) {
       options($(`organ-${side}`), names.map(label), names);
@@ -438,7 +438,7 @@
     const found = data.matrices.find((one) => one.reference === $("similar-to").value && one.probe === $("similar-at").value);
     const table = $("similar-table");
     if (!found) { table.replaceChildren(); return; }
-    fill(table, `Scores to ${found.reference} at ${found.probe}`, ["model", ...data.measures],
+    fill(table, `Scores against ${found.reference} at ${found.probe}`, ["model", ...data.measures],
       found.cells.map((cells, i) => [found.models[i], ...cells.map(score)]));
     table.querySelectorAll("tbody tr").forEach((line, i) => line.querySelectorAll("td").forEach((cell, j) => {
       const one = found.cells[i][j];
@@ -478,7 +478,7 @@
   /** Why the sliders do not give the scene's own estimate, where it lacks one of their readings. */
   function unread() {
     const names = data.fuzzy.unread.map((name) => name.toUpperCase()).join(" and ");
-    return names ? ` The scene has no reading of ${names}: its own estimate does without, the sliders do not.` : "";
+    return names ? ` The scene has no reading of ${names}: its estimate omits it, the sliders include it.` : "";
   }
 
   const readings = () => [0, 1].map((k) => Number($(`reading-${k}`).value));
@@ -490,7 +490,7 @@
       $(`reading-${k}`).setAttribute("aria-valuetext", `${value.toFixed(1)} kPa`);
     });
     fill($("fuzzy-table"), `Estimated Young's modulus [kPa] at ${first} ${now[0].toFixed(1)} kPa, ${second} ${now[1].toFixed(1)} kPa`,
-      ["system", "at the sliders", "error of interpolation", "at the scene's readings, exactly"],
+      ["system", "at the sliders", "error of interpolation", "at the readings of the scene, exact"],
       data.fuzzy.surfaces.map((one) => [one.name, estimate(one.system, ...now).toFixed(2), `± ${one.error.toFixed(2)}`,
         one.estimate === null ? "–" : one.estimate.toFixed(2)]));
     drawSurface();
@@ -542,7 +542,7 @@
     $("variable").value = data.fuzzy.inputs[0];
     $("system").addEventListener("input", drawSurface);
     $("variable").addEventListener("input", drawSets);
-    $("fuzzy-note").textContent = `Bilinear between ${fuzzy.x.length} × ${fuzzy.y.length} lines of readings that the run evaluated, the other readings as in the scene; a reading lower than the first line counts as that. The error is what leaving out every second line would miss.${unread()}`;
+    $("fuzzy-note").textContent = `Bilinear between ${fuzzy.x.length} × ${fuzzy.y.length} lines of readings that the run evaluated, the other readings as in the scene; a reading below the first line is set to it. The error is that of omitting every second line.${unread()}`;
     drawEstimates();
   }
 
@@ -550,10 +550,10 @@
 
   function drawTradeoff() {
     // Fronts last, and so above the others.
-    const groups = [["follows any load", (one) => one.any_load && !one.on_any_load_front, "circle", "#0072B2"],
-      ["for a load known beforehand", (one) => !one.any_load && !one.on_front, "square", "#009E73"],
-      ["follows any load, on its front", (one) => one.on_any_load_front, "diamond", "#D55E00"],
-      ["for a load known beforehand, on the front of all", (one) => !one.any_load && one.on_front, "star", "#CC79A7"]];
+    const groups = [["any load", (one) => one.any_load && !one.on_any_load_front, "circle", "#0072B2"],
+      ["load known beforehand", (one) => !one.any_load && !one.on_front, "square", "#009E73"],
+      ["any load, on its Pareto front", (one) => one.on_any_load_front, "diamond", "#D55E00"],
+      ["load known beforehand, on the Pareto front of all", (one) => !one.any_load && one.on_front, "star", "#CC79A7"]];
     const traces = groups.map(([name, is, symbol, colour]) => {
       const found = data.tradeoff.configurations.filter(is);
       return { type: "scatter", mode: "markers", name, x: found.map((one) => one.wall), y: found.map((one) => one.error ?? one.bar),
@@ -567,9 +567,9 @@
   }
 
   function startTradeoff() {
-    if (!data.tradeoff.configurations.length) { absent($("tradeoff"), "No trade-off study was kept."); return; }
-    $("tradeoff-note").textContent = `${data.tradeoff.conditions} The dotted line is real time. An open mark is an error that the reference does not resolve, drawn at the reference's own. None is faster and more accurate than one on a front.`;
-    fill($("tradeoff-table"), "Configurations measured", ["configuration", "error", "wall per simulated second [s/s]", "load", "on a front"],
+    if (!data.tradeoff.configurations.length) { absent($("tradeoff"), "No trade-off study is stored."); return; }
+    $("tradeoff-note").textContent = `${data.tradeoff.conditions} The dotted line is real time. An open mark is an error below that of the reference, drawn at the error of the reference. No configuration is both faster and more accurate than one on a Pareto front.`;
+    fill($("tradeoff-table"), "Configurations measured", ["configuration", "error", "wall per simulated second [s/s]", "load", "on a Pareto front"],
       data.tradeoff.configurations.map((one) => [one.name, one.stated, one.wall.toPrecision(2), one.any_load ? "any" : "known beforehand",
         one.on_front ? "of all" : one.on_any_load_front ? "of any load" : "–"]));
     drawTradeoff();
@@ -617,7 +617,7 @@
     range.selectNodeContents($("toml"));
     selection.removeAllRanges();
     selection.addRange(range);
-    $("copied").textContent = document.execCommand("copy") ? "copied" : "selected: copy it by the keyboard";
+    $("copied").textContent = document.execCommand("copy") ? "copied" : "selected: copy it with the keyboard";
   }
 
   window.liverStudy = { estimate, goTo, state };

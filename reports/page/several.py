@@ -1,4 +1,4 @@
-"""Several runs beside each other as one page, which asks no network for anything."""
+"""Comparison of several runs as one page, which makes no network request."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[C
     """The page; the same runs and plotly give the same bytes."""
     names = [words(short(name, 24)) for name in names]
     labels = shared_models(runs)
-    title = markup.escape(f"Several runs: {', '.join(names)}")
+    title = markup.escape(f"Comparison of runs: {', '.join(names)}")
     text = Template(part("several.html")).substitute(
         head=head(title),
         title=title,
@@ -35,7 +35,9 @@ def several_page(names: Sequence[str], runs: Sequence[Results], rows: Sequence[C
         height=f"{ROW * -(-len(labels) // COLUMNS)}rem",
         words=markup.escape(alternative(names, runs), quote=True),
         table=table(
-            [*several.HEADER, *names, "verdict"], several.cells(rows), "What differs first"
+            [*several.HEADER, *names, "verdict"],
+            several.cells(rows),
+            "Those that differ by more than their errors first",
         ),
         data=inert({"traces": list(_traces(names, runs, labels)), "layout": _layout(labels)}),
         plotly=plotly(),

@@ -105,7 +105,7 @@ def _written(results: Results) -> Mapping[str, str]:
         "summary": _items(summary.sentences(results)),
         "tradeoff": _items(tradeoff_answers.sentences(tradeoff.configurations())),
         "scene": markup.escape(write_scene(results.scene)),
-        "provenance": table(("what", "which"), provenance_rows(results), "What made this run"),
+        "provenance": table(("item", "value"), provenance_rows(results), "Provenance"),
         "notes": _items(words(text) for text in results.record.notes),
         "assumptions": _items(words(symbols(text)) for text in results.record.assumptions),
     }
@@ -113,7 +113,7 @@ def _written(results: Results) -> Mapping[str, str]:
 
 def _glance(results: Results) -> str:
     header, rows = summary.glance_table(results)
-    return table(header, rows, "Every model at a glance")
+    return table(header, rows, "Overview of the models")
 
 
 def _paragraphs(lines: Iterable[str]) -> str:

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 FUNCTION = f"{__name__}:run"
 READING = "reading"
 CONTENDERS = (*SYSTEMS, READING)
-"""The fuzzy systems, then the reading as it is."""
+"""The fuzzy systems, then the reading without one."""
 FIELD = ("field", "relative-l2")
 MEASURED = (*COLUMNS, FIELD)
 """Curve and measure of every score: means over control points, then the field at the peak."""

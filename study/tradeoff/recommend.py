@@ -405,18 +405,18 @@ def lines(found: Recommended) -> list[str]:
     error = (
         f"{100 * measured.judged:.1f} %"
         if measured.judged is not None
-        else f"{measured.status}, below the own error of what it is compared with"
+        else f"{measured.status}, below the error of the comparison"
         if measured.status == "not resolved" and measured.of_force
-        else f"{measured.status}, below the reference's own error"
+        else f"{measured.status}, below the error of the reference"
         if measured.status == "not resolved"
         else f"none: {measured.status} {measured.message}"
     )
     verdict = ""
     if measured.judged is not None:
-        verdict = ", as promised" if promise.holds(measured.judged) else ", not as promised"
+        verdict = ", as expected" if promise.holds(measured.judged) else ", not as expected"
     text = [
         described(one.configuration),
-        f"{_quantity(measured)} error promised {100 * promise.error:.1f} +- "
+        f"{_quantity(measured)} error expected {100 * promise.error:.1f} +- "
         f"{100 * promise.bar:.1f} %, measured {error}" + verdict,
     ]
     if measured.of_force:
@@ -429,15 +429,15 @@ def lines(found: Recommended) -> list[str]:
         )
     text.append(f"{found.wall_per_second:.3g} s of wall per simulated second on this machine")
     if one.cost.memory is not None:
-        text.append(f"{_in_mb(one.cost.memory)} kept while it steps, on top of the program's")
+        text.append(f"{_in_mb(one.cost.memory)} of memory during the steps, besides the program")
     if not one.configuration.any_load:
         text.append(
-            "It follows this place of the load, or its way, only. The error is that against linear "
-            "elements and what corrected lattices add to them."
+            "It is valid for this place or path of the load only. The error is that against linear "
+            "elements with the correction of corrected lattices."
         )
     text.append(
-        "The promise is for springs of the tissue's own modulus, tissue.youngs_modulus; those of a "
-        "fuzzy estimate have its error on top."
+        "The error is for springs with the modulus of the tissue, tissue.youngs_modulus; the error "
+        "of a fuzzy estimate adds to it."
     )
     return [*text, *table_of(found.others, _quantity(measured), one)]
 
@@ -463,7 +463,7 @@ def _beside_force(measured: Errors) -> Iterator[str]:
         told["the force against the finest lattice of the same springs"] = measured.discretisation
     parts = [f"of {of} {100 * error:.1f} %" for of, error in told.items() if error is not None]
     if parts:
-        yield f"measured beside it: {', '.join(parts)}"
+        yield f"other measured errors: {', '.join(parts)}"
 
 
 def table_of(
@@ -484,7 +484,7 @@ def table_of(
         return
     framed = any(one.frame is not None for one in front)
     yield (
-        f"chosen from (wall per simulated second, expected error of the {quantity}, memory"
+        f"candidates (wall time per simulated second, expected error of the {quantity}, memory"
         + (f", {SLOW:g} % of its frames):" if framed else "):")
     )
     for one in sorted(front, key=lambda one: one.wall_per_second):
@@ -492,7 +492,7 @@ def table_of(
         yield (
             f"{one.wall_per_second:>8.3g} s  {100 * one.promise.error:>5.1f} +- "
             f"{100 * one.promise.bar:.1f} %  {memory:>7}  {_frame_of(one)}"
-            f"{described(one.configuration)}" + (" <- taken" if one is taken else "")
+            f"{described(one.configuration)}" + (" <- selected" if one is taken else "")
         )
 
 
