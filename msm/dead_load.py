@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -11,6 +14,7 @@ from msm.kinematics import cross, deformation, dot
 from msm.laws import Law
 from msm.network import Network
 from msm.relaxation import relax
+from study.continuation import Increments, follow
 from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]
@@ -22,10 +26,20 @@ SHAPE_ERROR = 1e-7
 MOST_ITERATIONS = 60
 HISTORY = 6
 """Earlier shapes in Anderson's mixing (1965, J. ACM 12:547)."""
+INCREMENTS = Increments(easy=-1, smallest=1 / 4)
 
 
 class NoEquilibriumError(UnfinishedError):
     """No static equilibrium of a body under its dead load was found."""
+
+
+class _Unloaded(NamedTuple):
+    """Displacement `shape` [m] (n, 3) to the unloaded shape for a factor of the load."""
+
+    factor: float
+    shape: Floats
+    failure: str = ""
+    residuals: tuple[float, ...] = (0.0,)  # increments do not grow by how easily they are solved
 
 
 def rest_under_dead_load(law: Law, net: Network, dead_load: Floats) -> Floats:
@@ -49,42 +63,60 @@ def unloaded_network(law: Law, net: Network, dead_load: Floats) -> tuple[Network
     """The network whose equilibrium under dead load is the given shape, and its load [N] (n, 3).
 
     The network has the rest lengths and volumes of the unloaded shape, which Anderson's mixing
-    finds as a fixed point. The returned load includes the foundation's force in the given shape.
-    A linear network is returned unchanged with no load: its forces are those of the given shape.
+    finds as a fixed point, in increments of the load where necessary. The returned load includes
+    the foundation's force in the given shape. A linear network is returned unchanged with no load:
+    its forces are those of the given shape.
     NoEquilibriumError if the iteration does not converge.
     """
     if net.linear or not dead_load.any():
         return net, np.zeros_like(dead_load)
-    from scipy.optimize import NoConvergence, anderson  # here, as few runs need it
 
-    entries = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
-    foundation = csr_array(entries, shape=(len(dead_load), len(dead_load)))
+    def rest(start: _Unloaded, factor: float) -> _Unloaded:
+        return _unloaded(law, net, dead_load, start, factor)
 
-    def load_on(unloaded: Floats) -> Floats:
-        """The dead load with the force of a foundation at rest under the unloaded shape."""
-        return np.asarray(dead_load + foundation @ unloaded)
+    found = follow(_Unloaded(0.0, np.zeros_like(dead_load)), (1.0,), rest, INCREMENTS)
+    if found.failure:
+        part = f", but for {100.0 * found.reached:.2g} % of the load" if found.reached else ""
+        raise NoEquilibriumError(
+            f"gravity.given: no unloaded shape was found that sags to the given one{part}",
+            "reduce gravity.acceleration, or set gravity.given to unloaded",
+        )
+    unloaded = found.rests[-1].shape
+    return from_shape(net, unloaded), dead_load + _foundation(net) @ unloaded
+
+
+def _unloaded(
+    law: Law, net: Network, dead_load: Floats, start: _Unloaded, factor: float
+) -> _Unloaded:
+    """The unloaded shape for a factor of the load, from that for a smaller one."""
+    from scipy.linalg import LinAlgWarning  # here, as few runs need them
+    from scipy.optimize import NoConvergence, anderson
+
+    foundation = _foundation(net)
 
     def shape_error(unloaded: Floats) -> Floats:
         """Displacement from the given shape to the equilibrium of an unloaded one."""
-        return rest_under_dead_load(law, from_shape(net, unloaded), load_on(unloaded))
+        load = np.asarray(factor * dead_load + foundation @ unloaded)
+        return rest_under_dead_load(law, from_shape(net, unloaded), load)
 
+    extrapolated = start.shape * (factor / start.factor if start.factor else 1.0)
     tolerance = SHAPE_ERROR * float(net.length.max())
+    how = {"M": HISTORY, "maxiter": MOST_ITERATIONS, "f_tol": tolerance}
     try:
-        # alpha = -1 is the plain fixed-point step, which alone need not converge.
-        unloaded = anderson(
-            shape_error,
-            np.zeros_like(dead_load),
-            alpha=-1.0,
-            M=HISTORY,
-            maxiter=MOST_ITERATIONS,
-            f_tol=tolerance,
-        )
-    except NoConvergence:
-        raise NoEquilibriumError(
-            "gravity.given: no unloaded shape was found that sags to the given one",
-            "reduce gravity.acceleration, or set gravity.given to unloaded",
-        ) from None
-    return from_shape(net, unloaded), load_on(unloaded)
+        with warnings.catch_warnings():
+            # Earlier shapes may be nearly parallel; the error of the shape decides, not their mix.
+            warnings.simplefilter("ignore", LinAlgWarning)
+            # alpha = -1 is the plain fixed-point step, which alone need not converge.
+            shape = anderson(shape_error, extrapolated, alpha=-1.0, **how)
+    except (NoConvergence, NoEquilibriumError):  # also of a trial shape that cannot rest
+        return _Unloaded(factor, start.shape, "no shape")
+    return _Unloaded(factor, np.asarray(shape))
+
+
+def _foundation(net: Network) -> csr_array:
+    """The foundation's force [N] per displacement [m] (n, n), of either sign as in the network."""
+    entries = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
+    return csr_array(entries, shape=(len(net.load), len(net.load)))
 
 
 def from_shape(net: Network, u: Floats) -> Network:

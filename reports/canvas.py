@@ -76,6 +76,16 @@ def more_families() -> list[str]:
     return list(dict.fromkeys(names[file] for file in files))
 
 
+def legend_above(figure: Figure, axes: Axes, columns: int, **look: float) -> None:
+    """The legend of what is drawn in `axes`, in as many columns as fit above the figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    for count in range(columns, 0, -1):
+        legend = figure.legend(handles, labels, loc="outside upper center", ncols=count, **look)
+        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
+
+
 def sheet(height: float, width: float = TEXT_WIDTH) -> Figure:
     """An empty figure; sizes in inches."""
     from matplotlib.figure import Figure

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 PROBES_PER_FIGURE = 3
 MOST_PROBES = 9
 ROW_HEIGHT = 1.95
-LEGEND_HEIGHT = 0.3
+LEGEND_HEIGHT, LEGEND_COLUMNS = 0.3, 5
 MILLI = 1e3
 MARGIN = 0.06
 LEGEND = {"handlelength": 3.2, "columnspacing": 1.4}
@@ -101,8 +101,7 @@ def _figure(drawn: dict[str, list[ProbeMotion]]) -> Figure:
     for row, (probe, found) in zip(grid, drawn.items(), strict=True):
         _draw_row(row, found)
         row[0].set_title(short(probe), loc="left", fontweight="bold")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5, **LEGEND)
+    canvas.legend_above(figure, grid[0, 0], LEGEND_COLUMNS, **LEGEND)
     figure.align_ylabels()
     return figure
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_TOOLS = 4
-ROW_HEIGHT, LEGEND_HEIGHT = 1.95, 0.3
+ROW_HEIGHT, LEGEND_HEIGHT, LEGEND_COLUMNS = 1.95, 0.3, 5
 MILLI = 1e3
 
 
@@ -37,8 +37,7 @@ def force_figure(results: Results) -> bytes | None:
         for row, tool in zip(grid, shown, strict=True):
             _draw(row, results, tool)
             row[0].set_title(short(tool), loc="left", fontweight="bold")
-        handles, names = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper center", ncols=5)
+        canvas.legend_above(figure, grid[0, 0], LEGEND_COLUMNS)
         return figure
 
     return canvas.drawn(draw)

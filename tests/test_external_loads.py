@@ -14,6 +14,7 @@ from msm.stepper import LatticeStepper
 from study.models.lattice import requested_step
 from study.models.table import model
 from study.problem.contact import Load
+from study.problem.unfinished import UnfinishedError
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 
@@ -84,6 +85,27 @@ def test_the_unloaded_shape_loaded_again_is_the_given_one(volume_term):
     assert np.abs(found.trajectory.displacement).max() < 1e-6 * size
     _, sagging = moved(*given[:1], *extra)
     assert np.abs(sagging.trajectory.displacement).max() > 0.01 * size
+
+
+SOFT = (
+    'organ.size=["40 mm", "40 mm", "40 mm"]',
+    "support={side='inferior', kind='clamped', depth='1 mm'}",
+    "tissue.youngs_modulus=800 Pa",
+    "lattice.spacing=20 mm",
+    "gravity.given=loaded",
+)
+"""A block that stands; the mixing of shapes finds none for its whole weight at once."""
+
+
+def test_the_unloaded_shape_of_a_soft_block_is_found_in_increments():
+    stepper = stepper_of(prepared(*SOFT))
+    stepper.advance(200, 0.2 * stepper.limit_at_rest)
+    assert np.abs(stepper.u).max() < 1e-6 * 0.04
+
+
+def test_a_load_without_an_unloaded_shape_is_refused_with_what_was_reached():
+    with pytest.raises(UnfinishedError, match=r"gravity\.given.* but for \d+ % of the load"):
+        stepper_of(prepared(*SOFT, "tissue.youngs_modulus=400 Pa"))
 
 
 def test_a_missing_part_of_the_foundation_is_seen(monkeypatch):

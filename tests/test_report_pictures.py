@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports import renders, report
+from reports import canvas, renders, report
 from reports.camera import Camera, facing_tool
 from reports.field_figures import field_figures, job, views
 from reports.renders import FLAT, Job, Pictures, render
@@ -178,3 +178,17 @@ def test_what_was_drawn_before_is_drawn_again_only_of_other_results(tmp_path, mo
     with using_store(Store(tmp_path), readable=False):
         assert report.draw(results) == first
         assert len(drawn) == 6
+
+
+@pytest.mark.parametrize(("length", "columns"), [(10, 5), (24, 3), (70, 1)])
+def test_a_legend_has_as_many_columns_as_fit(length, columns):
+    with canvas.style():
+        figure = canvas.sheet(2.0)
+        axes = figure.subplots()
+        for n in range(7):
+            axes.plot([0, 1], [n, n], label=f"{n} " + "a" * (length - 2))
+        canvas.legend_above(figure, axes, 5)
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+    assert legend._ncols == columns
+    assert box.width <= figure.bbox.width
