@@ -23,7 +23,7 @@ WITHIN = {"True": "within", "False": "beyond", "": DASH}
 
 
 class Median(NamedTuple):
-    """Of many cases: median, least and largest relative difference, and how many lie within.
+    """Median, least and largest relative difference of many cases, and how many lie within.
 
     `uncertainty` and `own`: medians of the measurement's and of the model's own, relative; nothing
     is said of cases without an answer, of `cases` in all.
@@ -56,7 +56,7 @@ def validation() -> dict[str, object] | None:
 
 
 def cylinder_rows(lines: list[Line]) -> list[Group]:
-    """By what the plates do: model, quantity, median and range, uncertainty, own error, within."""
+    """By bonded or sliding plates: model, quantity, median, range, uncertainty, error, within."""
     groups: list[Group] = []
     for faces in _faces(lines, CYLINDERS):
         rows: Table = []
@@ -80,7 +80,7 @@ def of_cylinders(lines: list[Line], faces: str) -> dict[tuple[str, str], list[Li
 
 
 def summed(lines: list[Line]) -> Median | None:
-    """Of lines of one quantity; None if none has an answer."""
+    """The median of lines of one quantity; None if no line has an answer."""
     answered = [line for line in lines if line["found"]]
     if not answered:
         return None
@@ -166,7 +166,7 @@ def _signed(share: float) -> str:
 
 
 def _sign(value: float) -> str:
-    """Of a difference, as it is printed."""
+    """The printed sign of a difference."""
     return "−" if value < 0.0 else "+"
 
 

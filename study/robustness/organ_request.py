@@ -78,7 +78,7 @@ class OrganRequest:
 
     @property
     def backend(self) -> Backend:
-        """Where to run."""
+        """Where the blocks are computed: here, in processes, or by a scheduler."""
         return Backend(self.workers, self.scheduler)
 
     @cached_property
@@ -189,7 +189,7 @@ def _write(found: Found, request: OrganRequest) -> None:
 
 
 def lines(found: Found, request: OrganRequest) -> list[str]:
-    """What is printed beside the sentences of the tables: the lattices, and divergences."""
+    """Lines on the lattices and on divergences, for beside the sentences of the tables."""
     draws = found.draws
     size = len(draws.scores) * draws.scores.shape[1]
     told = [f"{size} draws on lattices of about {1e3 * request.about:.3g} mm"]

@@ -46,7 +46,7 @@ COLUMNS = (
 
 
 GAPS = (701, 301, 132, 57, 23, 10, 4, 1)
-"""Of Shell's sort, after Ciura 2001."""
+"""Gaps of Shell's sort, after Ciura (2001)."""
 
 
 def _compiled(*, inner: bool = True) -> Callable[[Any], Any]:
@@ -358,7 +358,7 @@ def _crossings(edges: Floats) -> Floats:
 
 @_compiled()
 def _enlarged(a: Floats) -> Floats:
-    """The same numbers with room for as many more."""
+    """The numbers with room for as many more."""
     made = np.empty(2 * len(a))
     for i in range(len(a)):
         made[i] = a[i]

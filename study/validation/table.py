@@ -81,7 +81,7 @@ def _line(one: Comparison) -> str:
 
 
 def _medians(block: list[Comparison]) -> Iterator[str]:
-    """Of many cases: median and range of relative differences, and how many lie within."""
+    """Median and range of the relative differences of many cases, and how many lie within."""
     groups: dict[tuple[str, str], list[Comparison]] = {}
     for one in block:
         groups.setdefault((one.model, one.quantity), []).append(one)
