@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from study.numerics.continuation import Increments, follow
 
 from msm.kernel import kernel
 from msm.kinematics import cross, deformation, dot
 from msm.laws import Law
 from msm.network import Network
 from msm.relaxation import relax
-from study.continuation import Increments, follow
 from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]

@@ -51,7 +51,7 @@ def _whole(budget: ErrorBudget) -> tuple[str, str, str]:
 
 
 def cause_name(cause: str, reference: str) -> str:
-    """A cause in print."""
+    """Printed name of a cause of the difference."""
     return CAUSES.get(cause, cause) if reference == "fem" else cause
 
 

@@ -13,7 +13,7 @@ DIGITS = 2
 
 
 def certified_rows(results: Results) -> Table:
-    """By model and control point, bounds of curve, length [mm], energy norm, rest; an estimate.
+    """Bounds by model and control point: curve, length [mm], energy norm, rest; an estimate.
 
     The estimate is that of the error by the steps of the load, which no bound covers.
     """

@@ -47,7 +47,7 @@ class Cut:
 
 
 def section(results: Results) -> Cut | None:
-    """What is drawn of a run, its reference first; None for a run without fields to draw."""
+    """The section of a run, its reference first; None for a run without fields to draw."""
     fields, named = results.fields, labels(results)
     names = [n for n in drawable(results) if f"cut.{n}" in fields]
     if not names or not len(fields.get("cut_triangles", ())) or not results.scene.renders:

@@ -70,7 +70,7 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Views:
-    """What is drawn of the organ: its surfaces, on sheets, as a camera sees them.
+    """The surfaces of the organ on sheets, as a camera sees them.
 
     `anchors` (probes + 1,): vertices at the tool and at the control points; `hidden`: whether they
     lie on the far side; `inclusions` [m] (k, m, 3): points of the surface of each, at rest; `ways`
@@ -140,7 +140,7 @@ def views(results: Results) -> Views | None:
 
 
 def exaggeration(rest: Floats, lengths: list[Floats]) -> float:
-    """By which displacements of these lengths [m] (s,) are drawn larger on points [m] (s, 3)."""
+    """Factor by which displacements of lengths [m] (s,) are drawn larger on points [m] (s, 3)."""
     extent = float(np.ptp(rest, axis=0).max())
     return _round_down(SHOWN_DEFORMATION * extent / colour_limit(lengths))
 

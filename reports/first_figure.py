@@ -22,7 +22,7 @@ BESIDE, WHOLE = 4.1, canvas.TEXT_WIDTH
 """Width beside a picture of the organ, and without one [inch]."""
 HEIGHT = 2.5
 COLUMNS, SHORT = 3, 18
-"""Of the legend, where no label has more letters; else one less."""
+"""Columns of the legend where no label has more than `SHORT` letters, otherwise one less."""
 
 
 def first_figure(results: Results) -> bytes | None:

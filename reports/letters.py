@@ -19,7 +19,7 @@ PACKAGES = ("manimgx_fonts", "manimgx_fonts_cjk")
 REMEDY = "pip install 'liver-study[scripts]'"
 ENDINGS = ("*.ttf", "*.otf", "*.ttc")
 MOST = 100
-"""Of the letters without a shape that are looked for; one after the other is found."""
+"""Largest number of letters without a shape that are looked for, each by a compilation."""
 
 
 def extra_fonts() -> list[Path]:

@@ -61,7 +61,7 @@ def measured() -> dict[str, object]:
 
 
 def measured_figures() -> Figures:
-    """Its figures as SVG by place; without those whose table is missing."""
+    """The figures of the document as SVG by place, without those whose table is missing."""
     drawn = {
         **robustness_figures(),
         "validation": validation_figure(),

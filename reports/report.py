@@ -50,7 +50,7 @@ STANDARD: Literal["ua-1"] = "ua-1"
 NO_GLYPH = re.compile(r'the text `"(.*?)"` could not be displayed with font', re.DOTALL)
 """What typst says of the first text that no font has letters for."""
 PROCESSES = 2
-"""That draw plots at most: more of them wait for the dearest."""
+"""Largest number of processes that draw plots: more would wait for the longest plot."""
 RENDERER = "renderer"
 """Name of what rendered the pictures of the organ, beside its figures."""
 Figures = dict[str, list[bytes]]
@@ -65,7 +65,7 @@ NOWHERE = Provenance(
     scene_sha256="",
     mesh_sha256=None,
 )
-"""Of results that are drawn, which show none."""
+"""Provenance of results of which figures alone are drawn: no figure shows it."""
 
 
 def make_report(folder: Path) -> None:

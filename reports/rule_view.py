@@ -24,7 +24,7 @@ FRAME_HEIGHT = 0.78
 FRAME = {"left": 0.075, "right": 0.985, "wspace": 0.12}
 OUTPUT_COLUMN = 1.3
 LEAST_SHARE = 0.01
-"""Of the weight, below which a constant is drawn and not named."""
+"""Share of the weight below which a constant is drawn without its name."""
 TOP = 2.1
 """Upper end of a small panel's axis; above 1 there is room for the name of the set."""
 ANTECEDENT, CONSEQUENT, READING = "#0072B2", "#E69F00", "#D55E00"

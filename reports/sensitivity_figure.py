@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LINE_HEIGHT = 0.14
 FRAME_HEIGHT = 0.75
 GROUP_GAP = 0.55
-"""Between two choices, in lines."""
+"""Gap between two choices, in lines."""
 SPREAD = 0.26
 """Between the systems' marks on one line, in lines."""
 KILO = 1e-3

@@ -29,7 +29,7 @@ class Measured:
 
     @property
     def printed(self) -> str:
-        """With its error."""
+        """The number with its error, as it is printed."""
         if self.error is None:
             return f"{significant(self.value)} (± not known)"
         if self.error < 5e-4 * abs(self.value):

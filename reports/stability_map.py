@@ -90,7 +90,7 @@ def _draw_shares(axes: Axes, found: Sequence[StabilityCase], families: Sequence[
 
 
 def _share(case: StabilityCase) -> float:
-    """Of its tolerance; a case without a difference did not meet its end and is off the scale."""
+    """Difference of a case over its tolerance; one that did not meet its end is off the scale."""
     if case.difference is None or case.tolerance is None:
         return 2.5
     limit = case.tolerance or 1.0

@@ -66,7 +66,7 @@ HEADING_ROWS = 2
 KEY, VALUE = 20, 14
 """Characters that fit on a line of a column of the scene."""
 LEFT_OUT = ("title", "renders", "remarks")
-"""Of the scene's own values: remarks stand among the notes."""
+"""Keys of the scene that its table leaves out: remarks are among the notes."""
 FIELD_QUANTITIES = (
     "field-relative-l2-peak",
     "field-relative-l2-final",

@@ -17,7 +17,7 @@ from reports.tradeoff import (
 )
 
 TOLD = ("60hz", "1khz")
-"""Rates that have a sentence."""
+"""Rates of the trade-off that a sentence is written on."""
 
 
 def sentences(found: Sequence[MeasuredConfiguration]) -> list[str]:

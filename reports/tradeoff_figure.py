@@ -138,7 +138,7 @@ def _draw_rate(
 
 
 def _plain(value: float, _: float) -> str:
-    """A tick's label."""
+    """Label of a tick, without powers of ten."""
     return f"{value:g}"
 
 
@@ -162,7 +162,7 @@ def _shade_unresolved(axes: Axes, shown: Sequence[MeasuredConfiguration]) -> Non
 
 
 def _draw_list(axes: Axes, without: Table) -> None:
-    """Those without an error, and why."""
+    """List the configurations without an error, and why they have none."""
     axes.set_axis_off()
     texts = [fill(f"{name}: {status} {message}", COLUMN) for name, status, message in without]
     place: Style = {"va": "top", "linespacing": 1.25}

@@ -81,7 +81,7 @@ def of_cylinders(lines: list[Line], faces: str) -> dict[tuple[str, str], list[Li
 
 
 def summed(lines: list[Line]) -> Median | None:
-    """Of lines of one quantity; None if none has an answer."""
+    """The median of lines of one quantity; None if no line has an answer."""
     answered = [line for line in lines if line["found"]]
     if not answered:
         return None
@@ -166,7 +166,7 @@ def _signed(share: float) -> str:
 
 
 def _sign(value: float) -> str:
-    """Of a difference, as it is printed."""
+    """The printed sign of a difference."""
     return "−" if value < 0.0 else "+"
 
 

@@ -85,7 +85,7 @@ def _beam(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
 
 
 def _cube(axes: Axes, lines: list[Line], colours: dict[str, str]) -> None:
-    """What is left of the beads, filled where the plate holds its face."""
+    """Rms error of the displaced beads, filled where the plate holds its face."""
     own = of_body(lines, CUBE, BEADS)
     cases = list(dict.fromkeys(line["case"] for line in own))
     names = list(colours)

@@ -225,7 +225,7 @@ def test_a_larger_design_has_the_rows_of_a_smaller_one():
     of = unknowns(COARSE)
     assert (shares(5, 16, of)[:4] == shares(5, 4, of)).all()
     for row in (0, 1, 6, 15):
-        assert organ.Asked(5, row, 3, COARSE).draws() == draws(shares(5, 16, of)[row, :3], of)
+        assert organ.DesignRow(5, row, 3, COARSE).draws() == draws(shares(5, 16, of)[row, :3], of)
 
 
 def test_a_motion_that_diverges_has_no_score(scene, given):

@@ -34,7 +34,7 @@ ROUND = 1e-3
 CURVES: tuple[Literal["displacement"], Literal["velocity"]] = ("displacement", "velocity")
 SHADES = 33
 STEPS = 2**15 - 1
-"""Of a displacement, up to the largest."""
+"""Whole numbers that a displacement is rounded to, up to the largest: 16 bits with a sign."""
 DASHES = {"fem": "solid", "basafa": "longdash", "reading": "dot"}
 OTHER_DASHES = ("solid", "dashdot", "dash", "longdashdot")
 

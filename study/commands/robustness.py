@@ -88,7 +88,7 @@ def _refuse_of_organ(flags: Mapping[str, object]) -> None:
 
 
 def _length(text: str | None) -> float | None:
-    """In metres."""
+    """The length [m] of --spacing. ValueError naming the flag for what is none."""
     from study.annotation.quantity import Quantity
 
     if text is None:

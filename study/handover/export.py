@@ -266,7 +266,7 @@ def frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
 
 
 def _own_frames(body: Body, motion: Transient) -> list[tuple[float, Floats]]:
-    """The same times with the reference's own steps, mass and quadrature."""
+    """The motion at the times of `frames` by the reference's own steps, mass and quadrature."""
     system = Oscillator(body.mass, body.stiffness, body.loads, motion.damping)
     return _kept(march(system, motion.factor, motion.step, motion.count), motion)
 

@@ -33,7 +33,7 @@ static.csv      what we get for it: displacement [m] of each node"""
 def about_calculix(
     scene: Scene, given: NodalProblem, motion: Transient, differences: tuple[float, float]
 ) -> str:
-    """On a problem at rest and in motion.
+    """Text on a problem at rest and in motion.
 
     `differences`: of the study's own displacement from the one written, relative L2 over the
     nodes, at rest and in motion.
@@ -66,7 +66,7 @@ differs by {at_rest:.1e} at rest and up to {in_motion:.1e} in motion, relative L
 
 
 def about_rest(scene: Scene, given: NodalProblem, at_rest: float) -> str:
-    """On a problem at rest alone; `at_rest` as in `about_calculix`."""
+    """Text on a problem at rest alone; `at_rest`: first of the differences of `about_calculix`."""
     return f"""\
 {scene.title or "A scene"}
 Its finite-element problem at rest for CalculiX, SI units throughout.
@@ -116,13 +116,13 @@ def external_loads_note(problem: Problem, given: NodalProblem, *, merged: bool =
 
 
 def _of_load(load: Load) -> str:
-    """Whose it is."""
+    """Name of the tool of a load, and whether the load is a station of its path."""
     travels = isinstance(load.factor, StationFactor)
     return f"of {load.tool.name}" + (" at a station of its path" if travels else "")
 
 
 def about_vtu(scene: Scene, given: NodalProblem) -> str:
-    """On the nodes and their fields for ParaView."""
+    """Text on the nodes and their fields for ParaView."""
     tissue = scene.tissue
     kind = "quadratic tetrahedra" if given.elements.shape[1] == 10 else "tetrahedra"
     return f"""\
@@ -140,7 +140,7 @@ density {tissue.density:g} kg/m^3.
 
 
 def about_mesh(scene: Scene, file: str, mesh: TetrahedralMesh) -> str:
-    """On the tetrahedra alone."""
+    """Text on the tetrahedra alone."""
     return f"""\
 {scene.title or "A scene"}
 The mesh of its finite elements, in metres. A scene takes it as organ.mesh with organ.unit = "m",

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 DOWN = np.array([0.0, 0.0, -1.0])
 BLOCK = (0.06, 0.05, 0.04)
 COLUMN = (0.04, 0.04, 0.06)
-"""Sizes [m]."""
+"""Width, depth and height of the column [m]."""
 FOUNDATION = 5e5
 """Stiffness under the column [Pa/m]."""
 PRESSURE = 200.0

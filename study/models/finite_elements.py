@@ -178,10 +178,10 @@ class PreparedElements:
         return at_points(evaluation(body, self.problem.observation.volume_points), u)
 
     def rest_at(self, poisson_ratio: float) -> Floats:
-        """The same at another Poisson ratio, on the mesh of the last run if there was one.
+        """Displacement [m] (q, 3) at rest as `rest`, at another Poisson ratio.
 
-        The matrices of that run are released, since both sets together would exceed the memory of a
-        run.
+        After a run, on the mesh of that run, whose matrices are released: both sets together would
+        exceed the memory of a run.
         """
         tissue = replace(self.problem.tissue, poisson_ratio=poisson_ratio)
         own, start = self._best_body(), None
@@ -493,7 +493,7 @@ def reference_of(scene: Scene) -> FiniteElements:
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[FiniteElements]:
-    """The one reference."""
+    """The finite elements of a scene, one model."""
     yield reference_of(scene)
 
 

@@ -59,17 +59,17 @@ COARSER = (-2, 0)
 FEWEST = 5
 """Samples of a motion of which every other one shows the error by steps."""
 BELOW = 3
-"""Levels of the organ's mesh by which one is coarser that is refined under the tools."""
+"""Levels by which the mesh that is refined under the tools is coarser than that of the organ."""
 UNDER, GROWING = 0.7, 0.7
 """Longest edge under a tool over its radius, and by how much edges grow with the distance."""
 WITHIN = 0.5
-"""Of a tool's radius, from where on they grow."""
+"""Distance from a tool at which edges begin to grow, over its radius."""
 RATIO = 0.75
 """Size of elements over that of the next coarser level."""
 OWN_STEPS = 100
-"""Fewest steps of a motion."""
+"""Least number of steps of a motion, where the scene gives none."""
 OVERLOOKED = 0.02
-"""Of the travel, how deep what no contact is sought for may be inside a tool."""
+"""Depth, over the travel, at which a note says that a tool is inside tissue beyond its contact."""
 
 
 @dataclass(frozen=True, kw_only=True)

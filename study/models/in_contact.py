@@ -56,7 +56,7 @@ def _wanted(problem: Problem, centres: Floats, longest: Floats) -> Floats:
 
 
 def _distance(points: Floats, places: Floats) -> Floats:
-    """Of points (n, 3) to the nearest of places (k, 3)."""
+    """Distance [m] (n,) of points (n, 3) to the nearest of places (k, 3)."""
     return np.asarray(cKDTree(places).query(points)[0])
 
 
@@ -91,7 +91,7 @@ def contact_errors(problem: Problem, body: Body) -> Floats:
 def contact_record(
     problem: Problem, solved: Sequence[MeshSolution], steps: Floats, *, graded: bool
 ) -> ContactRecord | None:
-    """What is known of the forces on the tools; none where none is moved.
+    """Record of the forces on the tools with their errors; None where no tool is moved.
 
     `steps` (tools,): relative L2 error of the forces by the steps.
     """

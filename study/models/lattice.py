@@ -228,7 +228,7 @@ class PreparedLattice:
         ]
 
     def _sizes(self) -> Iterator[str]:
-        """On a graded lattice: the number of cells of each size, and how its radius was chosen."""
+        """Cells of each size and radius of a graded lattice; nothing of a uniform one."""
         found, lattice = self.region, self.assembly.lattice
         if found is None:
             return

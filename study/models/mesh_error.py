@@ -37,7 +37,7 @@ class MeshSolution:
 
     @property
     def outlined(self) -> MeshSolution:
-        """The same without the matrices."""
+        """The solution without the matrices of its body."""
         return replace(self, body=self.body.outline) if isinstance(self.body, Body) else self
 
     def near(self, body: Body) -> Floats | None:

@@ -141,11 +141,11 @@ class Model(Protocol):
 
     @property
     def name(self) -> str:
-        """Unique in a study."""
+        """Name of the model, unique in a study."""
 
     @property
     def label(self) -> str:
-        """The name in print."""
+        """Name of the model in reports."""
 
     def varied(self, **settings: Any) -> Self:
         """The model with other settings by name, given as plain JSON values."""
@@ -159,7 +159,7 @@ class PointModel(Protocol):
 
     @property
     def name(self) -> str:
-        """Unique in a study."""
+        """Name of the model, unique in a study."""
 
     def run(self, problem: PointProblem, watch: Watch) -> ModelRun:
         """The motion with its record."""

@@ -14,7 +14,7 @@ from study.problem.rigid import PLATE, PUNCH, SPHERE, RigidTool
 Floats = NDArray[np.float64]
 
 APART = {SPHERE: 0.2, PUNCH: 0.35, PLATE: 0.35}
-"""Of the spacing of a lattice, how far apart the points are at which tools of a shape are met.
+"""Distance between the points at which a tool is met, over the spacing, by the tool's shape.
 
 What is bonded follows no shape: those of a bonded sphere are as far apart as a punch's.
 """

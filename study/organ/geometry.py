@@ -42,7 +42,7 @@ TETRAHEDRA_PER_CUBE = 12
 LOST = 0.03
 """Admissible volume error of a surface's mesh; curved elements have a far smaller one."""
 LOST_AT_MOST = 0.15
-"""The same for its coarser meshes, which only serve convergence."""
+"""Admissible volume error of the coarser meshes of a surface, which only serve convergence."""
 COARSEST = 0.5
 """Largest element size over the cube root of the built-in liver's volume.
 

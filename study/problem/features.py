@@ -16,7 +16,7 @@ FEATURES = {
 """Names of features that a model must support, with their words in messages."""
 
 BESIDE_ONE_LOAD = ("moved-tools", "several-loads", "travelling-loads", "gravity", "weights")
-"""Those features that act beside a single load of given force."""
+"""Names of the features that act beside a single load of given force."""
 
 
 def refuse_beside_one_load(features: Iterable[str], what: str) -> None:

@@ -52,7 +52,7 @@ class Region:
     outline: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def ratio(self, around: float) -> float:
-        """Its Poisson ratio within tissue of the given one."""
+        """Poisson ratio of the region: its own, or that of the tissue around if it has none."""
         return around if self.poisson_ratio is None else self.poisson_ratio
 
 

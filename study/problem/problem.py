@@ -58,7 +58,7 @@ class Problem:
 
     @property
     def response(self) -> Response:
-        """What is compared of its motion."""
+        """The quantities of a motion that are compared: curves, fields and forces on tools."""
         times, volumes = self.observation.times, self.volume_rule.weights
         tools = tuple(ToolPath(one.name, one.axis, one.travel(times)) for one in self.rigid_tools)
         return Response(times, self.probes, self.tool.direction, volumes, tools)
@@ -124,5 +124,5 @@ class PointProblem:
 
     @property
     def response(self) -> Response:
-        """What is compared of its motion: the components along the spring."""
+        """The quantities of a motion that are compared: the curves along the spring."""
         return Response(self.times, self.probes, np.array([1.0, 0.0, 0.0]), np.zeros(0))

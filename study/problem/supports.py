@@ -53,7 +53,7 @@ class FixedSurface:
         return np.asarray(held[..., None] & self.directions)
 
     def scaled(self, times: float) -> FixedSurface:
-        """Itself, as it has no stiffness."""
+        """The surface unchanged, as it has no stiffness to scale."""
         del times
         return self
 

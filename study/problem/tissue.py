@@ -21,5 +21,5 @@ class Tissue:
 
     @property
     def highest_poisson_ratio(self) -> float:
-        """Its own; of heterogeneous tissue the largest."""
+        """Largest Poisson ratio in the organ; homogeneous tissue has only one."""
         return self.poisson_ratio

@@ -158,7 +158,7 @@ def travel_paths(loads: Sequence[tuple[str, Floats, Callable[[Floats], Floats]]]
 def _outline(stations: Sequence[tuple[Floats, StationFactor]]) -> Floats:
     times = stations[0][1].times
     at = np.linspace(times[0], times[-1], OUTLINE)
-    shares = np.column_stack([turn.share(at) for _, turn in stations])
+    shares = np.column_stack([factor.share(at) for _, factor in stations])
     return np.asarray(shares @ np.array([place for place, _ in stations]))
 
 

@@ -179,12 +179,12 @@ class SensitivityEntry(NamedTuple):
 
 
 Key = tuple[str, str, str]
-"""Of a scored curve: model, reference and control point."""
+"""Model, reference and control point of a scored curve."""
 QUANTITIES = (
     *("field-relative-l2-peak", "field-relative-l2-final", "field-l2-final-over-peak"),
     *("field-best-factor-peak", "field-relative-l2-peak-at-best-factor"),
 )
-"""Of errors.csv, in the order of its rows."""
+"""Quantities of errors.csv, in the order of its rows."""
 
 
 def pairs(models: Sequence[str], references: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -34,7 +34,7 @@ CELL_TYPES = {4: VTK_TETRA, 8: VTK_HEXAHEDRON}
 # then round the upper one.
 HEXAHEDRON = (0, 4, 6, 2, 1, 5, 7, 3)
 COMPRESSION = 1
-"""Of deflate. Higher levels take several times as long and save a few per cent."""
+"""Level of deflate. Higher levels take several times as long and save a few per cent."""
 
 
 def write(path: Path, points: Floats, cells: Ints, times: Floats, fields: Fields) -> None:

@@ -45,7 +45,7 @@ DIVERGED = np.full(len(MEASURED), np.nan)
 
 
 @dataclass(frozen=True)
-class Asked:
+class DesignRow:
     """A row of a design, with `points` draws, on an organ.
 
     `spacing` [m] about which the lattices' are drawn; `finer`: refinement factor on each draw's own
@@ -103,14 +103,16 @@ def usual_spacing(problem: Problem) -> float:
     return float(problem.geometry.volume ** (1.0 / 3.0) / SIZES)
 
 
-def run(asked: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
+def run(row: Plain, scene: Plain, mesh_sha256: str | None) -> Plain:
     """Estimates and scores of a row of the design, as plain lists."""
     given = scene_problem(scene, mesh_sha256)
-    return plain(evaluated(Asked(**asked).draws(), given.scene, _seen(given.problem)))
+    return plain(
+        evaluated(DesignRow(**row).draws(), given.scene, _sparsely_observed(given.problem))
+    )
 
 
-def _seen(problem: Problem) -> Problem:
-    """The problem with almost no observation of the surface."""
+def _sparsely_observed(problem: Problem) -> Problem:
+    """The problem with one observed point of the surface: a score needs none."""
     surface = problem.observation.surface_points[:1]
     return replace(problem, observation=replace(problem.observation, surface_points=surface))
 
@@ -148,7 +150,7 @@ def _patient(draw: OrganDraw) -> dict[str, float | None]:
 
 
 def _estimate(system: str, modulus: float) -> StiffnessEstimate:
-    """Without its interval, since the bounds are not run."""
+    """An estimate without its interval, since the bounds are not run."""
     return StiffnessEstimate(system, modulus, None, 0.0, (), "")
 
 
@@ -189,7 +191,9 @@ def _compared(problem: Problem, found: Simulation, truth: Simulation) -> Floats:
     runs = found.trajectory, truth.trajectory
     if found.inverted_cells or truth.inverted_cells or not all(map(_is_whole, runs)):
         return DIVERGED
-    of_curves = np.mean([_at(problem, k, *runs) for k in range(len(problem.probes))], axis=0)
+    of_curves = np.mean(
+        [_curve_scores(problem, k, *runs) for k in range(len(problem.probes))], axis=0
+    )
     own, true, volumes = (
         runs[0].volume_field[0],
         runs[1].volume_field[0],
@@ -203,7 +207,7 @@ def _is_whole(run: Trajectory) -> bool:
     return run.status == "finished" and bool(np.isfinite(run.volume_field[0]).all())
 
 
-def _at(problem: Problem, probe: int, run: Trajectory, truth: Trajectory) -> Floats:
+def _curve_scores(problem: Problem, probe: int, run: Trajectory, truth: Trajectory) -> Floats:
     """Scores (7,) of the curves of a control point."""
     one, other = (problem.response.motion(each, probe) for each in (run, truth))
     own, true = (one.displacement, one.velocity), (other.displacement, other.velocity)

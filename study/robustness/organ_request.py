@@ -18,7 +18,7 @@ from study.robustness.organ_block import (
     CONTENDERS,
     FUNCTION,
     MEASURED,
-    Asked,
+    DesignRow,
     prepared,
     usual_spacing,
 )
@@ -80,7 +80,7 @@ class OrganRequest:
 
     @property
     def backend(self) -> Backend:
-        """Where to run."""
+        """Where the blocks are computed: here, in processes, or by a scheduler."""
         return Backend(self.workers, self.scheduler)
 
     @cached_property
@@ -118,8 +118,8 @@ class OrganRequest:
         return [self._task(row, 1, TIMES) for row in range(min(self.again, self.size))]
 
     def _task(self, row: int, points: int, finer: float = 1.0) -> Task:
-        asked = Asked(self.seed, row, points, self.about, finer)
-        return Task(FUNCTION, {"asked": asdict(asked), **self.given})
+        drawn = DesignRow(self.seed, row, points, self.about, finer)
+        return Task(FUNCTION, {"row": asdict(drawn), **self.given})
 
 
 def _refuse_moved(scene: Scene) -> None:
@@ -138,14 +138,14 @@ def planned(request: OrganRequest) -> str:
 
 
 @dataclass(frozen=True)
-class Found:
+class OrganDraws:
     """The draws over the design, and the changes of some on finer lattices."""
 
     draws: summary.Draws
     finer: tuple[rows.Finer, ...]
 
 
-def study(request: OrganRequest, progress: ReportStatus = silent) -> Found:
+def study(request: OrganRequest, progress: ReportStatus = silent) -> OrganDraws:
     """The nearest contender to the benchmark in each draw; all tables are written to the folder.
 
     Raises ValueError for a scene with nothing to draw, a size that is no power of two, a folder
@@ -155,7 +155,7 @@ def study(request: OrganRequest, progress: ReportStatus = silent) -> Found:
     tasks, again = request.tasks(), request.again_tasks()
     request.folder.mkdir(parents=True, exist_ok=True)
     outcomes = run([*tasks, *again], request.store, backend, progress)
-    found = _found(gathered(outcomes), len(tasks), request.about)
+    found = _organ_draws(gathered(outcomes), len(tasks), request.about)
     _write(found, request)
     return found
 
@@ -172,7 +172,7 @@ def gathered(outcomes: Sequence[Outcome]) -> list[Plain]:
     return values
 
 
-def _found(values: Sequence[Plain], rows_of: int, spacing: float) -> Found:
+def _organ_draws(values: Sequence[Plain], rows_of: int, spacing: float) -> OrganDraws:
     together = tuple(groups(unknowns(spacing)))
     points = len(together) + POINTS_APART
     scores = _scores(values[:rows_of]).reshape(-1, points, len(CONTENDERS), len(MEASURED))
@@ -182,7 +182,7 @@ def _found(values: Sequence[Plain], rows_of: int, spacing: float) -> Found:
     )
     again = values[rows_of:]
     finer = changes(scores[: len(again), 0], _scores(again), MEASURED) if again else ()
-    return Found(draws, tuple(finer))
+    return OrganDraws(draws, tuple(finer))
 
 
 def _scores(values: Iterable[Plain]) -> Floats:
@@ -190,7 +190,7 @@ def _scores(values: Iterable[Plain]) -> Floats:
     return np.concatenate(found).reshape(-1, len(CONTENDERS), len(MEASURED))
 
 
-def _write(found: Found, request: OrganRequest) -> None:
+def _write(found: OrganDraws, request: OrganRequest) -> None:
     folder, draws = request.folder, found.draws
     write_table(folder / NEAREST, rows.Nearest, summary.nearest(draws))
     write_table(folder / DIFFERENCES, rows.Difference, summary.differences(draws))
@@ -199,8 +199,8 @@ def _write(found: Found, request: OrganRequest) -> None:
     write_ranges(folder / RANGES, unknowns(request.about))
 
 
-def lines(found: Found, request: OrganRequest) -> list[str]:
-    """What is printed beside the sentences of the tables: the lattices, and divergences."""
+def lines(found: OrganDraws, request: OrganRequest) -> list[str]:
+    """Lines on the lattices and on divergences, for beside the sentences of the tables."""
     draws = found.draws
     size = len(draws.scores) * draws.scores.shape[1]
     told = [f"{size} draws on lattices of about {1e3 * request.about:.3g} mm"]

@@ -7,7 +7,7 @@ TABLE_III = {"interval-type-2": 0.8598, "mamdani": 0.8580, "sugeno": 0.8549}
 
 
 def table_i() -> list[list[str]]:
-    """Its Table I as rows of cells, the header first."""
+    """Table I of the paper as rows of cells, the header first."""
     found = rows("table1.csv")
     return [list(found[0]), *(list(row.values()) for row in found)]
 

@@ -18,7 +18,7 @@ from study.similarity.batch import COLUMNS
 Floats = NDArray[np.float64]
 
 ROUNDING = 0.5e-4
-"""Of the paper's four digits."""
+"""Largest rounding error of the four decimals that the paper prints."""
 TIE = 1e-6
 """Scores closer than this are equal: a hundred times the accuracy of the motions."""
 BOOTSTRAPS = 200

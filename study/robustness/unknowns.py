@@ -46,7 +46,7 @@ class Range:
 
     @property
     def extent(self) -> str:
-        """In print."""
+        """The range as text, for the table of the unknowns."""
         return f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
 
 
@@ -66,7 +66,7 @@ class OneOf:
 
     @property
     def extent(self) -> str:
-        """In print."""
+        """The range as text, for the table of the unknowns."""
         if len(self.values) > 6:
             return f"{len(self.values)} alternatives"
         return ", ".join(

@@ -119,7 +119,7 @@ def error_budgets(
 
 
 def _until_peak_load(problem: Problem) -> Problem:
-    """The same problem up to the peak of its load, the only frame that is recorded."""
+    """The problem up to the peak of its load, the only frame that is recorded."""
     seen = problem.observation
     peak = seen.frames[0]
     return replace(problem, observation=replace(seen, times=seen.times[: peak + 1], frames=(peak,)))

@@ -140,9 +140,8 @@ class OrganStages:
         """
         problem_record = self.stages.compute(self.problem_record())
         uncached = self._uncached(problem_record.mesh)
-        if (
-            uncached and problem_record.mesh != self.builder.mesh
-        ):  # a mesher that is not deterministic
+        # A mesher that is not deterministic has made another mesh than that of the stored results.
+        if uncached and problem_record.mesh != self.builder.mesh:
             problem_record = self.builder.problem_record()
             uncached = self._uncached(problem_record.mesh)
         for stage, needs in uncached:

@@ -1,4 +1,4 @@
-"""What is wrong in a scene between keys that are each right."""
+"""Contradictions between keys of a scene that are each valid."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ MESH_ONLY = (
 
 
 def contradictions(scene: Scene, table: Table) -> Iterator[str]:
-    """What is wrong between keys that are each right."""
+    """Contradictions between keys that are each valid, a line each with the remedy."""
     yield from _model_contradictions(scene)
     if len(set(scene.fuzzy.systems)) < len(scene.fuzzy.systems):
         yield "fuzzy.systems: a system is named twice"

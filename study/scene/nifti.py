@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 MILLIMETRES = {"unknown": 1.0, "mm": 1.0, "meter": 1e3, "micron": 1e-3}
 """Units of space that an image may be in, of which it may leave out that of its affine."""
 APART = 0.5
-"""Of a voxel's shortest edge, by which two places of one voxel may differ."""
+"""Largest distance between two places of one voxel, over its shortest edge."""
 
 
 def read_image(path: Path) -> tuple[Floats, Floats]:

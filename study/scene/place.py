@@ -113,9 +113,9 @@ def depths(point: Floats, direction: Floats, surface: SurfaceMesh) -> Floats:
 def _triangles_under(corner: Floats, target: Floats) -> NDArray[np.bool_]:
     """Whether a projected triangle (k, 3, 2) contains a point; edges count."""
     a, b, c = (corner[:, i] - target for i in range(3))
-    station_loads: Floats = np.stack([_cross(a, b), _cross(b, c), _cross(c, a)])
-    slack = 1e-12 * np.abs(station_loads).sum(axis=0)
-    return np.asarray((station_loads >= -slack).all(axis=0) | (station_loads <= slack).all(axis=0))
+    areas: Floats = np.stack([_cross(a, b), _cross(b, c), _cross(c, a)])
+    slack = 1e-12 * np.abs(areas).sum(axis=0)
+    return np.asarray((areas >= -slack).all(axis=0) | (areas <= slack).all(axis=0))
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -140,8 +140,8 @@ def _onto_plane(point: Floats, corner: Floats, normal: Floats) -> Floats:
     """Projections that fall inside their triangle; elsewhere a corner in their place."""
     foot = point - np.einsum("kd,kd->k", point - corner[:, 0], normal)[:, None] * normal
     sides = np.roll(corner, -1, axis=1) - corner
-    station_loads = (np.cross(sides, foot[:, None] - corner) @ normal[:, :, None])[..., 0]
-    over = np.asarray((station_loads >= 0).all(axis=1))
+    areas = (np.cross(sides, foot[:, None] - corner) @ normal[:, :, None])[..., 0]
+    over = np.asarray((areas >= 0).all(axis=1))
     return np.where(over[:, None], foot, corner[:, 0])
 
 

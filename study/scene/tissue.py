@@ -35,7 +35,7 @@ Booleans = NDArray[np.bool_]
 Distance = Callable[[Floats], Floats]
 
 PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
-"""By the units that a map may be in."""
+"""Pascals in a unit that a map may be in."""
 PIECES = re.compile(r"keep one piece \(`organ\.pieces`[^)]*\), or join them")
 """What is said of an organ of several pieces."""
 FEWEST = 8

@@ -36,8 +36,8 @@ def travelling(tool: Tool, patch: ToolPatch, surface: SurfaceMesh) -> tuple[Load
     reached = np.interp(found.marks, marks, times)
     places = _on_surface(patch, found.away, reached, surface)
     return tuple(
-        Load(replace(patch, centre=place), turn)
-        for place, turn in station_loads(
+        Load(replace(patch, centre=place), factor)
+        for place, factor in station_loads(
             found, places, times, marks, tool.history.factor, SAME * tool.radius
         )
     )

@@ -45,7 +45,7 @@ COLUMNS = (
 )
 """Curve and measure of each score that `scores` gives, in its order."""
 GAPS = (701, 301, 132, 57, 23, 10, 4, 1)
-"""Of Shell's sort, after Ciura 2001."""
+"""Gaps of Shell's sort, after Ciura (2001)."""
 ROOM = 512
 """Crossings for which there is room at first: more than most pairs of curves have."""
 

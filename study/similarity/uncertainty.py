@@ -133,7 +133,7 @@ def _without_block(n: int, count: int) -> Iterable[NDArray[np.int64]]:
 
 
 def _of(pair: Pair, part: NDArray[np.int64] | slice) -> Pair:
-    """The same pair at some of its samples."""
+    """A pair of motions at some of its samples."""
     own, true = (
         Motion(*(np.ascontiguousarray(x[part]) for x in (m.time, m.displacement, m.velocity)))
         for m in pair

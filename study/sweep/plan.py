@@ -20,7 +20,7 @@ class Plan(NamedTuple):
     seconds: float | None
 
     def __str__(self) -> str:
-        """For a reader."""
+        """One line for the terminal."""
         time = "an unknown time" if self.seconds is None else f"about {duration(self.seconds)}"
         return f"{self.total} runs, {self.stored} stored, {self.left} left: {time} of work"
 

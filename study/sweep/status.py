@@ -37,7 +37,7 @@ class SweepStatus(NamedTuple):
         )
 
     def __str__(self) -> str:
-        """For a reader."""
+        """One line for the terminal."""
         parts = [f"{self.finished} of {self.total}"]
         parts += [f"{self.stored} from before"] if self.stored else []
         parts += [f"{self.failed} failed"] if self.failed else []

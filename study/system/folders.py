@@ -22,7 +22,7 @@ Foreign = Callable[[set[str]], str | None]
 """Given the names in a folder, one that must not be lost, or None."""
 
 OLD, NEW = "old", "new"
-"""In the temporary folder: the content that is replaced, and the one that replaces it."""
+"""Names in the temporary folder: the replaced content, and the one that replaces it."""
 OF_THE_MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
 """Errors that another place or name does not remedy."""
 

@@ -25,14 +25,14 @@ SILICONE = 0.499
 EVERYWHERE = ImplicitBody(lambda x: np.full(x.shape[:-1], -1.0))
 
 RADIUS, HEIGHT = 0.025, 0.030
-"""Of the cylinders [m]."""
+"""Radius and height of the cylinders [m]."""
 BEAM = (0.1, 0.03, 0.03)
 """Length, width and height of the beam [m]."""
 BEAM_DENSITY = 1070.0
 BEAM_CELLS, BEAM_SPACINGS = (1, 2, 3), (7.5e-3, 5e-3, 3.75e-3)
 """Elements across half the width, and spacings [m] of lattices, coarse to fine."""
 CUBE = 0.08
-"""Edge [m]."""
+"""Edge of the cube [m]."""
 CUBE_DENSITY = 980.0
 CUBE_CELLS, CUBE_SPACED = (2, 3, 4), (3, 4, 6)
 """Cells of elements and of lattices along half an edge, coarse to fine."""

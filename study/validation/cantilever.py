@@ -148,7 +148,7 @@ def _apart(case: Markers, displacement: Floats) -> float:
 
 
 def _uncertainty(case: Markers) -> tuple[float, float]:
-    """Of the mean deflection and of one marker [m]: from repeats, and from the clamp.
+    """Uncertainty of the mean deflection and of one marker [m]: from repeats, and from the clamp.
 
     Half of the difference of the repeats; the clamped end is not perfectly still.
     """

@@ -34,7 +34,7 @@ from study.validation.user_scene import coarser, probe_number, refuse_unanswered
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
-"""From values of the free quantities to the curve (k,)."""
+"""Maps values of the free quantities to the curve (k,)."""
 
 CONFIDENCE = 0.95
 STEP = 0.02
@@ -226,7 +226,7 @@ class _Left:
 
     @property
     def runs(self) -> int:
-        """Number of runs."""
+        """Number of runs of the model so far."""
         return len(self._known)
 
     def __call__(self, logs: Floats) -> Floats:

@@ -61,7 +61,7 @@ class Prediction:
 
 
 Solve = Callable[[Specimen, int, float, tuple[float, ...]], Prediction]
-"""From a specimen, the number of its mesh or spacing, Young's modulus [Pa] and the load factors."""
+"""Predicts from a specimen, number of its mesh or spacing, Young's modulus [Pa], load factors."""
 
 
 def neo_hookean(

@@ -244,7 +244,7 @@ def _of_curve(name: str, curve: Curve, label: str, found: Floats, own: Floats | 
 
 
 def _of_markers(markers: UserMarkers, label: str, moved: Floats, own: Floats | None) -> Comparison:
-    """The same for the markers when the load is largest."""
+    """Comparison of the markers when the load is largest."""
     spread = markers.uncertainty
     return Comparison(
         problem=NAME,

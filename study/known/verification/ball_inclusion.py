@@ -26,12 +26,12 @@ Floats = NDArray[np.float64]
 RADIUS, HALF = 0.01, 0.03
 """[m]"""
 CELLS = 6
-"""Along each edge of the cube."""
+"""Number of cells along each edge of the cube."""
 FINER, FINER_LIMIT = (4, 7), 0.25
 CONTRASTS = (1.0, 10.0, 1000.0, 0.1)
 RATIOS = (("p2", 0.25), ("p2", 0.45), ("taylor-hood", 0.49))
 LIMITS = {1.0: 1e-10, 10.0: 0.3, 1000.0: 0.3, 0.1: 0.5}
-"""Of the error by contrast: cells of a whole radius cannot follow the ball."""
+"""Limits of the error by contrast: elements as large as the radius do not resolve the ball."""
 
 
 def findings() -> Iterator[Finding]:
@@ -48,7 +48,7 @@ def findings() -> Iterator[Finding]:
 
 
 def error(name: ElementName, nu: float, contrast: float, cells: int = CELLS) -> float:
-    """Of what the ball adds to the displacement of the nodes, relative, or of all if it is none."""
+    """Relative error of what the ball adds to the displacement, of the whole if it adds nothing."""
     ball = BallInclusion.stiffer(RADIUS, contrast, Tissue(poisson_ratio=nu), STRAIN)
     mesh = block_mesh((2.0 * HALF,) * 3, 2.0 * HALF / cells)
     centred = TetrahedralMesh(mesh.points - HALF, mesh.tetrahedra)

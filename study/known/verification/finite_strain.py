@@ -26,7 +26,7 @@ from study.problem.tissue import Tissue
 Floats = NDArray[np.float64]
 
 EDGE = 0.04
-"""Of the cube [m]."""
+"""Edge of the cube [m]."""
 STRETCH = 0.7
 RATIOS = (0.3, 0.499, 0.4999)
 SHAPE = 3.0

@@ -46,7 +46,7 @@ COARSEST, GROWTH, HALVINGS = 2, 1.0, 40
 """Cells along the block, growth of the elements away from the tool, and rounds of bisection."""
 LIMIT = 1e-2
 STIFF = 1e7
-"""Of springs that hold nodes, over the largest stiffness of any."""
+"""Stiffness of the springs that hold nodes, over the largest stiffness of any node."""
 CASES = (
     ("sliding sphere", SPHERE, False, "p2", 0.45),
     ("sliding punch", PUNCH, False, "p2", 0.45),
@@ -114,7 +114,7 @@ def quarter(tissue: Tissue, element: str, finest: float, *, flat: bool) -> Body:
 
 
 def quarter_mesh(finest: float, *, flat: bool) -> TetrahedralMesh:
-    """Its elements, `finest` [m] long at most where they have to be short."""
+    """Mesh of the quarter; edges are at most `finest` [m] at the contact or a punch's edge."""
     mesh = block_mesh((SIZE, SIZE, SIZE), SIZE / COARSEST)
     mesh = TetrahedralMesh(mesh.points * [1.0, 1.0, -1.0], mesh.tetrahedra[:, [0, 2, 1, 3]])
     for _ in range(HALVINGS):

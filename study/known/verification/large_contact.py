@@ -50,7 +50,8 @@ FINEST, IN_SLIP, AT_EDGE = 0.5, 0.35, 1 / 8
 dragged and slips in a ring, and at the edge of a punch, where the pressure is singular, over its
 radius."""
 FRICTION, DRAGGED, DRAGGED_NU = 0.3, (0.5, 1.0), 0.4999
-"""Of the sphere that is dragged, and to what fractions of the force at which it slides."""
+"""Coefficient of friction of the dragged sphere, tangential forces as shares of the one at which it
+slides, and the Poisson ratio under it."""
 ALONG, TOUCHING = np.array([1.0, 0.0, 0.0]), 1e-9
 
 
@@ -120,10 +121,10 @@ def _framed(bare: Body, planes: Sequence[bool]) -> Body:
 
 
 def drags(finest: float) -> list[tuple[float, float]]:
-    """Tangential over normal force of a sphere that is dragged, as it should be and as found.
+    """Tangential over normal force of a dragged sphere: the closed form and the computed one.
 
     A half of a half space without change of volume, elements `finest` times the radius of contact;
-    the far faces are moved as those of the half space are by the exact forces.
+    the far faces are displaced as those of the half space are by the exact forces.
     """
     tissue = Tissue(poisson_ratio=DRAGGED_NU)
     bare = _half(tissue, finest * indentation.TOUCHED)
@@ -168,7 +169,7 @@ def drags(finest: float) -> list[tuple[float, float]]:
 
 
 def _half(tissue: Tissue, finest: float) -> Body:
-    """Two quarters, one the other's image."""
+    """Half of the half space: a quarter and its mirror image."""
     mesh = indentation.quarter_mesh(finest, flat=False)
     image = mesh.points * [-1.0, 1.0, 1.0]
     points, place = np.unique(

@@ -30,7 +30,7 @@ STRETCHES = 100
 LOOKS = 100
 """Energies per stretch, over which the mean is taken."""
 SETTLING = 25
-"""Stretches before the hundred."""
+"""Stretches that are left out before those whose drift is measured."""
 SHARE = 0.1
 """Time step over the critical one."""
 RESOLVED = 1e-3

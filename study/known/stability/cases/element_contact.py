@@ -112,7 +112,7 @@ def beside_organ() -> Finding:
 
 
 def _quiet(_: float) -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 def _block() -> Body:

@@ -98,7 +98,7 @@ def layer(element: str, contrast: float) -> Finding:
 
 
 def lattice_layer(contrast: float) -> Finding:
-    """The same for springs with nu 1/4, on a fixed base."""
+    """Displacement of a layered lattice of springs with nu 1/4, on a fixed base."""
     make = Make(counts=(2, 2, 3), spacing=CELL)
     body, material = _lattice(make, varied(contrast, Tissue(youngs_modulus=make.youngs_modulus)))
     nodes = body.lattice.nodes
