@@ -131,6 +131,42 @@ def test_the_support_takes_what_a_tool_gives(shape):
     assert taken @ DOWN == pytest.approx(-(rest.forces[0] @ DOWN), rel=1e-6)
 
 
+class Clamped:
+    """A support that fixes the base, and what else a condition on its points tells."""
+
+    def __init__(self, also):
+        self.also = also
+
+    def density(self, points, normals):
+        return np.zeros(np.broadcast_shapes(points.shape, normals.shape)[:-1])
+
+    def fixed(self, points, normals):
+        held = (normals @ DOWN > 0.9) | self.also(points)
+        return np.repeat(held[..., None], 3, axis=-1)
+
+
+@pytest.mark.parametrize("tops", [0.0, 0.016], ids=["a side", "a side and part of the top"])
+def test_what_is_clamped_stays_under_a_tool_and_bears_what_reaches_it(tops):
+    """A plate presses on a block up to its clamped side, and beyond on what is clamped itself."""
+    clamped = Clamped(lambda x: (x[..., 0] < 1e-9) | ((x[..., 2] > 0.029) & (x[..., 0] < tops)))
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    body = discretise(block_mesh(SIZE, 0.015), TISSUE, clamped, blunt, "p2")
+    rest = at_peak(body, (tool(PLATE, depth=1e-3),), observed(0.4, 41, 15))
+    assert not rest.displacement[body.fixed].any()
+    pushed = np.where(body.fixed, 0.0, rest.nodal_forces[0])
+    assert body.stiffness @ rest.displacement == pytest.approx(pushed, abs=1e-9)
+    assert -(rest.forces[0] @ DOWN) > 0.5
+
+
+def test_a_tool_on_nothing_but_what_is_clamped_is_refused():
+    clamped = Clamped(lambda x: x[..., 2] > 0.029)
+    body = discretise(
+        block_mesh(SIZE, 0.015), TISSUE, clamped, ToolPatch(TOP, DOWN, 0.02, 0.0), "p2"
+    )
+    with pytest.raises(ValueError, match=r"tool: touches only what the support fixes; move tool"):
+        at_peak(body, (tool(),), observed(0.4, 41, 15))
+
+
 def test_a_plate_on_a_column_is_uniaxial_compression():
     """Force E A d / L of a column of nu 0 that is shortened by d in all, its base held stiffly."""
     tissue = Tissue(poisson_ratio=0.0)
