@@ -16,7 +16,8 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from fem_reference.elasticity import Body, rows
+from fem_reference.assembly import rows
+from fem_reference.elasticity import Body
 from study.problem.rigid import SPHERE, RigidTool
 
 Floats = NDArray[np.float64]
