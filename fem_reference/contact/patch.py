@@ -142,6 +142,24 @@ def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
     return Patch(tool, points, *known, tangents, (first, second))
 
 
+def on_free_nodes(found: Patch, fixed: Bools | None) -> Patch:
+    """The patch without vertices whose nodes the support holds against the tool.
+
+    They have no compliance. Their penetration is reported as that of any other point. ValueError
+    for a patch without other vertices.
+    """
+    if fixed is None:
+        return found
+    held = (fixed.reshape(-1, 3) & (found.tool.axis != 0.0)).any(axis=1)
+    free = np.asarray(abs(found.spread)[~held].sum(axis=0)) > LEAST_SHARE
+    if not free.any():
+        raise ValueError(
+            f"{found.tool.name}: touches only what the support fixes; move "
+            f"{found.tool.name}.place, or reduce support.depth"
+        )
+    return replace(found, shares=found.shares[np.flatnonzero(free)])
+
+
 def _tangents(normals: Floats) -> Floats:
     """Two tangent unit vectors (2, q, 3) whose cross product is the normal (q, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]

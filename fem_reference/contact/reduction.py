@@ -11,7 +11,7 @@ Laborde and Renard (2008), Eur. J. Mech. A 27:918. The static residuals are thos
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,9 +25,9 @@ from fem_reference.contact.linear import (
     LinearContact,
     SurfaceResponse,
 )
-from fem_reference.contact.patch import LEAST_SHARE, Patch, patch
+from fem_reference.contact.patch import on_free_nodes, patch
 from fem_reference.direct import Solve
-from fem_reference.elasticity import Body, Booleans
+from fem_reference.elasticity import Body
 from fem_reference.memory import factors_fit
 from fem_reference.solvers import by_factors, solver
 from fem_reference.subspace import Subspace, empty, extended
@@ -121,7 +121,7 @@ def contact_response(
     looked = np.unique(np.append(looked, [times[-1], peak]))
     for k in range(WIDENED + 1):
         patches = [
-            _on_free_nodes(patch(body, one, looked, 2.0**k * _margin(one, times)), body.fixed)
+            on_free_nodes(patch(body, one, looked, 2.0**k * _margin(one, times)), body.fixed)
             for one in tools
         ]
         contact = LinearContact.of(patches)
@@ -138,24 +138,6 @@ def contact_response(
         if deep <= OVERLOOKED * max(map(_travelled, tools, [times] * len(tools))):
             break
     return found
-
-
-def _on_free_nodes(found: Patch, fixed: Booleans | None) -> Patch:
-    """The patch without vertices whose nodes the support holds against the tool.
-
-    They have no compliance. Their penetration is reported as that of any other point. ValueError
-    for a patch without other vertices.
-    """
-    if fixed is None:
-        return found
-    held = (fixed.reshape(-1, 3) & (found.tool.axis != 0.0)).any(axis=1)
-    free = np.asarray(abs(found.spread)[~held].sum(axis=0)) > LEAST_SHARE
-    if not free.any():
-        raise ValueError(
-            f"{found.tool.name}: touches only what the support fixes; move "
-            f"{found.tool.name}.place, or reduce support.depth"
-        )
-    return replace(found, shares=found.shares[np.flatnonzero(free)])
 
 
 def _refuse_many(vertices: int) -> None:
