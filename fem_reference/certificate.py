@@ -209,6 +209,8 @@ class Comparison:
         `row` (nodes,): interpolation weights of the point.
         """
         forces = np.kron(row[:, None], np.eye(3))
+        if self.body.fixed is not None:
+            forces[self.body.fixed] = 0.0  # which do not move
         solutions = np.column_stack([self.solve(force) for force in forces.T])
         balanced = _stiffness_times(self.body, solutions)
         error = np.linalg.norm((forces - balanced) / np.sqrt(self.bound.diagonal)[:, None])

@@ -1,9 +1,4 @@
-"""Linear elasticity on tetrahedra: the stiffness, mass, support and load of a body.
-
-Isotropic elasticity is a sum of scalar forms: with D_ij the integral of d_i u d_j v for one
-component, block (i, j) of the stiffness is lambda D_ji + mu D_ij, and on the diagonal the trace of
-D times mu as well. D is integrated once and serves any Lame constants.
-"""
+"""Linear elasticity on tetrahedra: the stiffness, mass, support and load of a body."""
 
 from __future__ import annotations
 
@@ -15,39 +10,37 @@ import numpy as np
 import skfem
 from numpy.typing import NDArray
 from scipy.sparse import (
-    bsr_array,
     coo_array,
     csc_array,
     csr_array,
     diags_array,
-    eye_array,
-    hstack,
-    kron,
 )
-from skfem.models.elasticity import lame_parameters
 
+from fem_reference.assembly import (
+    MASS_ORDER,
+    by_component,
+    by_order,
+    composed,
+    elastic_stiffness,
+    finite,
+    gradient_order,
+    rows,
+)
 from fem_reference.elements import AUTO, ELEMENTS, ElementName, chosen_element
 from fem_reference.forms import Gradients, Pattern, gradients, pattern, products
 from fem_reference.grid import CurvedMapping, Projection, curved, mapping, straight
-from fem_reference.stiffness import Pressure, Stiffness
+from fem_reference.stiffness import Stiffness
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.tetrahedra import volumes
 from study.problem.contact import ToolPatch
-from study.problem.heterogeneous import Composition, Moduli, barycentric_samples, composition
+from study.problem.heterogeneous import Composition
 from study.problem.supports import Support
 from study.problem.tissue import Tissue
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
-# Degrees of quadrature. MASS_ORDER integrates squares of quadratic functions exactly. Load and
-# support vary inside a facet and need more. Gradients in curved cells are not polynomial.
-CURVED_ORDER = 4
-MASS_ORDER = 4
 FACET_ORDER = 10
-ENTRIES = 2**16
-"""Matrix blocks per batch."""
-ROUNDING = 1e-9
-"""Rounding of lambda, a difference of two moduli, relative to mu."""
+"""Degree of quadrature on facets, inside which load and support vary."""
 
 
 class Loaded(NamedTuple):
@@ -186,17 +179,19 @@ def discretise(
     given = (mesh, tissue, foundation, tool, element, project)
     name, surface = loaded or loaded_surface(*given)
     grid, one = surface.mesh, surface.elem
-    support = by_component(_finite(_foundation_form(foundation).assemble(surface), "the support"))
+    support = by_component(finite(_foundation_form(foundation).assemble(surface), "the support"))
     nodes = skfem.Basis(grid, one, mapping(grid), intorder=MASS_ORDER)
-    where, by_gradient = pattern(nodes), _by_order(nodes, _order(grid, name))
+    where, by_gradient = pattern(nodes), by_order(nodes, gradient_order(grid, name))
     made = composed(nodes, tissue)
     if isinstance(nodes.mapping, CurvedMapping):
         nodes.mapping.forget()
-    whole = by_component(_finite(_mass(nodes, where, tissue, made), "the mass"))
+    whole = by_component(finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)
     mass = decoupled(whole, fixed)
-    stiffness = _with_support(_elastic(integrals, nodes, name, tissue, made), support, fixed)
+    stiffness = _with_support(
+        elastic_stiffness(integrals, nodes, name, tissue, made), support, fixed
+    )
     load = without_fixed(patch_load(surface, tool), fixed)
     return Body(
         mesh,
@@ -242,30 +237,11 @@ def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
     return csc_array(coo_array(entries, shape=found.shape))
 
 
-def composed(nodes: Any, tissue: Tissue) -> Composition | None:
-    """Tissue of the cells of a basis, straight or curved; None for a homogeneous body."""
-
-    def points(cells: slice) -> Floats:
-        inside = np.ascontiguousarray(barycentric_samples()[:, 1:].T)
-        numbers = np.arange(cells.start, cells.stop)
-        return np.moveaxis(np.asarray(nodes.mapping.F(inside, tind=numbers)), 0, -1)
-
-    return composition(tissue, int(nodes.mesh.nelements), points)
-
-
 def _mass(nodes: Any, where: Pattern, tissue: Tissue, made: Composition | None) -> csr_array:
     """Mass matrix [kg] of one component."""
     if made is None:
         return tissue.density * products(nodes, where)
     return products(nodes, where, made.density(tissue.density))
-
-
-def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
-    """Lame constants [Pa], of one tissue or per cell (cells, 1)."""
-    if made is None:
-        return Moduli(*lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio))
-    found = made.moduli(tissue)
-    return Moduli(found.lame[:, None], found.shear[:, None])
 
 
 def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
@@ -279,7 +255,7 @@ def of_tissue(body: Body, tissue: Tissue, element: str = AUTO) -> Body:
     if ELEMENTS[name].shapes is not ELEMENTS[body.element].shapes:
         raise ValueError(f"reference.element: {name} has other nodes than {body.element}")
     pressure = body.stiffness.pressure
-    own = _elastic(body.gradients, body.nodes, name, tissue, body.composition, pressure)
+    own = elastic_stiffness(body.gradients, body.nodes, name, tissue, body.composition, pressure)
     return replace(body, element=name, stiffness=_with_support(own, body.support, body.fixed))
 
 
@@ -375,118 +351,6 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
         )
 
 
-def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
-    """Stiffness without support; Taylor-Hood elements have the volumetric part by the pressure."""
-    nodes = skfem.Basis(grid, ELEMENTS[name].shapes(), mapping(grid), intorder=_order(grid, name))
-    return _elastic(gradients(nodes, pattern(nodes)), nodes, name, tissue, composed(nodes, tissue))
-
-
-def _order(grid: Any, name: ElementName) -> int:
-    """Degree of the quadrature of the stiffness."""
-    return CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else ELEMENTS[name].gradient_order
-
-
-def _by_order(nodes: Any, order: int) -> Any:
-    """The basis with quadrature of another order, itself where that is the order of the mass."""
-    if order == MASS_ORDER:
-        return nodes
-    return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=order)
-
-
-def _elastic(
-    integrals: Gradients,
-    nodes: Any,
-    name: ElementName,
-    tissue: Tissue,
-    made: Composition | None = None,
-    pressure: Pressure | None = None,
-) -> Stiffness:
-    """Stiffness without support from its integrals, and from those of a known pressure if given."""
-    if made is not None:
-        return _varied(nodes, name, tissue, made)
-    lame, mu = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    mixed = ELEMENTS[name].mixed and lame > 0.0  # p = lambda div u needs lambda > 0
-    matrix = _isotropic(integrals, 0.0 if mixed else lame, mu)
-    if not mixed:
-        return Stiffness(matrix)
-    known = _pressure(nodes, name) if pressure is None else (pressure.divergence, pressure.mass)
-    return Stiffness(matrix, Pressure(*known, lame, mu))
-
-
-def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
-    """Stiffness without support of cells with moduli of their own, which weight the integrals.
-
-    The continuous pressure smears the jump of the exact one at an interface over the elements
-    there. ValueError for mixed elements with a Poisson ratio of 0.
-    """
-    where, by_gradient = pattern(nodes), _by_order(nodes, _order(nodes.mesh, name))
-    lame, mu = made.moduli(tissue)
-    by_shear = gradients(by_gradient, where, mu)
-    if not ELEMENTS[name].mixed:
-        return Stiffness(_isotropic(by_shear, 1.0, 1.0, gradients(by_gradient, where, lame)))
-    if not (lame > ROUNDING * mu).all():
-        raise ValueError(
-            "tissue.inclusion: a Poisson ratio of 0 has no pressure; enlarge its poisson_ratio, or "
-            "set reference.element to p2"
-        )
-    around, shear = lame_parameters(tissue.youngs_modulus, tissue.poisson_ratio)
-    coupling, mass = _pressure(nodes, name, around / lame)
-    _, schur = _pressure(nodes, name, 1.0 / lame + 1.0 / mu)
-    return Stiffness(_isotropic(by_shear, 0.0, 1.0), Pressure(coupling, mass, around, shear, schur))
-
-
-def _pressure(
-    nodes: Any, name: ElementName, density: Floats | None = None
-) -> tuple[csc_array, csc_array]:
-    """Integrals of divergence times pressure, and of pressure times pressure, by one quadrature.
-
-    The second have the factor `density` (cells,), if given.
-    """
-    grid, order = nodes.mesh, _order(nodes.mesh, name)
-    pressure = skfem.Basis(grid, skfem.ElementTetP1(), nodes.mapping, intorder=order)
-    basis = _by_order(nodes, order)
-    forms = [skfem.BilinearForm(lambda u, q, _, d=d: u.grad[d] * q) for d in range(3)]
-    parts = [_finite(one.assemble(basis, pressure), "the coupling") for one in forms]
-    by_node = np.arange(3 * basis.N).reshape(3, -1).T.ravel()
-    coupling = csc_array(csc_array(hstack(parts, format="csc"))[:, by_node])
-    return coupling, csc_array(products(pressure, pattern(pressure), density))
-
-
-def _isotropic(
-    integrals: Gradients, lame: float, mu: float, by_lame: Gradients | None = None
-) -> bsr_array:
-    """Blocks lambda D_ij + mu D_ji of the integrals, plus mu tr D for i = j.
-
-    `by_lame`: other integrals for lambda.
-    """
-    D = integrals.values
-    blocks = np.multiply(mu, D.mT, order="C")  # products copy any other memory order
-    with_lame = (integrals if by_lame is None else by_lame).values
-    for start in range(
-        0, len(blocks), ENTRIES
-    ):  # in batches, as a product has the size of the matrix
-        part = slice(start, start + ENTRIES)
-        blocks[part] += lame * with_lame[part]
-    diagonal = np.einsum("nii->ni", blocks)
-    diagonal += mu * np.einsum("nii->n", D)[:, None]
-    if not np.isfinite(blocks).all():
-        raise ValueError("the stiffness matrix is not finite: the mesh has a flat tetrahedron")
-    size = 3 * (len(integrals.indptr) - 1)
-    return bsr_array((blocks, integrals.indices, integrals.indptr), shape=(size, size))
-
-
-def by_component(matrix: csc_array) -> csc_array:
-    """The matrix of all three components from that of one."""
-    return csc_array(kron(matrix, eye_array(3), format="csc"))
-
-
-def _finite(matrix: Any, name: str) -> csc_array:
-    """ValueError for a matrix that is not finite: scikit-fem does not check the mesh."""
-    if not np.isfinite(matrix.data).all():
-        raise ValueError(f"{name} matrix is not finite: the mesh has a flat tetrahedron")
-    return csc_array(matrix)
-
-
 def _foundation_form(foundation: Support) -> Any:
     return skfem.BilinearForm(lambda u, v, w: foundation.density(rows(w.x), rows(w.n)) * u * v)
 
@@ -497,8 +361,3 @@ def patch_load(surface: Any, tool: ToolPatch) -> Floats:
     nodal = np.asarray(form.assemble(surface))
     total = float(nodal.sum())
     return np.outer(nodal * (tool.force / total), tool.direction).ravel()
-
-
-def rows(values: Any) -> Floats:
-    """Array (3, ...) of scikit-fem as (..., 3)."""
-    return np.moveaxis(np.asarray(values), 0, -1)

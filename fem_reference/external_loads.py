@@ -10,15 +10,8 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from fem_reference.elasticity import (
-    FACET_ORDER,
-    Body,
-    by_component,
-    decoupled,
-    patch_load,
-    rows,
-    without_fixed,
-)
+from fem_reference.assembly import by_component, rows
+from fem_reference.elasticity import FACET_ORDER, Body, decoupled, patch_load, without_fixed
 from study.problem.contact import ToolPatch, Weight
 from study.problem.problem import Problem
 

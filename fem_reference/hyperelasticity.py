@@ -16,7 +16,8 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-from fem_reference.elasticity import Body, Booleans, cell_moduli, decoupled, rows
+from fem_reference.assembly import cell_moduli, rows
+from fem_reference.elasticity import Body, Booleans, decoupled
 from fem_reference.elements import ELEMENTS
 from fem_reference.laws import DEFAULT, IDENTITY, LAWS, Law
 from study.problem.heterogeneous import Composition

@@ -19,7 +19,7 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-from fem_reference.elasticity import MASS_ORDER, cell_moduli, rows
+from fem_reference.assembly import MASS_ORDER, cell_moduli, rows
 from fem_reference.forms import pattern, products
 from fem_reference.grid import mapping
 from fem_reference.hyperelasticity import by_positive_weights, flat

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import cg
 
+from fem_reference.assembly import cell_moduli, rows
 from fem_reference.direct import Solve
-from fem_reference.elasticity import Body, cell_moduli, rows
+from fem_reference.elasticity import Body
 from fem_reference.grid import Projection
 from study.problem.tissue import Tissue
 

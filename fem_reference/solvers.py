@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.direct import IMBALANCE, Solve, factorised
-from fem_reference.elasticity import Body
+from fem_reference.elasticity import Body, without_fixed
 from fem_reference.iterative import Solver, iterative
 from fem_reference.memory import factors_fit
 
@@ -20,19 +20,30 @@ TOLERANCE = 1e-10
 def solver(body: Body, tolerance: float = TOLERANCE) -> Solver:
     """Solver of K u = f to a residual of `tolerance` times f, or to rounding.
 
-    Each call of an iterative solver may give its own tolerance and start vector.
+    Each call of an iterative solver may give its own tolerance and start vector. Forces on
+    constrained unknowns are left to the support.
     """
-    if body.unknowns > FACTORED_BELOW:
-        return _with_direct_fallback(body, iterative(body, tolerance))
-    solve = by_factors(body)
-    return lambda load, *_, **__: solve(load)
+    if body.unknowns <= FACTORED_BELOW:
+        direct = by_factors(body)
+        return lambda load, *_, **__: direct(load)
+    solve = _with_direct_fallback(body, iterative(body, tolerance))
+
+    def of_free(
+        load: Floats, tolerance: float | None = None, start: Floats | None = None
+    ) -> Floats:
+        return solve(without_fixed(load, body.fixed), tolerance, start)
+
+    return of_free
 
 
 def by_factors(body: Body) -> Solve:
-    """Direct solver of K u = f; the pressures are not returned."""
+    """Direct solver of K u = f; the pressures are not returned.
+
+    Forces on constrained unknowns are left to the support.
+    """
     solve, size = factorised(body.stiffness.system()), body.stiffness.size
     padding = np.zeros(body.unknowns - size)
-    return lambda load: solve(np.concatenate([load, padding]))[:size]
+    return lambda load: solve(np.concatenate([without_fixed(load, body.fixed), padding]))[:size]
 
 
 def _with_direct_fallback(body: Body, iterations: Solver) -> Solver:

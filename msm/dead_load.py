@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from study.numerics.continuation import Increments, follow
 
 from msm.kernel import kernel
 from msm.kinematics import cross, deformation, dot
 from msm.laws import Law
 from msm.network import Network
 from msm.relaxation import relax
+from study.numerics.continuation import Increments, follow
 from study.problem.unfinished import UnfinishedError
 
 Floats = NDArray[np.float64]
@@ -74,14 +74,17 @@ def unloaded_network(law: Law, net: Network, dead_load: Floats) -> tuple[Network
     def rest(start: _Unloaded, factor: float) -> _Unloaded:
         return _unloaded(law, net, dead_load, start, factor)
 
-    found = follow(_Unloaded(0.0, np.zeros_like(dead_load)), (1.0,), rest, INCREMENTS)
+    def shape(found: _Unloaded, _: int) -> Floats:
+        return found.shape
+
+    found = follow(_Unloaded(0.0, np.zeros_like(dead_load)), (1.0,), rest, shape, INCREMENTS)
     if found.failure:
         part = f", but for {100.0 * found.reached:.2g} % of the load" if found.reached else ""
         raise NoEquilibriumError(
             f"gravity.given: no unloaded shape was found that sags to the given one{part}",
             "reduce gravity.acceleration, or set gravity.given to unloaded",
         )
-    unloaded = found.rests[-1].shape
+    unloaded = found.states[-1]
     return from_shape(net, unloaded), dead_load + _foundation(net) @ unloaded
 
 

@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial import cKDTree
 
 from fem_reference import model as fem
-from fem_reference.contact import law
+from fem_reference.contact import large_motion, law
 from fem_reference.contact.law import ComplementarityProblem, frictional_forces, frictionless_forces
 from fem_reference.contact.motion import ContactProblem, at_peak, run
 from fem_reference.contact.patch import patch
@@ -130,6 +130,57 @@ def test_the_support_takes_what_a_tool_gives(shape):
     taken = (body.support @ rest.displacement).reshape(-1, 3).sum(axis=0)
     assert rest.forces[0] == pytest.approx(-rest.nodal_forces[0].reshape(-1, 3).sum(axis=0))
     assert taken @ DOWN == pytest.approx(-(rest.forces[0] @ DOWN), rel=1e-6)
+
+
+class Clamped:
+    """A support that fixes the base, and what else a condition on its points tells."""
+
+    def __init__(self, also):
+        self.also = also
+
+    def density(self, points, normals):
+        return np.zeros(np.broadcast_shapes(points.shape, normals.shape)[:-1])
+
+    def fixed(self, points, normals):
+        held = (normals @ DOWN > 0.9) | self.also(points)
+        return np.repeat(held[..., None], 3, axis=-1)
+
+
+@pytest.mark.parametrize("tops", [0.0, 0.016], ids=["a side", "a side and part of the top"])
+def test_what_is_clamped_stays_under_a_tool_and_bears_what_reaches_it(tops):
+    """A plate presses on a block up to its clamped side, and beyond on what is clamped itself."""
+    clamped = Clamped(lambda x: (x[..., 0] < 1e-9) | ((x[..., 2] > 0.029) & (x[..., 0] < tops)))
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    body = discretise(block_mesh(SIZE, 0.015), TISSUE, clamped, blunt, "p2")
+    rest = at_peak(body, (tool(PLATE, depth=1e-3),), observed(0.4, 41, 15))
+    assert not rest.displacement[body.fixed].any()
+    pushed = np.where(body.fixed, 0.0, rest.nodal_forces[0])
+    assert body.stiffness @ rest.displacement == pytest.approx(pushed, abs=1e-9)
+    assert -(rest.forces[0] @ DOWN) > 0.5
+
+
+def test_beside_what_is_clamped_large_strain_has_the_force_of_small_as_its_limit(monkeypatch):
+    """Two solvers that share the patch alone, the one with free unknowns, the other with all."""
+    monkeypatch.setattr(large_motion, "POINTWISE", 0.0)  # the elements of small strain
+    clamped = Clamped(lambda x: (x[..., 0] < 1e-9) | ((x[..., 2] > 0.029) & (x[..., 0] < 0.016)))
+    blunt = ToolPatch(TOP, DOWN, 0.02, 0.0)
+    body = discretise(block_mesh(SIZE, 0.015), TISSUE, clamped, blunt, "taylor-hood")
+    plate = tool(PLATE, depth=1e-5)
+    linear = at_peak(body, (plate,), observed(0.4, 41, 15)).forces[0] @ DOWN
+    given = large_motion.contact_problem(
+        body, TISSUE, (plate,), DAMPING, np.zeros_like, np.linspace(0.0, 0.2, 5)
+    )
+    state = large_motion.Integrator(given).peak_equilibrium(0.15, np.zeros(given.body.solid.size))
+    assert given.tool_forces(state)[0] @ DOWN == pytest.approx(linear, rel=2e-3)
+
+
+def test_a_tool_on_nothing_but_what_is_clamped_is_refused():
+    clamped = Clamped(lambda x: x[..., 2] > 0.029)
+    body = discretise(
+        block_mesh(SIZE, 0.015), TISSUE, clamped, ToolPatch(TOP, DOWN, 0.02, 0.0), "p2"
+    )
+    with pytest.raises(ValueError, match=r"tool: touches only what the support fixes; move tool"):
+        at_peak(body, (tool(),), observed(0.4, 41, 15))
 
 
 def test_a_plate_on_a_column_is_uniaxial_compression():

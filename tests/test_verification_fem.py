@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.sparse import block_array, csc_array
 from scipy.special import jv
 
-from fem_reference import dynamics, elasticity, memory
+from fem_reference import assembly, dynamics, elasticity, memory
 from fem_reference.contact.kinematics import Configuration
 from fem_reference.dynamics import Oscillator, march
 from fem_reference.elasticity import discretise
@@ -107,24 +107,25 @@ def fails(problem):
 
 def softer(monkeypatch):
     """Young's modulus too low by one per cent."""
-    exact = elasticity.lame_parameters
-    monkeypatch.setattr(elasticity, "lame_parameters", lambda E, nu: exact(0.99 * E, nu))
+    exact = assembly.lame_parameters
+    monkeypatch.setattr(assembly, "lame_parameters", lambda E, nu: exact(0.99 * E, nu))
 
 
 def more_compressible(monkeypatch):
     """Poisson ratio too low by one per cent."""
-    exact = elasticity.lame_parameters
-    monkeypatch.setattr(elasticity, "lame_parameters", lambda E, nu: exact(E, 0.99 * nu))
+    exact = assembly.lame_parameters
+    monkeypatch.setattr(assembly, "lame_parameters", lambda E, nu: exact(E, 0.99 * nu))
 
 
 def coarse_quadrature(monkeypatch):
     """One point per element, which leaves quadratic elements with mechanisms."""
-    for name, one in elasticity.ELEMENTS.items():
-        monkeypatch.setitem(elasticity.ELEMENTS, name, replace(one, gradient_order=1))
+    for name, one in assembly.ELEMENTS.items():
+        monkeypatch.setitem(assembly.ELEMENTS, name, replace(one, gradient_order=1))
 
 
 def coarse_mass(monkeypatch):
-    monkeypatch.setattr(elasticity, "MASS_ORDER", 2)
+    for module in (assembly, elasticity):
+        monkeypatch.setattr(module, "MASS_ORDER", 2)
 
 
 def weak_foundation(monkeypatch):

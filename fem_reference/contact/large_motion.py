@@ -26,7 +26,7 @@ from fem_reference.contact.equilibrium import (
     NoEquilibriumError,
 )
 from fem_reference.contact.kinematics import Configuration, FiniteContact, PreviousState
-from fem_reference.contact.patch import Patch, patch
+from fem_reference.contact.patch import Patch, on_free_nodes, patch
 from fem_reference.elasticity import Body
 from fem_reference.hyperelasticity import largest_log_strain
 from fem_reference.mixed_strain import on_nodes, relieved
@@ -86,7 +86,7 @@ def _patch(body: Body, tool: RigidTool, times: Floats) -> Patch:
     if tool.shape == PUNCH and not tool.bonded:
         wide = replace(tool, radius=(1.0 + MARGIN) * tool.radius)
     found = patch(body, wide, _looked(tool, times), _margin(tool, times))
-    return replace(found, tool=tool)
+    return replace(on_free_nodes(found, body.fixed), tool=tool)
 
 
 def _looked(tool: RigidTool, times: Floats) -> Floats:

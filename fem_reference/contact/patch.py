@@ -16,7 +16,8 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from fem_reference.elasticity import Body, rows
+from fem_reference.assembly import rows
+from fem_reference.elasticity import Body
 from study.problem.rigid import SPHERE, RigidTool
 
 Floats = NDArray[np.float64]
@@ -139,6 +140,24 @@ def patch(body: Body, tool: RigidTool, times: Floats, margin: float) -> Patch:
     first, second = (_slopes(fine, inside, one) for one in tangents)
     known = _values(fine)[inside], shares[:, np.flatnonzero(inside)]
     return Patch(tool, points, *known, tangents, (first, second))
+
+
+def on_free_nodes(found: Patch, fixed: Bools | None) -> Patch:
+    """The patch without vertices whose nodes the support holds against the tool.
+
+    They have no compliance. Their penetration is reported as that of any other point. ValueError
+    for a patch without other vertices.
+    """
+    if fixed is None:
+        return found
+    held = (fixed.reshape(-1, 3) & (found.tool.axis != 0.0)).any(axis=1)
+    free = np.asarray(abs(found.spread)[~held].sum(axis=0)) > LEAST_SHARE
+    if not free.any():
+        raise ValueError(
+            f"{found.tool.name}: touches only what the support fixes; move "
+            f"{found.tool.name}.place, or reduce support.depth"
+        )
+    return replace(found, shares=found.shares[np.flatnonzero(free)])
 
 
 def _tangents(normals: Floats) -> Floats:

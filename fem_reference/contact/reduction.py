@@ -25,7 +25,7 @@ from fem_reference.contact.linear import (
     LinearContact,
     SurfaceResponse,
 )
-from fem_reference.contact.patch import patch
+from fem_reference.contact.patch import on_free_nodes, patch
 from fem_reference.direct import Solve
 from fem_reference.elasticity import Body
 from fem_reference.memory import factors_fit
@@ -120,7 +120,10 @@ def contact_response(
     looked = times[:: max(1, len(times) // LOOKS)]
     looked = np.unique(np.append(looked, [times[-1], peak]))
     for k in range(WIDENED + 1):
-        patches = [patch(body, one, looked, 2.0**k * _margin(one, times)) for one in tools]
+        patches = [
+            on_free_nodes(patch(body, one, looked, 2.0**k * _margin(one, times)), body.fixed)
+            for one in tools
+        ]
         contact = LinearContact.of(patches)
         columns = contact.nodal_forces.shape[1]
         _refuse_many(sum(one.count for one in patches))

@@ -35,7 +35,8 @@ import numpy as np
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from fem_reference.elasticity import Body, discretise, elastic
+from fem_reference.assembly import elastic
+from fem_reference.elasticity import Body, discretise
 from fem_reference.exchange import calculix
 from fem_reference.exchange.nodal import nodal_problem
 from fem_reference.grid import straight

@@ -15,7 +15,8 @@ import skfem
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fem_reference.elasticity import Body, discretise, loaded_surface, rows
+from fem_reference.assembly import rows
+from fem_reference.elasticity import Body, discretise, loaded_surface
 from fem_reference.elements import AUTO
 from fem_reference.observation import at_points, evaluation, largest_strain
 from fem_reference.subspace import Subspace, ritz_subspace, superposition

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, eye_array, kron
 from skfem.models.poisson import mass as product
 
+from fem_reference.assembly import elastic, rows
 from fem_reference.direct import factorised
-from fem_reference.elasticity import FACET_ORDER, elastic, rows
+from fem_reference.elasticity import FACET_ORDER
 from fem_reference.elements import ELEMENTS, ElementName
 from fem_reference.stiffness import Stiffness
 from study.problem.tissue import Tissue

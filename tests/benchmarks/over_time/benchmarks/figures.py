@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.elasticity import Body, discretise, elastic
+from fem_reference.assembly import elastic
+from fem_reference.elasticity import Body, discretise
 from fem_reference.grid import straight
 from fem_reference.solvers import solve_static
 from fem_reference.subspace import ritz_subspace
