@@ -399,7 +399,7 @@ def test_pivots_of_a_matrix_that_rounding_could_turn_are_not_trusted(rng):
 
 
 def test_what_the_page_shows_bounds_each_frame(bodies):
-    page = (Path(__file__).parents[1] / "docs" / "models.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[1] / "docs" / "superposition.md").read_text(encoding="utf-8")
     block = next(text for text in page.split("```python\n")[1:] if "CertifiedMotion" in text)
     shown: dict[str, object] = {}
     exec(block.split("```")[0], shown)  # noqa: S102 - what is run is our own page

@@ -9,9 +9,9 @@ kept. Errors are those of the nonlinear part, as there.
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from study.problem.problem import Problem
 from study.scene import Scene
 from study.scene.problem import problem_of
 from study.tradeoff.timing import in_turns
-from tests.benchmarks.corrected_places import SMALL, by_frames, written
+from tests.benchmarks.corrected_places import SMALL, by_frames
 from tests.benchmarks.corrected_runs import LEVEL, VECTORS
 from tests.benchmarks.graded_places import (
     FINEST,
@@ -42,6 +42,7 @@ from tests.benchmarks.graded_places import (
     size,
 )
 from tests.benchmarks.planned_places import WANTED
+from tests.benchmarks.tables import complete, read
 
 Floats = NDArray[np.float64]
 
@@ -131,23 +132,16 @@ def corrected(given: Scene, problem: Problem, offered: Sequence[GradedLook]) -> 
 
 def kept() -> list[Row]:
     """Rows of the table that are there."""
-    if not OWN.exists():
-        return []
-    with OWN.open(encoding="utf-8") as file:
-        whole = {"levels", "nodes"}
-        return [
-            Row(**{k: int(v) if k in whole else float(v) for k, v in one.items()})  # type: ignore[arg-type]
-            for one in csv.DictReader(file)
-        ]
+    return read(OWN, Row)
 
 
 def main() -> None:
     """Write the table, after each place."""
-    found = kept()
-    for one in sorted(known(), key=lambda one: -one["strain"]):
-        if one["strain"] > SMALL[1] and (one["at_x"], one["at_z"]) not in {r[:2] for r in found}:
-            found += rows(one)
-            written(OWN, found)
+    places = sorted(known(), key=lambda one: -one["strain"])
+    tasks = {
+        (one["at_x"], one["at_z"]): partial(rows, one) for one in places if one["strain"] > SMALL[1]
+    }
+    complete(OWN, Row, tasks, lambda row: (row.at_x, row.at_z))
 
 
 if __name__ == "__main__":
