@@ -26,7 +26,7 @@ NAMES = {
     "msm-mamdani": "lattice, Mamdani",
     "msm-sugeno": "lattice, Sugeno",
     "msm-interval-type-2": "lattice, interval type-2",
-    "reading": "lattice, the reading as it is",
+    "reading": "lattice, elastography reading",
 }
 LATTICES = {("0.25", "False"): "0.25, springs", ("0.45", "False"): "0.45, springs alone"} | {
     ("0.45", "True"): "0.45, with the volume term",

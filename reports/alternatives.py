@@ -1,4 +1,4 @@
-"""What the figures of a report show, in words for whoever does not see them."""
+"""Alternative texts of the figures of a report, for readers who cannot see them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FIXED = {
     "are in the table of sets",
     "surfaces": "Estimated stiffness over two readings, a surface for each fuzzy system; the "
     "estimates at the scene's readings are in the table of estimates",
-    "sensitivity": "How far each open choice moves the estimate of each system; the largest are "
+    "sensitivity": "Change of the estimate of each system by each open choice; the largest are "
     "named in the findings, all are in sensitivity.csv",
     "tool_force": "Force of each tool over time and over its travel; the largest are in the table "
     "that follows",
@@ -39,7 +39,7 @@ def alternatives(results: Results) -> dict[str, list[str]]:
             for group in probe_groups(results)
         ],
         "budget": [_budgets(results) or "Error budgets of the displacement field"],
-        "cut": [f"Displacement in a cut through the tool's axis, a panel a model. {found}".strip()],
+        "cut": [f"Displacement in a cut through the tool axis, a panel per model. {found}".strip()],
         "fields": [f"Difference from the finite elements on the surface. {found}".strip()],
         "rules": [f"Rules of {name} that fire, and its output" for name in view_names(results)],
     }

@@ -1,4 +1,4 @@
-"""What the difference of each lattice from a reference is made of, as sentences and tables."""
+"""Error budgets: the causes of each lattice's difference from a reference, as text and tables."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from study.results.folder import Results
 from study.results.records import BudgetPart, ErrorBudget
 
 CAUSES = {"stiffness": "estimate of stiffness"}
-"""Causes that read better otherwise, against finite elements."""
+"""Names of causes in print, against finite elements."""
 SMALL = 5e-4
 """Share below which a contribution is printed as zero."""
 
 
 def budgets(results: Results) -> list[dict[str, object]]:
-    """A table per reference: a row a cause, two columns a model, contribution and what is left."""
+    """A table per reference: a row per cause; per model contribution, its error and remainder."""
     return [_table(results, reference, of) for reference, of in by_reference(results).items()]
 
 
@@ -32,7 +32,7 @@ def by_reference(results: Results) -> dict[str, list[ErrorBudget]]:
 def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[str, object]:
     causes = [part.cause for part in found[0].parts]
     rows: Table = [
-        ["whole", *(c for one in found for c in (resolved(one.total, one.total_error), DASH, ""))]
+        ["total", *(c for one in found for c in (resolved(one.total, one.total_error), DASH, ""))]
     ]
     for i, cause in enumerate(causes):
         cells = [text for one in found for text in _cells(one.parts[i])]
@@ -68,20 +68,23 @@ def signed(share: float) -> str:
 
 
 def sentences(results: Results) -> Iterator[str]:
-    """Whether a better estimate would help, and what else would: of the nearest model."""
+    """The error budget of the nearest model: what remains after each correction; the main cause."""
     found = by_reference(results).get("fem")
     if not found:
         return
     named = labels(results)
     nearest = min(found, key=lambda one: one.total)
     parts = [part for part in nearest.parts if part.cause != "remainder" and part.size >= SMALL]
-    steps = ", ".join(f"{cause_name(part.cause, 'fem')} {percent(part.left)}" for part in parts)
+    steps = ", ".join(
+        f"{cause_name(part.cause, 'fem')} {fixed(100.0 * part.left, 1)} %" for part in parts
+    )
     if steps:
         yield (
-            f"Error budget: the field of {named[nearest.model]} is {percent(nearest.total)} off "
-            f"the finite elements; mending one cause after another leaves: {steps}."
+            f"Error budget: the field of {named[nearest.model]} differs from the finite elements "
+            f"by {percent(nearest.total)}. Remaining difference as the causes are corrected one "
+            f"after another: {steps}."
         )
     largest = max(parts, key=lambda part: part.contribution, default=None)
     if largest is not None:
         name = cause_name(largest.cause, "fem")
-        yield f"The largest part of that is the {name}, {signed(largest.contribution)}."
+        yield f"The largest cause is the {name}, {signed(largest.contribution)}."

@@ -175,4 +175,4 @@ def _scale(figure: Figure, axes: list[Axes], levels: Floats, lengths: list[Float
         format="%.2g",
     )
     bar.ax.grid(visible=False)
-    bar.set_label("length of the displacement [mm]", labelpad=1)
+    bar.set_label("displacement magnitude [mm]", labelpad=1)

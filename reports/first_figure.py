@@ -1,4 +1,4 @@
-"""The figure of the first page: curves at the tool, and what the nearest model's error is of."""
+"""The figure of the first page: curves at the tool, and the error budget of the nearest model."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COLUMNS, SHORT = 3, 18
 
 
 def first_figure(results: Results) -> bytes | None:
-    """SVG of the displacement at the tool, and the waterfall of the nearest model if it has one."""
+    """SVG of the displacement at the tool, and the budget of the nearest model if it has one."""
     found = motions(results, tool_probe(results))
     if not found:
         return None
@@ -60,14 +60,16 @@ def budget_of_nearest(results: Results) -> ErrorBudget | None:
 
 
 def caption(results: Results) -> str:
-    """What the figure shows, as its caption says it."""
-    band = "; the band is the type-2 interval" if results.bands else ""
-    said = (
-        f"Displacement at the control point {tool_probe(results)} along the push, over time{band}. "
+    """The caption of the figure."""
+    band = "; the band is the type-2 stiffness interval" if results.bands else ""
+    text = (
+        f"Curves: displacement at the control point {tool_probe(results)} along the push, over "
+        f"time{band}. "
     )
     if budget_of_nearest(results) is not None:
-        said += (
-            "Waterfall: what the difference of the nearest model's field from the reference at the "
-            "peak is made of; blue shrinks it, orange makes it grow."
+        text += (
+            "Bars: error budget of the nearest model, whose field differs from the reference at "
+            "the peak load. Blue: correcting the cause reduces the difference; orange: it "
+            "increases it."
         )
-    return said
+    return text

@@ -1,4 +1,4 @@
-"""Tables of the fuzzy systems: where their sets come from, and what moves their estimates."""
+"""Tables of the fuzzy systems: sources of their sets, and sensitivity of their estimates."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def within_systems(found: Iterable[SensitivityEntry]) -> list[SensitivityEntry]:
 
 
 def system_changes(results: Results) -> Table:
-    """How far the estimates [kPa] of two systems are apart: here, rms and largest over readings."""
+    """Differences [kPa] between the estimates of two systems: here, rms and largest."""
     return [_system_row(one) for one in results.sensitivity if one.choice == SYSTEM]
 
 
@@ -66,7 +66,7 @@ def _system_row(entry: SensitivityEntry) -> list[str]:
 
 
 def sensitivity_sentences(results: Results) -> list[str]:
-    """Which choices move the estimate more than the choice of system does."""
+    """Choices that change the estimate by more than the choice of system does."""
     span = between_systems(results.sensitivity)
     if span is None:
         return []
@@ -76,31 +76,32 @@ def sensitivity_sentences(results: Results) -> list[str]:
     lesser = {entry.choice for entry in others if entry.rms_change_pa > span[0]}
     lesser -= {entry.choice for entry in above}
     first = (
-        f"Open choices: two systems differ by {low} to {high} kPa (rms over a spread of readings)."
+        f"Open choices: the estimates of two systems differ by {low} to {high} kPa (rms over "
+        "sampled readings)."
     )
-    return [" ".join([first, *_movers(above), *_lesser(lesser)])]
+    return [" ".join([first, *_larger(above), *_lesser(lesser)])]
 
 
-def _movers(above: Sequence[SensitivityEntry]) -> Iterator[str]:
-    """The largest of each choice, of entries in falling order."""
+def _larger(above: Sequence[SensitivityEntry]) -> Iterator[str]:
+    """The largest effect of each choice, of entries in falling order."""
     if not above:
-        yield "No choice within a system moves its estimate further."
+        yield "No choice within a system has a larger effect."
         return
     largest: dict[str, SensitivityEntry] = {}
     for entry in above:
         largest.setdefault(entry.choice, entry)
     parts = [
-        words(f"{heading(entry)} {entry.alternative} ({system_name(entry.system)} ")
-        + f"by {_kilo(entry.rms_change_pa)} kPa)"
+        words(f"{heading(entry)} {entry.alternative} ({system_name(entry.system)}, ")
+        + f"{_kilo(entry.rms_change_pa)} kPa)"
         for entry in largest.values()
     ]
-    yield f"Further than that move an estimate: {'; '.join(parts)}."
+    yield f"Choices with a larger effect: {'; '.join(parts)}."
 
 
 def _lesser(choices: set[str]) -> Iterator[str]:
     names = [choice_name(choice) for choice in CHOICE_NAMES if choice in choices]
     if names:
-        yield f"Between the two lie: {', '.join(names)}."
+        yield f"Choices with an effect within that range: {', '.join(names)}."
 
 
 def set_rows(results: Results) -> Table:

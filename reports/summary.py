@@ -1,4 +1,4 @@
-"""What a run found: one row per model and a few sentences, for the first page."""
+"""Findings of a run: one row per model, and sentences."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ GLANCE = (
     "modulus [kPa]",
     "÷ reference",
     "peak at tool [mm]",
-    "field differs from FE",
-    "at best factor",
-    "× real time",
+    "field difference from FE",
+    "at best scale factor",
+    "real-time factor",
     "status",
 )
 ALWAYS = ("model", "status")
@@ -103,8 +103,10 @@ def printed_peak(results: Results, model: ModelRecord, probe: str) -> str:
 
 
 def real_time_factor(model: ModelRecord) -> str:
-    """Simulated over wall time of a model as printed, a dash where it was not timed."""
-    return significant(model.simulated_s / model.wall_s, 2) if model.wall_s else DASH
+    """Simulated over wall time as printed, a dash where a model was not timed or ended early."""
+    if not model.wall_s or model.status != "finished":
+        return DASH
+    return significant(model.simulated_s / model.wall_s, 2)
 
 
 def _own(error: float | None) -> str:
@@ -134,7 +136,7 @@ def status(model: ModelRecord) -> str:
 
 
 def sentences(results: Results) -> list[str]:
-    """What this run found, in a few sentences."""
+    """Findings of the run, in sentences."""
     return [
         *_estimates(results),
         *sensitivity_sentences(results),
@@ -163,8 +165,9 @@ def _estimates(results: Results) -> Iterator[str]:
             low, high = one.interval_pa
             verb = "contains" if low <= reference <= high else "does not contain"
             yield (
-                f"The interval of {system_name(name)}, {fixed(low / PA_PER_KPA, 2)} to "
-                f"{fixed(high / PA_PER_KPA, 2)} kPa, {verb} the reference modulus."
+                f"The stiffness interval of the fuzzy system {system_name(name)}, "
+                f"{fixed(low / PA_PER_KPA, 2)} to {fixed(high / PA_PER_KPA, 2)} kPa, {verb} the "
+                "reference modulus."
             )
 
 
@@ -180,8 +183,8 @@ def _fields(results: Results) -> Iterator[str]:
         ranked = sorted(found, key=lambda model: found[model])
         parts = [f"{named[model]} {resolved(found[model], error)}" for model in ranked]
         yield (
-            "Field: at peak load the displacement over the whole organ differs from that of the "
-            f"finite elements by, in relative L2, {', '.join(parts)}."
+            "Field: relative L2 difference of the displacement over the whole organ from the "
+            f"finite elements at the peak load: {', '.join(parts)}."
         )
 
 
@@ -190,17 +193,17 @@ def _limits(results: Results) -> Iterator[str]:
     if limits is not None:
         parts = [f"{resolved(share, error)} {place}" for share, place in _by_place(limits)]
         yield (
-            "Limit of the springs: at rest and with the exact modulus the lattice's field still "
-            f"differs, in relative L2: {', '.join(parts)}."
+            "Limit of the spring lattice: at rest and with the exact modulus, the relative L2 "
+            f"difference of its field from finite elements is {', '.join(parts)}."
         )
 
 
 def _by_place(limits: LatticeLimits) -> Iterator[tuple[float, str]]:
     yield limits.relative_l2, f"at Poisson ratio {limits.poisson_ratio:g}"
-    yield limits.relative_l2_at_best_factor, "at best factor"
+    yield limits.relative_l2_at_best_factor, "at the best scale factor"
     yield limits.relative_l2_at_quarter, "against Poisson ratio 0.25"
     if limits.relative_l2_with_volume_term is not None:
-        place = "with one volume term per cell, which frees the Poisson ratio"
+        place = "with one volume term per cell, which corrects the Poisson ratio"
         yield limits.relative_l2_with_volume_term, place
 
 
@@ -210,30 +213,30 @@ def _rankings(results: Results) -> Iterator[str]:
         found = list(leads(results, reference, probe))
         if found:
             yield (
-                f"Similarity of the fuzzy systems to {reference_name(results, reference)} at "
-                f"control point "
-                f"{words(probe)}: {_winners(found, named)}{_elsewhere(results, reference, probe)}"
+                f"Similarity of the fuzzy-tuned models to {reference_name(results, reference)} at "
+                f"the control point {words(probe)}: {_winners(found, named)}"
+                f"{_elsewhere(results, reference, probe)}"
             )
             yield from _first_ranks(results, reference, probe)
             yield from _baseline(results, reference, probe)
 
 
 def _first_ranks(results: Results, reference: str, probe: str) -> Iterator[str]:
-    """How often each model is first alone, or shares that with those it is not told apart from."""
+    """In how many measures each model is first, alone or with others within the error."""
     named, parts = labels(results), list[str]()
     for model, ranks in rank_table(results, reference, probe).items():
         alone, shared = times_first(ranks)
         if alone or shared:
-            parts.append(f"{named[model]} alone on {alone}, shared on {shared}")
+            parts.append(f"{named[model]} alone in {alone}, shared in {shared}")
     yield (
-        f"First rank against {reference_name(results, reference)} at {words(probe)}, of "
-        f"{len(columns(results))} measures and all models, ties within the error of the "
-        f"difference: {'; '.join(parts)}."
+        f"First rank against {reference_name(results, reference)} at the control point "
+        f"{words(probe)}, in {len(columns(results))} measures (models whose difference is within "
+        f"its error share a rank): {'; '.join(parts)}."
     )
 
 
 def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
-    """How often the reading without any fuzzy system is nearer than all of them."""
+    """In how many measures the reading without a fuzzy system scores above all of them."""
     scores = score_table(results, reference, probe)
     own = scores.get("reading")
     tuned = [scores[m.name] for m in results.record.models if m.system and m.name in scores]
@@ -242,24 +245,25 @@ def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
     shared = [column for column in own if all(column in row for row in tuned)]
     ahead = sum(own[column] > max(row[column] for row in tuned) for column in shared)
     verb = "scores" if ahead else "never scores"
-    of = f" by {ahead} of {len(shared)} measures" if ahead else ""
+    of = f" in {ahead} of {len(shared)} measures" if ahead else ""
     yield (
-        f"The reading as it is, without any fuzzy system, {verb} higher than every fuzzy system "
-        f"against {reference_name(results, reference)} at {words(probe)}{of}."
+        f"{labels(results)['reading']}, which uses no fuzzy system, {verb} higher than every "
+        f"fuzzy-tuned model against {reference_name(results, reference)} at the control point "
+        f"{words(probe)}{of}."
     )
 
 
 def _winners(found: list[Lead], named: dict[str, str]) -> str:
-    """Who scored highest by how many measures, and how many of the leads are resolved."""
+    """The models with the highest scores, and how many of their leads are resolved."""
     counts = _times_highest(found)
     if not counts:
-        return f"the two highest scores are equal on all {len(found)} measures."
+        return f"the two highest scores are equal in all {len(found)} measures."
     (first, most), *others = counts
-    parts = [f"{named[first]} scores highest on {most} of {len(found)} measures"]
-    parts += [f"{named[model]} on {times}" for model, times in others]
+    parts = [f"{named[first]} scores highest in {most} of {len(found)} measures"]
+    parts += [f"{named[model]} in {times}" for model, times in others]
     ends = min(found, key=lambda lead: lead.margin), max(found, key=lambda lead: lead.margin)
     span = spread([printed_margin(lead) for lead in ends])
-    return f"{', '.join(parts)}; leads over the next: {span}. {_resolution(found)}"
+    return f"{', '.join(parts)}; lead over the second: {span}. {_resolution(found)}"
 
 
 def printed_margin(lead: Lead) -> str:
@@ -273,7 +277,7 @@ def _times_highest(found: list[Lead]) -> list[tuple[str, int]]:
 
 
 def _elsewhere(results: Results, reference: str, probe: str) -> str:
-    """Who scored highest how often at the other control points."""
+    """The models with the highest scores at the other control points."""
     others = [name for name in results.record.probes if name != probe]
     found = [lead for other in others for lead in leads(results, reference, other)]
     named = labels(results)
@@ -281,16 +285,16 @@ def _elsewhere(results: Results, reference: str, probe: str) -> str:
     if not parts:
         return ""
     return (
-        f" Highest at the other control points, of {len(found)} scores: {', '.join(parts)}. "
-        f"{_resolution(found)}"
+        f" Number of highest scores at the other control points, of {len(found)}: "
+        f"{', '.join(parts)}. {_resolution(found)}"
     )
 
 
 def _resolution(found: list[Lead]) -> str:
     counts = {
-        "{} above the errors of the difference": True,
+        "{} resolved": True,
         "{} not resolved": False,
-        "{} beside a numerical error that is not known": None,
+        "{} with a numerical error that is not known": None,
     }
     parts = [
         text.format(n)
@@ -300,8 +304,8 @@ def _resolution(found: list[Lead]) -> str:
     turned = sum(lead.hangs_on_view for lead in found)
     exceed = {0: "All exceed their", 1: "1 does not exceed its"}
     verb = exceed.get(turned, f"{turned} do not exceed their")
-    view = f" {verb} spread over windows of the motion and axes of the phase plane."
-    return f"Of these leads {', '.join(parts)}.{view}"
+    view = f" {verb} range over time windows and scalings of the phase plane."
+    return f"Of these leads: {', '.join(parts)}.{view}"
 
 
 def _reference(results: Results) -> Iterator[str]:
@@ -316,11 +320,11 @@ def _reference(results: Results) -> Iterator[str]:
         worst, probe = error.worst, tool_probe(results)
         there = error.by_probe[probe]
         yield (
-            "Reference: its own discretisation error is estimated from "
-            f"{min(len(model.elements.levels), 3)} meshes at {percent(error.field_peak)} of the "
-            f"field at the peak and at most {percent(worst.displacement)} of a displacement and "
-            f"{percent(worst.velocity)} of a velocity curve ({percent(there.displacement)} and "
-            f"{percent(there.velocity)} at control point {words(probe)})."
+            "Reference: its discretisation error, estimated from "
+            f"{min(len(model.elements.levels), 3)} meshes, is {percent(error.field_peak)} of the "
+            f"field at the peak load and at most {percent(worst.displacement)} of a displacement "
+            f"and {percent(worst.velocity)} of a velocity curve ({percent(there.displacement)} and "
+            f"{percent(there.velocity)} at the control point {words(probe)})."
         )
     strain, limit = model.largest_strain, results.record.strain_limit
     if strain is not None and model.elements.law is not None:
@@ -330,19 +334,19 @@ def _reference(results: Results) -> Iterator[str]:
         beyond = _large_strain(model.elements.large_strain) if strain > limit else ""
         side = "below" if strain < limit else "not below"
         yield (
-            f"Its largest strain is {percent(strain)}, {side} the {percent(limit)} up to "
-            f"which linear strain is trusted here.{beyond}"
+            f"Its largest strain is {percent(strain)}, {side} the limit of {percent(limit)} "
+            f"assumed for linear strain.{beyond}"
         )
 
 
 def _large_strain(found: LargeStrain | None) -> str:
-    """What large deformation changes where linear strain is not trusted, if it was computed."""
+    """The effect of large deformation where the strain is beyond the limit, if computed."""
     if found is None:
         return ""
     law = LAWS.get(found.law, found.law)
     return (
-        f" A {law} solid on the same mesh moves otherwise by {percent(found.field_difference)} "
-        f"of the field at the peak (relative L2; largest logarithmic strain "
-        f"{percent(found.largest_strain)}): so much of a difference from the linear reference "
-        "may be large deformation, which that leaves out."
+        f" The field of a {law} solid on the same mesh differs by "
+        f"{percent(found.field_difference)} at the peak load (relative L2; largest logarithmic "
+        f"strain {percent(found.largest_strain)}). A difference of this size from the linear "
+        "reference may be due to large deformation, which the reference neglects."
     )

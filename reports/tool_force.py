@@ -1,4 +1,4 @@
-"""What rigid tools feel: force over time and over depth, and the largest of it."""
+"""Contact force of rigid tools over time and over travel, and its largest value."""
 
 from __future__ import annotations
 

@@ -462,7 +462,7 @@ def test_two_models_of_one_name_are_refused():
         list(models_of(scene, {}))
 
 
-def test_the_reading_as_it_is_needs_no_fuzzy_system():
+def test_the_model_of_the_reading_needs_no_fuzzy_system():
     scene = read_scene("paper", ("models=['basafa','reading']", "patient.hbv='4 kPa'"))
     found = run_study(scene)
     assert not found.record.fuzzy.systems
@@ -470,7 +470,7 @@ def test_the_reading_as_it_is_needs_no_fuzzy_system():
     assert {row.model for row in found.scores} == {"reading"}
 
 
-def test_the_reading_as_it_is_needs_a_reading():
+def test_the_model_of_the_reading_needs_a_reading():
     with pytest.raises(ValueError, match="models: reading needs a reading"):
         validate({"organ": {"shape": "point"}, "models": ["basafa", "reading"]}, "own.toml")
 

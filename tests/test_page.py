@@ -163,7 +163,7 @@ def test_a_difference_below_the_error_of_the_reference_is_not_resolved():
 
 def test_a_diverged_model_is_told_and_never_the_nearest():
     results = with_model(results_of(), "basafa", status="diverged", ended_at_s=0.25)
-    assert "Basafa benchmark diverged at 0.250 s" in said(results)
+    assert "Basafa benchmark diverged at 0.250 s: do not use it" in said(results)
     assert nearest(results).model.name != "basafa"
 
 
@@ -204,7 +204,7 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
         for m in MODELS[1:]
     )
     found = said(with_record(results_of(), budgets=budgets))
-    assert "The largest cause of the difference is the Poisson ratio, +20.0 % of 40.0 %." in found
+    assert "the Poisson ratio, which contributes +20.0 % to a total of 40.0 %." in found
     assert "lattice.volume_term = true" in found
 
 

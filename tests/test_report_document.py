@@ -311,12 +311,12 @@ def test_the_document_holds_the_numbers_of_the_run():
     said = " ".join(content["summary"])
     assert "12.00 to 14.00 kPa, 1.20 to 1.40 times the reference modulus of 10 kPa" in said
     assert "does not contain the reference modulus" in said
-    assert "Its largest strain is 4.0 %, below the 5.0 %" in said
+    assert "Its largest strain is 4.0 %, below the limit of 5.0 %" in said
 
 
 def test_a_larger_strain_is_said_to_be_too_large():
     results = with_model(results_of(), "fem", largest_strain=0.06)
-    assert "6.0 %, not below the 5.0 %" in " ".join(document(results)["summary"])
+    assert "6.0 %, not below the limit of 5.0 %" in " ".join(document(results)["summary"])
 
 
 TOY = "toy"

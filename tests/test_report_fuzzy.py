@@ -263,12 +263,12 @@ def test_the_changes_between_two_systems_are_in_kilopascal(results):
 def test_the_summary_names_what_moves_the_estimate_more_than_the_system(results):
     (sentence,) = sensitivity_sentences(results)
     assert "two systems differ by 0.35 to 1.13 kPa (rms" in sentence
-    assert "Sugeno's weights: sum → max (Sugeno by 4.05 kPa)" in sentence
-    assert "Between the two lie: reading of Table I." in sentence
+    assert "Sugeno's weights: sum → max (Sugeno, 4.05 kPa)" in sentence
+    assert "Choices with an effect within that range: reading of Table I." in sentence
     assert "integration" not in sentence
     calm = tuple(row for row in ROWS if row.choice in ("system", "sampling"))
     (sentence,) = sensitivity_sentences(replace(results, sensitivity=calm))
-    assert "No choice within a system moves its estimate further." in sentence
+    assert "No choice within a system has a larger effect." in sentence
 
 
 def test_sets_without_a_full_source_are_marked(results):

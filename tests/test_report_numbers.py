@@ -42,6 +42,7 @@ from study.results.records import CurveErrors
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
     FUZZY,
+    LABELS,
     MODELS,
     SOFTNESS,
     results_of,
@@ -199,7 +200,7 @@ def test_equal_scores_have_no_winner():
     results = results_of([*FUZZY[:2], "fem"])
     results = replace(results, scores=tuple(row._replace(score=0.5) for row in results.scores))
     assert all(lead.is_resolved is False for lead in leads(results, "fem", "tool"))
-    assert "the two highest scores are equal on all 7 measures" in " ".join(sentences(results))
+    assert "the two highest scores are equal in all 7 measures" in " ".join(sentences(results))
     cells = [
         c for t in similarity_tables(results) for g in t["groups"] for r in g["rows"] for c in r
     ]
@@ -245,7 +246,7 @@ def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own
     table = glance(results)
     rows = {row[0]: dict(zip(table["header"], row, strict=True)) for row in table["rows"]}
     sugeno = rows["MSM Sugeno"]
-    assert (sugeno["field differs from FE"], sugeno["at best factor"]) == (whole, at_best)
+    assert (sugeno["field difference from FE"], sugeno["at best scale factor"]) == (whole, at_best)
     assert f"MSM Sugeno {whole}" in " ".join(sentences(results))
     row = next(row for row in error_rows(results) if row[:2] == ["Finite elements", "MSM Sugeno"])
     assert row[2:] == [whole, "50.0 %", "10.0 %", at_best, "1.300"]
@@ -253,14 +254,14 @@ def test_a_difference_below_the_error_of_the_finite_elements_is_not_resolved(own
 
 def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
     said = " ".join(sentences(results_of(["fem", *FUZZY])))
-    assert said.count("Of these leads 7 above the errors of the difference.") == 2
+    assert said.count("Of these leads: 7 resolved.") == 2
     results = results_of(["fem", *FUZZY])
     by_probe = results.model("fem").mesh_error.by_probe
     by_probe = by_probe | {"far": CurveErrors(displacement=0.2, velocity=0.2)}
     results = with_mesh_error(results, by_probe=by_probe)
     said = " ".join(sentences(results))
-    assert said.count("Of these leads 7 above the errors of the difference.") == 1
-    assert said.count("Of these leads 7 not resolved.") == 1
+    assert said.count("Of these leads: 7 resolved.") == 1
+    assert said.count("Of these leads: 7 not resolved.") == 1
 
 
 def test_the_error_of_the_finite_elements_hides_no_difference_from_the_benchmark():
@@ -274,13 +275,22 @@ def test_the_limits_of_the_springs_are_compared_with_that_error_too():
     assert document(results)["limits"]["at_quarter"] == "not resolved (< 6.0 %)"
     assert document(results)["limits"]["whole"] == "24.0 %"
     said = " ".join(sentences(results))
-    assert "24.0 % at Poisson ratio 0.45, 23.0 % at best factor" in said
+    assert "24.0 % at Poisson ratio 0.45, 23.0 % at the best scale factor" in said
     assert "not resolved (< 6.0 %) against Poisson ratio 0.25" in said
     assert "5.0 % against Poisson ratio 0.25" in " ".join(sentences(differences(0.03)))
 
 
+def test_a_diverged_model_has_no_real_time_factor():
+    """Its wall time is that of a part of the motion."""
+    column = glance(results_of())["header"].index("real-time factor")
+    row = LABELS.index("Basafa benchmark")
+    assert glance(results_of())["rows"][row][column] != "–"
+    lost = with_model(results_of(), "basafa", status="diverged", ended_at_s=0.06)
+    assert glance(lost)["rows"][row][column] == "–"
+
+
 def test_the_reference_shows_its_own_error_in_place_of_a_difference():
-    column = glance(results_of())["header"].index("field differs from FE")
+    column = glance(results_of())["header"].index("field difference from FE")
     assert glance(results_of())["rows"][0][column] == "± 3.0 %"
     assert glance(differences(None))["rows"][0][column] == "–"
 
@@ -325,8 +335,8 @@ def test_curves_are_drawn_in_millimetres_between_the_bounds_of_an_interval():
 
 def test_a_column_that_no_model_fills_is_left_out():
     results = results_of(["basafa", *FUZZY])
-    assert "field differs from FE" not in glance(results)["header"]
-    assert "field differs from FE" in glance(results_of())["header"]
+    assert "field difference from FE" not in glance(results)["header"]
+    assert "field difference from FE" in glance(results_of())["header"]
 
 
 def test_table_iii_stands_beside_the_range_of_all_measures():
@@ -369,9 +379,9 @@ def test_leads_that_another_window_or_other_axes_may_turn_are_counted():
         rows = tuple(row._replace(**spread) for row in results.score_differences)
         return " ".join(sentences(replace(results, score_differences=rows)))
 
-    assert "All exceed their spread over windows" in said(window=0.0, normalised=0.0)
-    assert " 7 do not exceed their spread over windows" in said(window=1.0, normalised=0.0)
-    assert " 7 do not exceed their spread over windows" in said(window=0.0, normalised=1.0)
+    assert "All exceed their range over time windows" in said(window=0.0, normalised=0.0)
+    assert " 7 do not exceed their range over time windows" in said(window=1.0, normalised=0.0)
+    assert " 7 do not exceed their range over time windows" in said(window=0.0, normalised=1.0)
 
 
 def hyperelastic(results):
@@ -403,13 +413,13 @@ def test_hyperelastic_elements_are_what_fields_differ_from(small_results):
     linear, renamed = small_results, hyperelastic(small_results)
     assert finite_elements(renamed).name == "hyperelastic"
     assert own_error(renamed) == own_error(linear) > 0.0
-    column = glance(linear)["header"].index("field differs from FE")
+    column = glance(linear)["header"].index("field difference from FE")
     assert [row[column] for row in glance(renamed)["rows"]] == [
         row[column] for row in glance(linear)["rows"]
     ]
     said = " ".join(sentences(renamed))
     assert "largest logarithmic strain" in said
-    assert "linear strain is trusted" not in said
+    assert "assumed for linear strain" not in said
     how = reference(renamed)["how"]
     assert how.startswith("Neo-Hookean elasticity on")
     assert "implicit steps of SDIRK2" in how

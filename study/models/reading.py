@@ -15,7 +15,7 @@ from study.models.model import Estimates, ModelKind
 from study.models.tissue import of_modulus
 from study.scene import Scene
 
-NAME, LABEL = "reading", "MSM reading as is"
+NAME, LABEL = "reading", "MSM reading"
 
 
 def modulus(scene: Scene) -> float:
@@ -47,8 +47,8 @@ def assumptions(scene: Scene) -> list[str]:
     return [
         *on_organ,
         *springs(scene),
-        "The model of the reading as it is takes Young's modulus from elastography without any "
-        "fuzzy system, of several readings their geometric mean: what a fuzzy system must beat.",
+        "MSM reading takes Young's modulus from the elastography reading without a fuzzy system, "
+        "or from the geometric mean of several readings. It is the baseline of the fuzzy systems.",
     ]
 
 

@@ -51,9 +51,11 @@ TIME_HISTORY = (
 )
 PHASE_PLANE = (
     # Distances on axes divided by the reference's largest absolute value.
-    Measure("frechet", "1 / (1 + d); d = largest gap, best walk forward on both", frechet_score),
+    Measure("frechet", "1 / (1 + d); d = discrete Fréchet distance", frechet_score),
     Measure("area", "1 / (1 + d); d = area between the curves, ends joined", area_score),
-    Measure("pcm", "1 / (1 + d); d = mean gap, shorter curve slid along the longer", pcm_score),
+    Measure(
+        "pcm", "1 / (1 + d); d = mean distance, shorter curve shifted along the longer", pcm_score
+    ),
 )
 MEASURES: dict[str, tuple[Measure, ...]] = {
     "displacement": TIME_HISTORY,
