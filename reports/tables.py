@@ -285,7 +285,7 @@ def _formula_row(name: str, text: str) -> list[str]:
 
 
 def error_rows(results: Results) -> Table:
-    """Field differences and best factor of each model from each reference."""
+    """Field differences and best scale factor of each model from each reference."""
     named = labels(results)
     return [
         [
