@@ -41,7 +41,7 @@ def test_placements_that_are_none(lines, message):
         read_abaqus(text.encode())
 
 
-@pytest.mark.parametrize("word", ["x", "1.5", "9" * 30, "\xa0x5", "5\x1c", "", "<n>"])
+@pytest.mark.parametrize("word", ["x", "1.5", "1_3", "9" * 30, "\xa0x5", "5\x1c", "", "<n>"])
 def test_numbers_that_are_none_are_named_with_their_line(word):
     text = keyword_text() + f"49, 1, 2, {word}, 5\n"
     with pytest.raises(MeshError, match="line 80: "):

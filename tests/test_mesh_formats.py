@@ -170,6 +170,13 @@ def test_obj_numbers_that_are_no_coordinates(tmp_path, value):
         load_text(tmp_path, "organ.obj", text)
 
 
+@pytest.mark.parametrize("word", ["0_0.0", "1_0"])
+def test_a_number_with_an_underscore_is_none(tmp_path, word):
+    text = obj(*cube_surface()).replace("v 0.0 0.0 0.0", f"v {word} 0 0")
+    with pytest.raises(MeshError, match=rf"expected 3 numbers, found `{word} 0 0`"):
+        load_text(tmp_path, "organ.obj", text)
+
+
 # ---- VTK ---------------------------------------------------------------------------------------
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -318,16 +319,16 @@ def _integers(
                 f"line {line}: element {row[0].strip()[:20]} has {len(row) - 1} nodes, "
                 f"{element_type} needs {nodes}"
             )
-    try:
-        return np.array(rows).astype(np.int64)
-    except (ValueError, OverflowError):
-        line, bad = next(
-            (line, word)
-            for line, row in zip(lines, rows, strict=True)
-            for word in row
-            if not re.fullmatch(r"[ \t]*[+-]?[0-9]{1,18}[ \t]*", word)
-        )
-        raise MeshError(f"line {line}: `{bad.strip()[:40]}` is no node or element number") from None
+    if not any("_" in word for row in rows for word in row):  # Python reads 1_3 as 13
+        with suppress(ValueError, OverflowError):
+            return np.array(rows).astype(np.int64)
+    line, bad = next(
+        (line, word)
+        for line, row in zip(lines, rows, strict=True)
+        for word in row
+        if not re.fullmatch(r"[ \t]*[+-]?[0-9]{1,18}[ \t]*", word)
+    )
+    raise MeshError(f"line {line}: `{bad.strip()[:40]}` is no node or element number")
 
 
 # ---- Putting together --------------------------------------------------------------------------

@@ -37,7 +37,9 @@ def floats(lines: Sequence[NumberedLine], count: int) -> FloatArray:
         rows = np.array([words[:count] for _, words in lines], dtype=float)
     except ValueError:
         rows = np.empty((0, 0))
-    if rows.shape == (len(lines), count):
+    # Python reads 1_0 as 10, which no mesh file means.
+    grouped = any("_" in word for _, words in lines for word in words[:count])
+    if rows.shape == (len(lines), count) and not grouped:
         return rows
     if not lines:
         return np.empty((0, count))
@@ -56,4 +58,4 @@ def _is_number(word: str) -> bool:
         float(word)
     except ValueError:
         return False
-    return True
+    return "_" not in word
