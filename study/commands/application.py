@@ -19,7 +19,7 @@ from study.commands.compare import compare
 from study.commands.estimate import estimate
 from study.commands.export import export
 from study.commands.fit import fit
-from study.commands.flags import EXIT_BAD_INPUT, EXIT_MACHINE
+from study.commands.flags import EXIT_BAD_INPUT
 from study.commands.plan import plan
 from study.commands.recommend import recommend
 from study.commands.report import report
@@ -33,6 +33,7 @@ from study.commands.validate import validate
 from study.commands.verify import verify
 from study.commands.view import view
 from study.system import signals
+from study.system.signals import EXIT_MACHINE
 
 app = App(
     name="liver-study",

@@ -11,8 +11,6 @@ from cyclopts import Parameter, Token
 
 EXIT_FAILED_CHECK = 1
 EXIT_BAD_INPUT = 2
-EXIT_MACHINE = 3
-"""Exit code for no disk, no memory or a signal, and for a defect, whose traceback is printed."""
 
 Overrides = Annotated[list[str] | None, Parameter(name="--set")]
 """Flag --set: overrides of a scene, table.key=value."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 from cyclopts import Parameter
 
-from study.commands.flags import EXIT_FAILED_CHECK, EXIT_MACHINE, Overrides, Switch, WholeOrNone
+from study.commands.flags import EXIT_FAILED_CHECK, Overrides, Switch, WholeOrNone
 from study.system.folders import tell
+from study.system.signals import EXIT_MACHINE
 
 if TYPE_CHECKING:
     from study.results import Results

@@ -17,10 +17,10 @@ from fuzzy.liver.bases import KNOWLEDGE
 from fuzzy.liver.cohort import NOMINAL, CohortRow, CohortStudy, Comparison, cohort_study
 from fuzzy.liver.monotonicity import falls
 from fuzzy.liver.settings import LiverSettings
+from fuzzy.liver.stiffness import PA_PER_KPA
 from fuzzy.systems.kinds import SYSTEMS
 from fuzzy.systems.sets import Array
 
-PA_PER_KPA = 1e3
 LEGEND = """Errors of the estimated stiffness: bias and rms in kPa over all; rms in % of
 the true stiffness of those with one reading, with its 95 % interval, and of those with more (2+).
 Then the rms error in % of the displacement that follows, the share of patients within the type-2

@@ -12,7 +12,7 @@ from typing import NoReturn
 Handler = Callable[[int, FrameType | None], object]
 
 EXIT_MACHINE = 3
-"""Exit code when the machine or a person ends the program: no disk, no memory, a signal."""
+"""Exit code for no disk, no memory or a signal, and for a defect, whose traceback is printed."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some are missing on some systems
 
 _asked: list[int] = []
