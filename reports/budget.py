@@ -31,9 +31,7 @@ def by_reference(results: Results) -> dict[str, list[ErrorBudget]]:
 
 def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[str, object]:
     causes = [part.cause for part in found[0].parts]
-    rows: Table = [
-        ["whole", *(c for one in found for c in (resolved(one.total, one.total_error), DASH, ""))]
-    ]
+    rows: Table = [["whole", *(text for one in found for text in _whole(one))]]
     for i, cause in enumerate(causes):
         cells = [text for one in found for text in _cells(one.parts[i])]
         rows.append([cause_name(cause, reference), *cells])

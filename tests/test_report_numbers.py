@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reports import budget
 from reports.appearance import LOOKS, looks
 from reports.content import document
 from reports.differences import finite_elements, own_error
@@ -37,8 +38,9 @@ from reports.tables import (
     paper_rows,
     similarity_tables,
 )
+from reports.tool_force import overlap
 from study.models.hyperelastic import LAW, METHOD
-from study.results.records import CurveErrors
+from study.results.records import BudgetPart, CurveErrors, ErrorBudget
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
     FUZZY,
@@ -49,6 +51,7 @@ from tests.report_samples import (
     with_elements,
     with_mesh_error,
     with_model,
+    with_record,
     without_arrays,
 )
 
@@ -261,6 +264,48 @@ def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
     said = " ".join(sentences(results))
     assert said.count("Of these leads 7 above the errors of the difference.") == 1
     assert said.count("Of these leads 7 not resolved.") == 1
+
+
+def budgeted(total_error=0.02):
+    """Two parts of a difference of 0.4, and a remainder within rounding."""
+    parts = [
+        BudgetPart(cause=cause, size=size, contribution=share, left=left, error=error)
+        for cause, size, share, left, error in (
+            ("stiffness", 0.32, 0.3, 0.15, None),
+            ("lattice spacing", 0.12, 0.1, 0.0001, 0.02),
+            ("remainder", 0.0001, -0.0001, 0.0, 0.02),
+        )
+    ]
+    found = ErrorBudget(
+        model="msm-mamdani", reference="fem", total=0.4, total_error=total_error, parts=tuple(parts)
+    )
+    return with_record(results_of(), budgets=(found,))
+
+
+def test_a_budget_has_a_row_a_cause_and_the_error_of_the_whole():
+    (table,) = budget.budgets(budgeted())
+    assert [row[1:] for row in table["rows"]] == [
+        ["40.0 %", "± 2.0 %", ""],
+        ["+30.0 %", "", "15.0 %"],
+        ["+10.0 %", "± 2.0 %", "0"],
+        ["0", "± 2.0 %", "0"],
+    ]
+    (table,) = budget.budgets(budgeted(0.5))
+    assert table["rows"][0][1:] == ["not resolved (< 50.0 %)", "± 50.0 %", ""]
+    (table,) = budget.budgets(budgeted(None))
+    assert table["rows"][0][1:] == ["40.0 %", "–", ""]
+    told, largest = budget.sentences(budgeted())
+    assert "MSM Mamdani is 40.0 % off" in told
+    assert told.count("%") == 3
+    assert largest.endswith("+30.0 %.")
+
+
+def test_the_deepest_overlap_of_any_model_is_printed():
+    results = with_model(results_of(), "msm-mamdani", tool_overlap_m=1.26e-4)
+    assert overlap(results) == "0.13 mm"
+    results = with_model(results, "msm-sugeno", tool_overlap_m=2.5e-3)
+    assert overlap(results) == "2.5 mm"
+    assert overlap(results_of()) == ""
 
 
 def test_the_error_of_the_finite_elements_hides_no_difference_from_the_benchmark():
