@@ -38,9 +38,10 @@ from reports.tables import (
     paper_rows,
     similarity_tables,
 )
-from reports.tool_force import overlap
+from reports.tool_force import force_rows, overlap
 from study.models.hyperelastic import LAW, METHOD
-from study.results.records import BudgetPart, CurveErrors, ErrorBudget
+from study.results.records import BudgetPart, CurveErrors, ErrorBudget, ToolForce
+from study.results.tables import ToolForceScore
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
     FUZZY,
@@ -298,6 +299,36 @@ def test_a_budget_has_a_row_a_cause_and_the_error_of_the_whole():
     assert "MSM Mamdani is 40.0 % off" in told
     assert told.count("%") == 3
     assert largest.endswith("+30.0 %.")
+
+
+def test_the_table_of_tools_has_force_time_depth_and_work_in_its_units():
+    """[N], [s], [mm] and [mJ]; a score is printed to its error, 4 % of the force in all."""
+    planted = ToolForce(
+        model="msm-mamdani",
+        tool="tool",
+        peak_n=1.5,
+        peak_at_s=0.25,
+        peak_travel_m=4.2e-3,
+        work_j=3.15e-3,
+        relative_error=0.01,
+        spacing_error=0.03,
+    )
+    bare = replace(planted, model="msm-sugeno", relative_error=None, spacing_error=None)
+    results = with_record(results_of(), tools=(planted, bare))
+    scores = [
+        ToolForceScore(model, "fem", "tool", "force", measure, score)
+        for model, measure, score in (
+            ("msm-mamdani", "iso-18571", 0.1),
+            ("msm-mamdani", "relative-l2", 0.87654),
+            ("msm-sugeno", "relative-l2", 0.5),
+        )
+    ]
+    first, second = force_rows(replace(results, tool_scores=tuple(scores)))
+    assert first[:2] == ["tool", "MSM Mamdani"]
+    assert first[2:6] == ["1.50 ± 0.06", "0.250", "4.2", "3.15"]
+    assert first[6] == "0.88 (Finite elements)"
+    assert second[1:3] == ["MSM Sugeno", "1.50"]
+    assert second[6].startswith("0.5")
 
 
 def test_the_deepest_overlap_of_any_model_is_printed():
