@@ -10,6 +10,7 @@ import pytest
 
 from reports import budget
 from reports.appearance import LOOKS, looks
+from reports.certified import certified_rows
 from reports.content import document
 from reports.differences import finite_elements, own_error
 from reports.digits import (
@@ -40,7 +41,13 @@ from reports.tables import (
 )
 from reports.tool_force import force_rows, overlap
 from study.models.hyperelastic import LAW, METHOD
-from study.results.records import BudgetPart, CurveErrors, ErrorBudget, ToolForce
+from study.results.records import (
+    BudgetPart,
+    CertifiedReduction,
+    CurveErrors,
+    ErrorBudget,
+    ToolForce,
+)
 from study.results.tables import ToolForceScore
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
@@ -329,6 +336,25 @@ def test_the_table_of_tools_has_force_time_depth_and_work_in_its_units():
     assert first[6] == "0.88 (Finite elements)"
     assert second[1:3] == ["MSM Sugeno", "1.50"]
     assert second[6].startswith("0.5")
+
+
+def test_the_table_of_bounds_has_each_in_its_column_and_rounds_up():
+    """Of the curve, its largest [mm], of the energy, at rest, and by steps, by control point."""
+    bounds = CertifiedReduction(
+        vectors=7,
+        energy=0.0312,
+        rest=0.0051,
+        rounding=1e-9,
+        displacement={"tool": 0.0241, "far": 0.0625},
+        largest_m={"tool": 1.01e-4, "far": 2e-4},
+    )
+    by_step = CurveErrors(displacement=0.002, velocity=0.3)
+    results = with_elements(certified=bounds)
+    results = with_model(results, "fem", time_step_errors={"tool": by_step})
+    assert [row[2:] for row in certified_rows(results)] == [
+        ["2.5 %", "0.11", "3.2 %", "0.51 %", "0.2 %"],
+        ["6.3 %", "0.20", "3.2 %", "0.51 %", "–"],
+    ]
 
 
 def test_the_deepest_overlap_of_any_model_is_printed():
