@@ -31,9 +31,7 @@ def by_reference(results: Results) -> dict[str, list[ErrorBudget]]:
 
 def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[str, object]:
     causes = [part.cause for part in found[0].parts]
-    rows: Table = [
-        ["total", *(c for one in found for c in (resolved(one.total, one.total_error), DASH, ""))]
-    ]
+    rows: Table = [["total", *(text for one in found for text in _total(one))]]
     for i, cause in enumerate(causes):
         cells = [text for one in found for text in _cells(one.parts[i])]
         rows.append([cause_name(cause, reference), *cells])
@@ -45,7 +43,7 @@ def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[s
     }
 
 
-def _whole(budget: ErrorBudget) -> tuple[str, str, str]:
+def _total(budget: ErrorBudget) -> tuple[str, str, str]:
     error = DASH if budget.total_error is None else f"± {percent(budget.total_error)}"
     return resolved(budget.total, budget.total_error), error, ""
 

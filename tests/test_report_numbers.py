@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reports import budget
 from reports.appearance import LOOKS, looks
+from reports.certified import certified_rows
 from reports.content import document
 from reports.differences import finite_elements, own_error
 from reports.digits import (
@@ -37,8 +39,16 @@ from reports.tables import (
     paper_rows,
     similarity_tables,
 )
+from reports.tool_force import force_rows, overlap
 from study.models.hyperelastic import LAW, METHOD
-from study.results.records import CurveErrors
+from study.results.records import (
+    BudgetPart,
+    CertifiedReduction,
+    CurveErrors,
+    ErrorBudget,
+    ToolForce,
+)
+from study.results.tables import ToolForceScore
 from study.similarity.score import FORMULAS
 from tests.report_samples import (
     FUZZY,
@@ -50,6 +60,7 @@ from tests.report_samples import (
     with_elements,
     with_mesh_error,
     with_model,
+    with_record,
     without_arrays,
 )
 
@@ -262,6 +273,97 @@ def test_leads_at_the_other_control_points_are_said_to_be_resolved_or_not():
     said = " ".join(sentences(results))
     assert said.count("Of these leads: 7 resolved.") == 1
     assert said.count("Of these leads: 7 not resolved.") == 1
+
+
+def budgeted(total_error=0.02):
+    """Two parts of a difference of 0.4, and a remainder within rounding."""
+    parts = [
+        BudgetPart(cause=cause, size=size, contribution=share, left=left, error=error)
+        for cause, size, share, left, error in (
+            ("stiffness", 0.32, 0.3, 0.15, None),
+            ("lattice spacing", 0.12, 0.1, 0.0001, 0.02),
+            ("remainder", 0.0001, -0.0001, 0.0, 0.02),
+        )
+    ]
+    found = ErrorBudget(
+        model="msm-mamdani", reference="fem", total=0.4, total_error=total_error, parts=tuple(parts)
+    )
+    return with_record(results_of(), budgets=(found,))
+
+
+def test_a_budget_has_a_row_a_cause_and_the_error_of_the_whole():
+    (table,) = budget.budgets(budgeted())
+    assert [row[1:] for row in table["rows"]] == [
+        ["40.0 %", "± 2.0 %", ""],
+        ["+30.0 %", "", "15.0 %"],
+        ["+10.0 %", "± 2.0 %", "0"],
+        ["0", "± 2.0 %", "0"],
+    ]
+    (table,) = budget.budgets(budgeted(0.5))
+    assert table["rows"][0][1:] == ["not resolved (< 50.0 %)", "± 50.0 %", ""]
+    (table,) = budget.budgets(budgeted(None))
+    assert table["rows"][0][1:] == ["40.0 %", "–", ""]
+    told, largest = budget.sentences(budgeted())
+    assert "MSM Mamdani is 40.0 % off" in told
+    assert told.count("%") == 3
+    assert largest.endswith("+30.0 %.")
+
+
+def test_the_table_of_tools_has_force_time_depth_and_work_in_its_units():
+    """[N], [s], [mm] and [mJ]; a score is printed to its error, 4 % of the force in all."""
+    planted = ToolForce(
+        model="msm-mamdani",
+        tool="tool",
+        peak_n=1.5,
+        peak_at_s=0.25,
+        peak_travel_m=4.2e-3,
+        work_j=3.15e-3,
+        relative_error=0.01,
+        spacing_error=0.03,
+    )
+    bare = replace(planted, model="msm-sugeno", relative_error=None, spacing_error=None)
+    results = with_record(results_of(), tools=(planted, bare))
+    scores = [
+        ToolForceScore(model, "fem", "tool", "force", measure, score)
+        for model, measure, score in (
+            ("msm-mamdani", "iso-18571", 0.1),
+            ("msm-mamdani", "relative-l2", 0.87654),
+            ("msm-sugeno", "relative-l2", 0.5),
+        )
+    ]
+    first, second = force_rows(replace(results, tool_scores=tuple(scores)))
+    assert first[:2] == ["tool", "MSM Mamdani"]
+    assert first[2:6] == ["1.50 ± 0.06", "0.250", "4.2", "3.15"]
+    assert first[6] == "0.88 (Finite elements)"
+    assert second[1:3] == ["MSM Sugeno", "1.50"]
+    assert second[6].startswith("0.5")
+
+
+def test_the_table_of_bounds_has_each_in_its_column_and_rounds_up():
+    """Of the curve, its largest [mm], of the energy, at rest, and by steps, by control point."""
+    bounds = CertifiedReduction(
+        vectors=7,
+        energy=0.0312,
+        rest=0.0051,
+        rounding=1e-9,
+        displacement={"tool": 0.0241, "far": 0.0625},
+        largest_m={"tool": 1.01e-4, "far": 2e-4},
+    )
+    by_step = CurveErrors(displacement=0.002, velocity=0.3)
+    results = with_elements(certified=bounds)
+    results = with_model(results, "fem", time_step_errors={"tool": by_step})
+    assert [row[2:] for row in certified_rows(results)] == [
+        ["2.5 %", "0.11", "3.2 %", "0.51 %", "0.2 %"],
+        ["6.3 %", "0.20", "3.2 %", "0.51 %", "–"],
+    ]
+
+
+def test_the_deepest_overlap_of_any_model_is_printed():
+    results = with_model(results_of(), "msm-mamdani", tool_overlap_m=1.26e-4)
+    assert overlap(results) == "0.13 mm"
+    results = with_model(results, "msm-sugeno", tool_overlap_m=2.5e-3)
+    assert overlap(results) == "2.5 mm"
+    assert overlap(results_of()) == ""
 
 
 def test_the_error_of_the_finite_elements_hides_no_difference_from_the_benchmark():
