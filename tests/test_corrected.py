@@ -1,4 +1,4 @@
-"""The corrected lattice: linear elements plus what a coarse lattice does beyond itself linear."""
+"""The corrected lattice: linear elements plus the nonlinear part of a coarse lattice."""
 
 import dataclasses
 import pickle

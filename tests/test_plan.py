@@ -80,6 +80,25 @@ def test_most_accurate_that_keeps_the_rate_is_chosen_for_a_rate_alone():
     assert not any(in_time(one, 1000.0) for one in better)
 
 
+def test_steps_are_no_longer_than_the_time_between_the_states_of_a_rate():
+    """Or their cost would be that of a lower rate."""
+    exact = next(one for one in offered() if one.scene.models == ("superposition",))
+    assert exact.step > 1e-3
+    found = choose([exact], Require(rate=1000.0))
+    assert found.step == pytest.approx(1e-3)
+    assert found.wall_per_s == pytest.approx(1000.0 * exact.step_wall)
+
+
+def test_refusal_names_only_remedies_that_a_scene_can_take():
+    rough = [replace(one, prediction=Prediction((Part("spacing", 1.5),))) for one in offered()]
+    with pytest.raises(ValueError, match=r"is 150 %, by a .*: relax require\.rate") as error:
+        choose(rough, Require(error=0.1, rate=60.0))
+    assert "allow it" not in str(error.value), "the largest that can be required is 100 %"
+    with pytest.raises(ValueError, match=r"allow it, or refine") as error:
+        choose(offered(), Require(error=1e-4))
+    assert "rate" not in str(error.value)
+
+
 def test_memory_leaves_out_what_does_not_fit():
     smallest = min(one.memory for one in offered())
     assert choose(offered(), Require(memory=1.5 * smallest)).memory <= 1.5 * smallest
@@ -88,7 +107,7 @@ def test_memory_leaves_out_what_does_not_fit():
 @pytest.mark.parametrize(
     ("required", "said"),
     [
-        (Require(error=1e-4), r"require\.error: 0\.0 % is not expected of any model; the nearest"),
+        (Require(error=1e-4), r"require\.error: 0\.01 % is not expected of any model; the nearest"),
         (Require(memory=1.0), r"require: no model keeps this rate or memory; the nearest is a"),
     ],
 )
@@ -298,6 +317,7 @@ def test_check_plans_what_run_would(typed):
         ('require.at=["liver"]', "'liver' is no control point; there are tool, corner"),
         ('require.quantities=["field"]', "name rest, history or both"),
         ('require.quantities=["rest", "rest"]', "named twice"),
+        ('require.at=["tool", "tool"]', "named twice"),
         ("require.rate=60 s", "'s' is not a unit like Hz"),
         ("require.memory=2 mm", "'mm' is not a unit like byte"),
         ("require.eror=5 %", "did you mean 'error'?"),

@@ -241,7 +241,7 @@ def test_a_run_compares_all_that_follow(results):
     one = results.model("corrected")
     assert one.status == "finished"
     assert one.correction is not None
-    for words in ("at most 0.25 radii apart", "for this way of the load only"):
+    for words in ("at most 0.25 radii apart", "for this path of the load only"):
         assert any(words in said for said in results.record.assumptions)
     assert results.record.probes == ("tool", "tool-end")
     start, end = (results.curve("corrected", name) for name in results.record.probes)

@@ -1,10 +1,9 @@
-"""A coarse lattice corrected by linear finite elements: the sum of what each of them does well.
+"""Linear finite elements with an additive multi-fidelity correction by a coarse lattice.
 
-The finite elements know shape, load and surface, and nothing of geometry that changes; a coarse
-lattice knows how geometry changes the motion, roughly. So the motion is that of the elements in a
-subspace plus what the lattice does beyond itself linear (`study.models.remainder`). For small loads
-it is that of the elements. Nothing here knows the tool or its path: it is made of prepared models,
-which follow from the problem.
+The finite elements represent shape, surface and load, but no geometric nonlinearity, of which a
+coarse lattice gives an approximation. The motion is that of the elements in a subspace plus the
+nonlinear part of the lattice's motion (`study.models.remainder`). For small loads it is that of the
+elements.
 """
 
 from __future__ import annotations
@@ -153,7 +152,7 @@ class PreparedCorrected:
     def rest(self) -> Floats:
         """Displacement [m] (q, 3) at rest at the points of the volume field, linearised.
 
-        That of the elements: linear about rest, a lattice does nothing beyond itself linear.
+        That of the elements: linearised about rest, the nonlinear part of a lattice is zero.
         """
         return self.fine.rest()
 
@@ -256,9 +255,9 @@ def _solved(fine: FiniteElements, problem: Problem) -> MeshSolution:
 
 
 def _unknown(name: str, compared: Trajectory | str) -> Iterator[str]:
-    """A note where there is nothing to tell the error of the coarse lattice by."""
+    """A note where the error of the coarse lattice cannot be estimated."""
     if isinstance(compared, str):
-        yield f"What the spacing of {name} leaves out is not estimated: {compared}."
+        yield f"The spacing error of {name} is not estimated: {compared}."
 
 
 def models(scene: Scene, _: Estimates) -> Iterator[CorrectedLattice]:
@@ -308,16 +307,16 @@ def _weights_damped(lattice: PreparedLattice) -> PreparedLattice:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On what the sum takes for granted."""
+    """On what the sum neglects, and how its errors are estimated."""
     coarse = _coarse(scene)
     sizes = " and more" if coarse.graded else ""
-    of = "way" if any(tool.travels for tool in scene.tools) else "place"
+    of = "path" if any(tool.travels for tool in scene.tools) else "place"
     return [
-        "The corrected lattice is the linear finite elements plus what a lattice of "
-        f"{1e3 * coarse.spacing:.3g} mm{sizes} does beyond itself linear, for this {of} of the "
-        "load only. Its errors are estimates, none of them a bound: of what the spacing leaves out "
-        f"of the nonlinear part, from a lattice of {FINER:.2g} times the spacing and an assumed "
-        f"order of {ORDER:g}; of the linear part by its mesh and by its vectors.",
+        "The corrected lattice is the linear finite elements plus the nonlinear part of a lattice "
+        f"of {1e3 * coarse.spacing:.3g} mm{sizes}, for this {of} of the load only. Its errors are "
+        "estimates, none of them a bound: that of the nonlinear part by its spacing, from a "
+        f"lattice of {FINER:.2g} times the spacing at an assumed order of {ORDER:g}; that of the "
+        "linear part by its mesh and by its vectors.",
         *springs(coarse.scene),
     ]
 

@@ -1,14 +1,14 @@
-"""What a lattice does beyond itself linear: the part of a motion that geometry adds.
+"""The nonlinear part of a lattice's motion: the effect of large displacements.
 
-The difference of a lattice and the same lattice linear about rest, both by the same steps of the
-same integrator. What the two have in common cancels: the error of the steps, of the cells that cut
-the surface, of the load spread over few nodes. What is left is small and smooth, so that a coarse
-lattice shows it: its error falls about with the spacing to the power ORDER, and a lattice
-of half the spacing tells how large it is.
+It is the difference of a lattice and its linearisation about rest, both by the same steps of the
+same integrator. Errors that both have in common cancel: those of the steps, of cut cells at the
+surface, and of the load on few nodes. The remainder is small and smooth, so that a coarse lattice
+resolves it. Its error decreases with about the spacing to the power ORDER, and is estimated from a
+lattice of half the spacing.
 
-Under gravity both start at rest under it, each by its own forces, and what large displacements
-change of the sag is in the difference too. A shape that is given loaded is where both start; what
-its prestress does to a load is then of the nonlinear lattice alone.
+Under gravity both start in equilibrium under it, each by its own forces, so that the difference
+includes the effect of large displacements on the sag. A shape that is given loaded is where both
+start; the effect of its prestress on a load is that of the nonlinear lattice alone.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ Ints = NDArray[np.int64]
 ORDER = 1.5
 """Assumed of the remainder's error in the spacing; cells that are cut keep it from 2."""
 FINER = 0.5
-"""Spacing of the lattice that tells the error, times that of the one whose error it tells.
+"""Spacing of the lattice that the error is estimated from, times that of the other.
 
-A coarser one would be cheaper, but where neither shows the strain under the tool both miss the same
-and seem to agree; one of two thirds differs too little beside the chance of how cells lie
-(`reports/data/corrected_places.csv` has both).
+A coarser one would be cheaper, but where neither resolves the strain under the tool both have the
+same error and seem to agree. With one of two thirds the difference is too small against the scatter
+by the position of the cells (`reports/data/corrected_places.csv` has both).
 """
 KEPT = 0.75
-"""Share of the vectors that is left when their last ones are left out to see what they do."""
+"""Share of the vectors that is kept to estimate the truncation error from the others."""
 
 
 @dataclass(frozen=True)

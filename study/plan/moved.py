@@ -53,29 +53,30 @@ from study.similarity.fields import norm, relative_l2, relative_l2_of_curves
 Floats = NDArray[np.float64]
 
 LOOK = 1.0
-"""Spacing of the finest lattice that is looked at, times that of the scene.
+"""Spacing of the finest of these lattices, times that of the scene.
 
-Coarser ones tell too little of what lattices do beyond themselves linear: on a block under a tool
-of 12 mm those of 12.5 and 25 mm an eighth of what one of 10 mm is off that of 5 mm, those of 10 and
-20 mm two thirds.
+Coarser ones underestimate the error of the nonlinear part: on a block under a tool of 12 mm, it is
+an eighth of the difference between lattices of 10 and 5 mm if estimated from those of 12.5 and 25
+mm, and two thirds from those of 10 and 20 mm.
 """
 BETWEEN = 1.25
 """Spacing of the third lattice, times that of the finest.
 
-With the two of a run alone the prediction fell short more often: they may agree by chance.
+Two lattices may agree by chance, and the prediction would fall short more often.
 """
 PEAK_FORCE, HISTORY = "peak-force", "history"
 
 
 @dataclass(frozen=True)
 class MovedLook:
-    """What lattices did: of `spacing` [m], and of COARSER and BETWEEN times it.
+    """Motions of lattices of `spacing` [m], and of COARSER and BETWEEN times it.
 
-    `error`: of what is wanted, relative, as they tell it of the finest. Of the finest: springs,
-    critical step [s], wall [s] of a step and of its set-up, bytes of its arrays, largest strain of
-    a spring. `beyond`: largest relative difference of what the coarsest and the finest do beyond
-    themselves linear, beside the finest's whole motion; `elements`: coarse and fine ones at rest,
-    `mesh` how far apart. None and none where a corrected lattice does not follow the scene.
+    `error`: estimated relative error of the required quantities on the finest. Of the finest too:
+    number of `springs`, `critical` step [s], wall time [s] of a step and of its set-up, bytes of
+    its arrays, largest strain of a spring. `beyond`: largest difference of the nonlinear parts on
+    the coarsest and the finest, relative to the whole motion of the latter. `elements`: coarse
+    finite elements at rest, and `mesh` their estimated discretisation error. `beyond` and
+    `elements` are None where a corrected lattice does not support the scene.
     """
 
     spacing: float
@@ -104,7 +105,7 @@ class AtRest:
 
 
 def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
-    """Move three lattices. ValueError where one of them does not reach the end."""
+    """Motions of three lattices. ValueError where one of them does not finish."""
     spacings = [times * LOOK * scene.lattice.spacing for times in (COARSER, BETWEEN, 1.0)]
     moved = [_run(scene, problem, one) for one in spacings]
     runs = [run for run, _ in moved]
@@ -145,7 +146,7 @@ def _is_correctable(scene: Scene) -> bool:
 
 
 def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook]:
-    """A motion and what it took."""
+    """A motion, and its size and cost."""
     started = time.perf_counter()
     prepared = _lattice(scene, _settings(scene, spacing)).prepare(problem)
     run, springs = prepared.moved(), len(prepared.assembly.springs.weight)
@@ -170,7 +171,7 @@ def _lattice(scene: Scene, settings: Lattice) -> LatticeModel:
 
 
 def _beyond_linear(scene: Scene, problem: Problem, spacing: float, run: Run) -> Trajectory:
-    """What of a motion of a lattice is beyond itself linear, by the same steps."""
+    """The nonlinear part of a lattice's motion, by the same steps."""
     settings = replace(_settings(scene, spacing), geometry="linear")
     linear = _lattice(scene, settings).prepare(problem).moved(Counts(run.substeps))
     return plus(run.trajectory, linear.trajectory, -1.0)
@@ -230,9 +231,9 @@ def _at_rest(level: int, size: float, prepared: PreparedElements) -> AtRest:
 
 
 def _by_mesh(measure: Measure, elements: Sequence[AtRest]) -> float:
-    """Error of the finest of these elements, by Richardson; infinite of a single mesh.
+    """Error of the finest of these elements by Richardson extrapolation; infinite for one mesh.
 
-    Over all loads together, as a control point that a tool leaves hardly moves any more.
+    Over all loads together, since a control point hardly moves once a tool has left it.
     """
     if len(elements) < 2:
         return math.inf

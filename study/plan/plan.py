@@ -127,6 +127,7 @@ def measure(required: Require, problem: Problem) -> Measure:
 
 def choose(offered: Sequence[Candidate], required: Require) -> Candidate:
     """The cheapest that meets all requirements. ValueError, with the nearest, where none does."""
+    offered = [_at_rate(one, required.rate) for one in offered]
     able = [one for one in offered if _keeps(one, required)]
     if not able:
         raise ValueError(_refusal(offered, required))
@@ -135,6 +136,11 @@ def choose(offered: Sequence[Candidate], required: Require) -> Candidate:
     if required.rate is None:
         return min(able, key=lambda one: one.wall)
     return min(able, key=lambda one: one.wall_per_s)
+
+
+def _at_rate(one: Candidate, rate: float | None) -> Candidate:
+    """With steps no longer than the time between two states at a rate [Hz]."""
+    return one if rate is None else replace(one, step=min(one.step, 1.0 / rate))
 
 
 def _keeps(one: Candidate, required: Require) -> bool:
@@ -155,10 +161,13 @@ def _refusal(offered: Sequence[Candidate], required: Require) -> str:
     rest = [one for one in offered if _keeps(one, replace(required, error=None))]
     if required.error is not None and rest:
         nearest = min(rest, key=lambda one: one.prediction.error)
+        error, relaxed = nearest.prediction.error, len(rest) < len(offered)
+        remedies = ["allow it"] if error <= 1.0 else []
+        remedies += ["relax require.rate or require.memory"] if relaxed or required.rate else []
+        remedies += ["refine lattice.spacing or reference.element_size"]
         return (
             f"require.error: {_percent(required.error)} is not expected of any model; the nearest "
-            f"is {_percent(nearest.prediction.error)}, by a {nearest.name}: allow it, or refine "
-            "lattice.spacing or reference.element_size"
+            f"is {_percent(error)}, by a {nearest.name}: {', or '.join(remedies)}"
         )
     fastest = min(offered, key=lambda one: (one.wall_per_s, one.memory))
     return (
@@ -268,7 +277,9 @@ def _left_out(scene: Scene, chosen: Candidate) -> tuple[str, str]:
 
 
 def _percent(value: float) -> str:
-    """A percentage, with a decimal where that is significant."""
+    """A percentage, with decimals where they are significant."""
+    if 0.0 < value < 0.0005:
+        return f"{100.0 * value:.1g} %"
     return f"{100.0 * value:.1f} %" if value < 0.0995 else f"{100.0 * value:.0f} %"
 
 

@@ -419,6 +419,8 @@ def _require_contradictions(scene: Scene, required: Require) -> Iterator[str]:
         yield "require.quantities: peak-force is that of tools that are moved; remove it"
     if len(wanted) < len(required.quantities):
         yield "require.quantities: a quantity is named twice"
+    if len(set(required.at)) < len(required.at):
+        yield "require.at: a control point is named twice"
     if required.rate is not None and not wanted & {"history", "peak-force"}:
         yield "require.rate: nothing moves at rest; add history to require.quantities or remove it"
     for name in required.at:
