@@ -251,10 +251,9 @@ def kernels() -> Iterator[tuple[str, str]]:
     most = max(int(one["lanes"]) for one in grid)
     yield "kernels-on", _where(lines)
     yield "kernels-lanes", str(most)
-    for name, lanes in (("", most), ("-narrow", min(int(one["lanes"]) for one in grid))):
-        found = [one for one in grid if int(one["lanes"]) == lanes]
-        yield f"grid-gain{name}", span(float(one["times_list"]) for one in found)
-        yield f"grid-over-c{name}", span((float(one["over_c"]) for one in found), "{:.2f}".format)
+    widest = [one for one in grid if int(one["lanes"]) == most]
+    yield "grid-gain", span(float(one["times_list"]) for one in widest)
+    yield "grid-over-c", span((float(one["over_c"]) for one in widest), "{:.2f}".format)
 
 
 def _where(lines: list[Line]) -> str:

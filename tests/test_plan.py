@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import replace
 from functools import cache, partial
 
@@ -114,6 +115,19 @@ def test_memory_leaves_out_what_does_not_fit():
 def test_what_no_candidate_keeps_is_refused_with_the_nearest(required, said):
     with pytest.raises(ValueError, match=said):
         choose(offered(), required)
+
+
+def test_a_refusal_lists_the_nearest_error_of_each_control_point():
+    """That of all is the largest of them, and that of one is refused without a list."""
+    with pytest.raises(ValueError, match=r"require\.at") as error:
+        planning.plan(scene_of("require.error=0.01 %"))
+    stated, listed = str(error.value).split("require.at, whose nearest alone are ")
+    alone = [float(part.split()[-2]) for part in listed.split(", ")]
+    assert len(alone) == len(scene_of("require.error=0.01 %").control_points)
+    assert max(alone) <= float(re.search(r"nearest is ([\d.]+) %", stated).group(1))
+    with pytest.raises(ValueError, match="not expected") as error:
+        planning.plan(scene_of("require.error=0.01 %", *AT_TOOL))
+    assert "nearest alone" not in str(error.value)
 
 
 def test_planted_error_of_the_linear_models_turns_the_choice():

@@ -67,7 +67,7 @@ COARSER = 2
 GRADED = 3
 """Least number of graded meshes, for the same reason."""
 MOST_HALVED = 2
-"""Largest number of halvings of the model's own steps for contact forces."""
+"""Largest factor on the number of the model's own steps for contact forces."""
 FINER = 12
 """Largest number of levels above the scene's that an accuracy may require, memory permitting."""
 FRAME_RATE = 60.0

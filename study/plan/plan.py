@@ -86,10 +86,24 @@ def plan(scene: Scene) -> Plan:
     if problem.has_further_loads:
         return _by_motions(scene, problem, required)
     seen = look(scene, problem)
-    foresight = Foresight(seen, measure(required, problem))
-    moves = HISTORY in required.quantities
-    offered = list((candidates if moves else resting)(scene, seen, foresight))
-    chosen = choose(offered, required)
+    points = measure(required, problem)
+    foresight = Foresight(seen, points)
+    offering = candidates if HISTORY in required.quantities else resting
+
+    def nearest_at(probe: int) -> float:
+        at_it = Foresight(seen, Measure((probe,), None))
+        return min(one.prediction.error for one in offering(scene, seen, at_it))
+
+    try:
+        chosen = choose(list(offering(scene, seen, foresight)), required)
+    except ValueError as refused:
+        if required.error is None or len(points.probes) == 1:
+            raise
+        alone = [f"{problem.probes[i]} {_percent(nearest_at(i))}" for i in points.probes]
+        raise ValueError(
+            f"{refused}, or name fewer control points in require.at, whose nearest alone are "
+            f"{', '.join(alone)}"
+        ) from None
     return Plan(chosen.scene, tuple(_decisions(scene, seen, foresight, chosen)), chosen)
 
 
