@@ -111,10 +111,9 @@ def _validation(results: Results) -> Iterator[str]:
     measured = validation()
     if measured is not None:
         yield (
-            f"Compared with static measurements on silicone bodies, {measured['within']} "
-            "differences are within twice the uncertainty of the measurement plus the error of "
-            "the model. This was computed beforehand, and no body is liver; `liver-study "
-            "validate` repeats it."
+            f"{measured['agreeing']} predictions of static measurements on silicone bodies agree "
+            "within their expanded uncertainty plus the error of the model. This was computed "
+            "beforehand, and no body is liver; `liver-study validate` repeats it."
         )
     if finite_elements(results) is None:
         yield "It has no finite elements: differences between its models are not errors."

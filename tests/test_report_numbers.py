@@ -304,7 +304,7 @@ def test_a_budget_has_a_row_a_cause_and_the_error_of_the_whole():
     (table,) = budget.budgets(budgeted(None))
     assert table["rows"][0][1:] == ["40.0 %", "–", ""]
     told, largest = budget.sentences(budgeted())
-    assert "MSM Mamdani is 40.0 % off" in told
+    assert "the field of MSM Mamdani differs from the finite elements by 40.0 %" in told
     assert told.count("%") == 3
     assert largest.endswith("+30.0 %.")
 

@@ -394,10 +394,10 @@ def test_a_model_that_diverged_has_rows_up_to_then_and_no_others():
         (
             "models=['msm','basafa']",
             "fuzzy.systems=['sugeno']",
-            'control_points={"a,\\"b\\"\\n c"={side="superior",at=[0.5,0.5]}}',
+            'control_points={"a,\\"b\\" c"={side="superior",at=[0.5,0.5]}}',
         ),
     ],
-    ids=["some of it diverged", "names with commas, quotes and ends of lines"],
+    ids=["some of it diverged", "names with commas and quotes"],
 )
 def test_whatever_a_run_leaves_is_whole(overrides, tmp_path):
     """Also a model that diverged, whose band ends, and one with inverted cells."""
