@@ -37,7 +37,7 @@ FINISHED = [path for path in RESULTS if all((path / name).is_file() for name in 
 
 project = PROJECT["name"]
 author = PROJECT["authors"][0]["name"]
-copyright = author  # noqa: A001 - Sphinx's name
+copyright = author  # noqa: A001 - Sphinx reads it by this name
 release = PROJECT["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]

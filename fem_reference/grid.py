@@ -84,18 +84,18 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
                 found[i, j] += nodes[i, cells][:, None] * slopes[j]
         return found
 
-    def J(self, i: int, j: int, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+    def J(self, i: int, j: int, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - as skfem's mappings
         """Derivative of coordinate i by local coordinate j."""
         return np.asarray(self._at(X, tind).by_local[i, j])
 
-    def invDF(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+    def invDF(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - as skfem's mappings
         """Derivative of local coordinate i by coordinate j (i, j, cells, q)."""
         at = self._at(X, tind)
         if at.inverse is None:
             at = self._kept = at._replace(inverse=super().invDF(X, tind))
         return np.asarray(at.inverse)
 
-    def F(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - its name
+    def F(self, X: Floats, tind: Any = None) -> Floats:  # noqa: N802 - as skfem's mappings
         """Points [m] (3, cells, q) at local coordinates."""
         nodes, dofs = self.mesh.doflocs, self.mesh.dofs.element_dofs
         dofs = dofs if tind is None else dofs[:, tind]

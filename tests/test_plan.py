@@ -128,6 +128,9 @@ def test_a_refusal_lists_the_nearest_error_of_each_control_point():
     with pytest.raises(ValueError, match="not expected") as error:
         planning.plan(scene_of("require.error=0.01 %", *AT_TOOL))
     assert "nearest alone" not in str(error.value)
+    with pytest.raises(ValueError, match="keeps this rate") as error:
+        choose(offered(), Require(error=0.5, rate=1e9), lambda: {"tool": offered()})
+    assert "require.at" not in str(error.value), "fewer points are no remedy for a rate"
 
 
 def test_planted_error_of_the_linear_models_turns_the_choice():

@@ -50,7 +50,7 @@ moduli = fuzzy.infer(system, readings, "mamdani").value
 for (reading,), modulus in zip(readings, moduli, strict=True):
     print(f"a reading of {reading:4.1f} kPa gives {modulus:5.2f} kPa")
 
-from skfuzzy.control import ControlSystemSimulation  # noqa: E402 - its second half
+from skfuzzy.control import ControlSystemSimulation  # noqa: E402 - where it is used
 
 theirs = ControlSystemSimulation(fuzzy.to_skfuzzy(system))
 theirs.input["reading"] = 8.0

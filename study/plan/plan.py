@@ -7,7 +7,7 @@ most accurate. The choice is made before anything expensive runs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,6 +24,7 @@ from study.scene import Require, Scene
 from study.scene.problem import problem_of
 
 FIELD = "field"
+Alone = Callable[[], Mapping[str, Sequence[Candidate]]]
 """The required quantity that includes the whole organ."""
 
 TOLD_BY = {
@@ -90,20 +91,15 @@ def plan(scene: Scene) -> Plan:
     foresight = Foresight(seen, points)
     offering = candidates if HISTORY in required.quantities else resting
 
-    def nearest_at(probe: int) -> float:
-        at_it = Foresight(seen, Measure((probe,), None))
-        return min(one.prediction.error for one in offering(scene, seen, at_it))
+    def alone() -> dict[str, list[Candidate]]:
+        """Candidates judged at one required control point each, if there are several."""
+        each = points.probes if len(points.probes) > 1 else ()
+        measures = {problem.probes[i]: Measure((i,), None) for i in each}
+        return {
+            name: list(offering(scene, seen, Foresight(seen, at))) for name, at in measures.items()
+        }
 
-    try:
-        chosen = choose(list(offering(scene, seen, foresight)), required)
-    except ValueError as refused:
-        if required.error is None or len(points.probes) == 1:
-            raise
-        alone = [f"{problem.probes[i]} {_percent(nearest_at(i))}" for i in points.probes]
-        raise ValueError(
-            f"{refused}, or name fewer control points in require.at, whose nearest alone are "
-            f"{', '.join(alone)}"
-        ) from None
+    chosen = choose(list(offering(scene, seen, foresight)), required, alone)
     return Plan(chosen.scene, tuple(_decisions(scene, seen, foresight, chosen)), chosen)
 
 
@@ -139,12 +135,15 @@ def measure(required: Require, problem: Problem) -> Measure:
     return Measure(tuple(problem.probes.index(name) for name in names), volumes)
 
 
-def choose(offered: Sequence[Candidate], required: Require) -> Candidate:
-    """The cheapest that meets all requirements. ValueError, with the nearest, where none does."""
+def choose(offered: Sequence[Candidate], required: Require, alone: Alone = dict) -> Candidate:
+    """The cheapest that meets all requirements. ValueError, with the nearest, where none does.
+
+    `alone`: makes the same candidates with their errors at single control points, by name.
+    """
     offered = [_at_rate(one, required.rate) for one in offered]
     able = [one for one in offered if _keeps(one, required)]
     if not able:
-        raise ValueError(_refusal(offered, required))
+        raise ValueError(_refusal(offered, required, alone))
     if required.error is None:
         return min(able, key=lambda one: one.prediction.error)
     if required.rate is None:
@@ -170,15 +169,34 @@ def in_time(one: Candidate, rate: float) -> bool:
     return whole_steps(1.0 / rate, one.step) * one.step_wall <= 1.0 / rate
 
 
-def _refusal(offered: Sequence[Candidate], required: Require) -> str:
+def _otherwise_able(offered: Iterable[Candidate], required: Require) -> list[Candidate]:
+    """Candidates that meet all requirements but that of an error."""
+    at_rate = (_at_rate(one, required.rate) for one in offered)
+    return [one for one in at_rate if _keeps(one, replace(required, error=None))]
+
+
+def _smallest_error(offered: Iterable[Candidate]) -> Candidate:
+    return min(offered, key=lambda one: one.prediction.error)
+
+
+def _refusal(offered: Sequence[Candidate], required: Require, alone: Alone) -> str:
     """What cannot be met, and the nearest error at this rate and memory, or the nearest rate."""
-    rest = [one for one in offered if _keeps(one, replace(required, error=None))]
+    rest = _otherwise_able(offered, required)
     if required.error is not None and rest:
-        nearest = min(rest, key=lambda one: one.prediction.error)
+        nearest = _smallest_error(rest)
         error, relaxed = nearest.prediction.error, len(rest) < len(offered)
         remedies = ["allow it"] if error <= 1.0 else []
         remedies += ["relax require.rate or require.memory"] if relaxed or required.rate else []
         remedies += ["refine lattice.spacing or reference.element_size"]
+        at_points = [
+            f"{name} {_percent(_smallest_error(_otherwise_able(found, required)).prediction.error)}"
+            for name, found in alone().items()
+        ]
+        if at_points:
+            remedies += [
+                "name fewer control points in require.at, whose nearest alone are "
+                f"{', '.join(at_points)}"
+            ]
         return (
             f"require.error: {_percent(required.error)} is not expected of any model; the nearest "
             f"is {_percent(error)}, by a {nearest.name}: {', or '.join(remedies)}"
