@@ -25,7 +25,7 @@ from msm.grid_joints import Joints
 from msm.grid_parts import Part, by_size, joined, whole
 from msm.lattice import CORNERS, CellLattice, LatticeMesh
 from msm.network import Network
-from msm.simd import Lanes, lanes_of, widest
+from msm.simd import Lanes, lanes_of, widest, zeros
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,7 +44,8 @@ class Grid(NamedTuple):
     Springs: first place `start` (b,) of each block; `offset` (s,), `rest` [m] (s, 3), `length` [m]
     and `per_length` [1/m], each (s,), of each direction; `weight` (b s, l), relative to k_ref.
     Cells, blocks of their lowest corners: `cell_start`, `corner` (8,) offsets, `bulk` [J],
-    `spacing` [m]. Foundation: `held_start`, `held_offset`, `held` [N/m]. Nodes, each (b, l):
+    `spacing` [m]; `axes`: those of the box, the one along which places are numbered first last, as
+    `corner` has them. Foundation: `held_start`, `held_offset`, `held` [N/m]. Nodes, each (b, l):
     `mass`, `gamma_0`, `gamma_1` as in `Network`, `kept` and `share`, which integrators fill;
     `load` [N] (3 b, l). `uneven`: whether damping grows with the displacement.
     """
@@ -60,6 +61,7 @@ class Grid(NamedTuple):
     per_length: Floats
     weight: Floats
     cell_start: Ints
+    axes: tuple[int, int, int]
     corner: Ints
     bulk: Floats
     spacing: float
@@ -109,7 +111,7 @@ def grids_of(
         return None
     place, first = [], 0
     for part in parts:
-        margin = part.reach + width
+        margin = part.reach + 2 * width  # forces of a block's last cells go into the next
         place.append(first + margin + part.numbers)
         first += part.count + 2 * margin
     motion = np.zeros((3, 3, first))
@@ -142,6 +144,8 @@ def _grid(
     length = np.linalg.norm(part.rest, axis=1)
     own, node = place[owned], part.node[owned]
     u, v, force = motion
+    slow, middle, fast = np.argsort(-part.strides, kind="stable").tolist()
+    axes = slow, middle, fast
     return Grid(
         lanes=lanes_of(width, single=single),
         u=u,
@@ -154,7 +158,8 @@ def _grid(
         per_length=1.0 / length,
         weight=blocks.rows(place[springs.node], springs.which, springs.value, len(springs.offset)),
         cell_start=cells.start,
-        corner=CORNERS @ part.strides,
+        axes=axes,
+        corner=CORNERS @ part.strides[list(axes)],
         bulk=cells.rows(cells.place, 0, net.bulk[part.cells]),
         spacing=float(part.spacing),
         held_start=supports.start,
@@ -202,7 +207,7 @@ class _Blocks:
         """Sum of values by block, kind and lane, (b kinds, l); `without` where there is none."""
         block = np.searchsorted(self.start, place, side="right") - 1
         lane = place - self.start[block] if len(place) else place
-        found = np.zeros((len(self.start) * kinds, self.width))
+        found = zeros((len(self.start) * kinds, self.width))
         np.add.at(found, (block * kinds + which, lane), value)
         if without:
             empty = np.ones(found.shape, dtype=bool)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from msm.external_loads import add_external_forces, apply_tool_contact
 from msm.forces import hold
 from msm.grid import Grid, Grids
-from msm.grid_forces import add_internal_forces, add_stiffness_damping, damping
+from msm.grid_forces import add_internal_forces, add_stiffness_damping, add_to, damping
 from msm.grid_joints import add_joint_foundation, follow, share_out
 from msm.kernel import inner_kernel, kernel
 from msm.simd import every, load, store
@@ -163,12 +163,6 @@ def pushes(grid: Grid, b: int, d: int, factor: float) -> Any:
 
 
 @inner_kernel()
-def add_to(grid: Grid, a: Floats, d: int, i: int, x: Any) -> None:
-    """Add to component d of vectors at the nodes from i on."""
-    store(a, d, i, load(a, d, i, grid.lanes) + x)
-
-
-@inner_kernel()
 def kick_and_drift(grid: Grid, factor: float, dt: float) -> None:
     """Velocities by the shares set before, then displacements by dt; the forces are used up."""
     for b in range(grid.start.shape[0]):
@@ -177,7 +171,7 @@ def kick_and_drift(grid: Grid, factor: float, dt: float) -> None:
         for d in range(3):
             moving = kept * load(grid.v, d, i, grid.lanes) + share * pushes(grid, b, d, factor)
             store(grid.v, d, i, moving)
-            add_to(grid, grid.u, d, i, dt * moving)
+            add_to(grid.lanes, grid.u, d, i, dt * moving)
             store(grid.force, d, i, every(0.0, grid.lanes))
 
 
@@ -190,7 +184,7 @@ def kick_again(grid: Grid, factor: float, half: float) -> None:
         c = damping(grid, grid.u, b)
         for d in range(3):
             moving = load(grid.v, d, i, grid.lanes)
-            add_to(grid, grid.v, d, i, share * (pushes(grid, b, d, factor) - c * moving))
+            add_to(grid.lanes, grid.v, d, i, share * (pushes(grid, b, d, factor) - c * moving))
 
 
 @inner_kernel()
@@ -214,8 +208,8 @@ def take_stage(
             moving = load(speed, d, i, grid.lanes)
             pushed = pushes(grid, b, d, factor) - c * moving
             rate = pushed / load(grid.mass, b, 0, grid.lanes)
-            add_to(grid, du, d, i, weight * moving)
-            add_to(grid, dv, d, i, weight * rate)
+            add_to(grid.lanes, du, d, i, weight * moving)
+            add_to(grid.lanes, dv, d, i, weight * rate)
             store(at, d, i, load(grid.u, d, i, grid.lanes) + ahead * moving)
             store(speed, d, i, load(grid.v, d, i, grid.lanes) + ahead * rate)
             store(grid.force, d, i, every(0.0, grid.lanes))
@@ -228,7 +222,7 @@ def finish(grid: Grid, du: Floats, dv: Floats) -> None:
     for b in range(grid.start.shape[0]):
         i = grid.start[b]
         for d in range(3):
-            add_to(grid, grid.u, d, i, load(du, d, i, grid.lanes))
-            add_to(grid, grid.v, d, i, load(dv, d, i, grid.lanes))
+            add_to(grid.lanes, grid.u, d, i, load(du, d, i, grid.lanes))
+            add_to(grid.lanes, grid.v, d, i, load(dv, d, i, grid.lanes))
             store(du, d, i, none)
             store(dv, d, i, none)

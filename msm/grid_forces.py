@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from msm.forces import cofactors, corner_shares
 from msm.grid import Grid
 from msm.kernel import inner_kernel
-from msm.kinematics import X, Y, Z, dot, slopes
+from msm.kinematics import dot, slopes
 from msm.laws import law_of_kind, stiffness, tension
-from msm.simd import Lanes, every, inverse_root, load, root, store, where_not_zero
+from msm.simd import Lanes, every, inverse_root, load, one_later, root, store, where_not_zero
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,11 +54,17 @@ def vectors(lanes: Lanes, a: Floats, i: int) -> Any:
 
 
 @inner_kernel()
+def add_to(lanes: Lanes, a: Floats, d: int, i: int, x: Any) -> None:
+    """Add to component d of vectors at the nodes from i on."""
+    store(a, d, i, load(a, d, i, lanes) + x)
+
+
+@inner_kernel()
 def add(lanes: Lanes, a: Floats, i: int, x: Any, y: Any, z: Any) -> None:
     """Add vectors at the nodes from i on."""
-    store(a, 0, i, load(a, 0, i, lanes) + x)
-    store(a, 1, i, load(a, 1, i, lanes) + y)
-    store(a, 2, i, load(a, 2, i, lanes) + z)
+    add_to(lanes, a, 0, i, x)
+    add_to(lanes, a, 1, i, y)
+    add_to(lanes, a, 2, i, z)
 
 
 # Springs ---------------------------------------------------------------------------------------
@@ -210,8 +216,9 @@ _SINGLE: dict[bool, Callable[..., Any]] = {True: _single_proportional, False: _s
 
 
 @inner_kernel()
-def gradient(lanes: Lanes, at: Ints, a: Floats, d: int, i: int, to_gradient: float) -> Any:
-    """Mean gradients of component d over the cells from the corners i on."""
+def gradient(grid: Grid, a: Floats, row: int, i: int, to_gradient: float) -> Any:
+    """Mean gradient of the component along an axis of the grid, over the cells from i on."""
+    lanes, at, d = grid.lanes, grid.corner, grid.axes[row]
     return slopes(
         load(a, d, i, lanes),
         load(a, d, i + at[1], lanes),
@@ -226,24 +233,47 @@ def gradient(lanes: Lanes, at: Ints, a: Floats, d: int, i: int, to_gradient: flo
 
 
 @inner_kernel()
+def no_shares(lanes: Lanes) -> Any:
+    """Contributions of no cells, as `scatter_pressure` returns them."""
+    none = every(0.0, lanes)
+    shares = none, none, none, none
+    return shares, shares, shares
+
+
+@inner_kernel()
 def scatter_pressure(
-    lanes: Lanes, at: Ints, force: Floats, i: int, pressure: Any, rows: Any
-) -> None:
-    """Subtract the nodal forces of pressures on the cofactors of cells, weights included."""
+    grid: Grid, force: Floats, c: int, pressure: Any, rows: Any, before: Any
+) -> Any:
+    """Subtract the nodal forces of pressures on the cofactors of block c, weights included.
+
+    Corners along a row are shared by neighbouring cells. Their forces are summed in registers
+    first, those of the last cell with the next block's, which receives them as `before`.
+    """
+    i, count = grid.cell_start[c], len(grid.lanes)
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = rows
-    x0, x1, x2, x3 = corner_shares(pressure * ax, pressure * ay, pressure * az)
-    y0, y1, y2, y3 = corner_shares(pressure * bx, pressure * by, pressure * bz)
-    z0, z1, z2, z3 = corner_shares(pressure * cx, pressure * cy, pressure * cz)
-    # No corner right after its neighbour: along a row, the load would wait for the store that it
-    # overlaps in part.
-    add(lanes, force, i, x0, y0, z0)
-    add(lanes, force, i + at[3], x3, y3, z3)
-    add(lanes, force, i + at[5], -x2, -y2, -z2)
-    add(lanes, force, i + at[6], -x1, -y1, -z1)
-    add(lanes, force, i + at[1], x1, y1, z1)
-    add(lanes, force, i + at[2], x2, y2, z2)
-    add(lanes, force, i + at[4], -x3, -y3, -z3)
-    add(lanes, force, i + at[7], -x0, -y0, -z0)
+    now = (
+        corner_shares(pressure * ax, pressure * ay, pressure * az),
+        corner_shares(pressure * bx, pressure * by, pressure * bz),
+        corner_shares(pressure * cx, pressure * cy, pressure * cz),
+    )
+    add_shares(grid, force, i, before, now)
+    if c + 1 < grid.cell_start.shape[0] and grid.cell_start[c + 1] == i + count:
+        return now
+    none = no_shares(grid.lanes)
+    add_shares(grid, force, i + count, now, none)
+    return none
+
+
+@inner_kernel()
+def add_shares(grid: Grid, force: Floats, i: int, before: Any, now: Any) -> None:
+    """Add the contributions to the corners from i on, those to upper corners one place later."""
+    for d in range(3):
+        (b0, b1, b2, b3), (s0, s1, s2, s3) = before[d], now[d]
+        axis = grid.axes[d]
+        add_to(grid.lanes, force, axis, i, s0 + one_later(b1, s1))
+        add_to(grid.lanes, force, axis, i + grid.corner[2], s2 + one_later(b3, s3))
+        add_to(grid.lanes, force, axis, i + grid.corner[4], -(s3 + one_later(b2, s2)))
+        add_to(grid.lanes, force, axis, i + grid.corner[6], -(s1 + one_later(b0, s0)))
 
 
 def volume_change(grid: Grid, linear: Small, u: Floats, i: int, to_gradient: float) -> Any:
@@ -257,29 +287,29 @@ def _volume_change(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> 
 
 
 def _volume_change_displaced(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
-    a, b, e = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
-    f, g, h = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
-    p, q, r = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
+    a, b, e = gradient(grid, u, 0, i, to_gradient)
+    f, g, h = gradient(grid, u, 1, i, to_gradient)
+    p, q, r = gradient(grid, u, 2, i, to_gradient)
     return cofactors(a, b, e, f, g, h, p, q, r)
 
 
 def _volume_change_at_rest(grid: Any, linear: Any, u: Any, i: Any, to_gradient: Any) -> Any:  # noqa: ARG001 - numba matches names
     """The divergence of u, and the cofactors of the identity."""
-    x, _, _ = gradient(grid.lanes, grid.corner, u, X, i, to_gradient)
-    _, y, _ = gradient(grid.lanes, grid.corner, u, Y, i, to_gradient)
-    _, _, z = gradient(grid.lanes, grid.corner, u, Z, i, to_gradient)
+    x, _, _ = gradient(grid, u, 0, i, to_gradient)
+    _, y, _ = gradient(grid, u, 1, i, to_gradient)
+    _, _, z = gradient(grid, u, 2, i, to_gradient)
     return x + y + z, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @inner_kernel()
 def add_volume_forces(grid: Grid, linear: Small, u: Floats, force: Floats) -> None:
     """Add -kappa V (J - 1) cof(F) B_a for each corner a of each cell."""
-    to_gradient = 0.25 / grid.spacing
+    to_gradient, before = 0.25 / grid.spacing, no_shares(grid.lanes)
     for c in range(grid.cell_start.shape[0]):
         i = grid.cell_start[c]
         swelling, x, y, z = volume_change(grid, linear, u, i, to_gradient)
         pressure = load(grid.bulk, c, 0, grid.lanes) * swelling * to_gradient
-        scatter_pressure(grid.lanes, grid.corner, force, i, pressure, (x, y, z))
+        before = scatter_pressure(grid, force, c, pressure, (x, y, z), before)
 
 
 @inner_kernel()
@@ -287,17 +317,17 @@ def add_volume_damping(
     grid: Grid, linear: Small, beta: float, u: Floats, v: Floats, force: Floats
 ) -> None:
     """Add -beta kappa V (dJ/dt) cof(F) B_a for each corner a of a cell; dJ/dt = cof(F) : dF/dt."""
-    to_gradient = 0.25 / grid.spacing
+    to_gradient, before = 0.25 / grid.spacing, no_shares(grid.lanes)
     for c in range(grid.cell_start.shape[0]):
         i = grid.cell_start[c]
         _, x, y, z = volume_change(grid, linear, u, i, to_gradient)
         growth = (
-            dot(x, gradient(grid.lanes, grid.corner, v, X, i, to_gradient))
-            + dot(y, gradient(grid.lanes, grid.corner, v, Y, i, to_gradient))
-            + dot(z, gradient(grid.lanes, grid.corner, v, Z, i, to_gradient))
+            dot(x, gradient(grid, v, 0, i, to_gradient))
+            + dot(y, gradient(grid, v, 1, i, to_gradient))
+            + dot(z, gradient(grid, v, 2, i, to_gradient))
         )
         pressure = load(grid.bulk, c, 0, grid.lanes) * growth * (beta * to_gradient)
-        scatter_pressure(grid.lanes, grid.corner, force, i, pressure, (x, y, z))
+        before = scatter_pressure(grid, force, c, pressure, (x, y, z), before)
 
 
 # Nodes -----------------------------------------------------------------------------------------

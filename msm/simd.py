@@ -27,11 +27,14 @@ from numba.extending import (
     register_model,
     type_callable,
 )
+from numpy.typing import NDArray
 
 Lanes = tuple[float | np.float32, ...]
 
 WIDTHS = (1, 2, 4, 8)
 """Widths of vectors of doubles; vectors of singles are twice as wide."""
+CACHE_LINE = 64
+"""Bytes that the processor reads at once; a vector is never longer."""
 INDEX = ir.IntType(32)
 FUSED = ("contract",)
 
@@ -145,6 +148,17 @@ def _splat(context: Any, builder: Any, x: Any, plain: Any, kind: LanesType) -> A
     return builder.shuffle_vector(
         first, nothing, ir.Constant(ir.VectorType(INDEX, count), [0] * count)
     )
+
+
+def zeros(shape: tuple[int, int]) -> NDArray[np.float64]:
+    """A matrix of zeros that begins on a cache line.
+
+    In rows of one vector no load then spans two lines, which takes twice the time.
+    """
+    size = 8 * int(np.prod(shape))
+    data = np.zeros(size + CACHE_LINE, dtype=np.uint8)
+    ahead = -data.ctypes.data % CACHE_LINE
+    return data[ahead : ahead + size].view(np.float64).reshape(shape)
 
 
 @intrinsic
@@ -323,6 +337,21 @@ def with_lane(_: Any, x: Any, n: Any, value: Any) -> Any:  # noqa: ARG001 - type
         return builder.insert_element(given[0], number, builder.trunc(given[1], INDEX))
 
     return x(x, types.intp, types.float64), code
+
+
+@intrinsic
+def one_later(_: Any, before: Any, now: Any) -> Any:  # noqa: ARG001 - typed alone
+    """The last lane of a vector, then all but the last of the next."""
+    count = getattr(now, "count", 1)
+    lanes = list(range(count - 1, 2 * count - 1))
+
+    def code(_: Any, builder: Any, __: Any, given: Any) -> Any:
+        if count == 1:
+            return given[0]
+        order = ir.Constant(ir.VectorType(INDEX, count), lanes)
+        return builder.shuffle_vector(given[0], given[1], order)
+
+    return now(now, now), code
 
 
 def lanewise(function: Callable[..., Any], kind: Any) -> Callable[..., Any]:

@@ -198,6 +198,7 @@ def nudge(field, place, change):
         nudge("rest", (2, 1), 1e-6),
         nudge("weight", (50, 0), 1e-3),
         nudge("corner", 5, 1),
+        nudge("corner", 6, 1),
         nudge("bulk", (5, 0), 1e-6),
         nudge("held_offset", 4, 1),
         nudge("load", (7, 0), 1e-4),

@@ -12,7 +12,17 @@ from numba.core.errors import TypingError
 
 from msm import simd
 from msm.kernel import kernel
-from msm.simd import WIDTHS, every, inverse_root, lanes_of, load, root, store, where_not_zero
+from msm.simd import (
+    WIDTHS,
+    every,
+    inverse_root,
+    lanes_of,
+    load,
+    one_later,
+    root,
+    store,
+    where_not_zero,
+)
 
 
 @kernel()
@@ -68,6 +78,28 @@ def test_numbers_of_another_precision_than_the_lanes_are_refused():
     a = np.ones((3, 17))
     with pytest.raises(TypingError):
         compute(lanes_of(4, single=True), a, a, a)
+
+
+@kernel()
+def later(lanes, a, b, out):
+    store(out, 0, 0, one_later(load(a, 0, 0, lanes), load(b, 0, 0, lanes)))
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_neighbouring_vectors_are_read_one_lane_later(width):
+    numbers = np.arange(2.0 * width)[None]
+    found = np.zeros((1, width))
+    later(lanes_of(width), numbers[:, :width].copy(), numbers[:, width:].copy(), found)
+    assert found[0].tolist() == numbers[0, width - 1 : -1].tolist()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (333, 4), (100_000, 8)])
+def test_matrices_of_vectors_begin_on_a_cache_line(shape):
+    found = simd.zeros(shape)
+    assert found.shape == shape
+    assert found.ctypes.data % simd.CACHE_LINE == 0
+    assert not found.any()
+    found[:] = 1.0  # its own memory
 
 
 @kernel()
