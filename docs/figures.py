@@ -981,8 +981,8 @@ def organ() -> Iterator[tuple[str, str]]:
 
 
 def run_stages() -> Iterator[tuple[str, str]]:
-    """What the default run takes: at first, of kept stages, and after a change."""
-    whole = {line["case"]: line for line in measured("run_stages") if line["stage"] == "whole"}
+    """What the default run takes: at first, of kept stages, and after a change, by machine."""
+    whole = [line for line in measured("run_stages") if line["stage"] == "whole"]
     for name, case in (
         ("first", "after install"),
         ("fresh", "side by side"),
@@ -992,10 +992,20 @@ def run_stages() -> Iterator[tuple[str, str]]:
         ("reading", "other reading"),
         ("spacing", "other spacing"),
     ):
-        seconds = float(whole[case]["wall_s"])
-        yield f"run-{name}", f"{seconds:.0f} s" if seconds >= 1.0 else f"{seconds:.1f} s"
-    for name, case in ("first", "after install"), ("fresh", "side by side"):
-        yield f"run-{name}-memory", f"{float(whole[case]['memory_mb']) / 1e3:.1f} GB"
+        lines = [line for line in whole if line["case"] == case]
+        yield f"run-{name}", seconds(float(line["wall_s"]) for line in lines)
+        if name in {"first", "fresh"}:
+            memory = max(float(line["memory_mb"]) for line in lines)
+            yield f"run-{name}-memory", f"{memory / 1e3:.1f} GB"
+    names = dict.fromkeys(line["machine"].partition(",")[0] for line in whole)
+    yield "run-machines", " and ".join(names)
+
+
+def seconds(times: Iterable[float]) -> str:
+    """Least and largest of some times [s]."""
+    found = sorted(times)
+    least, most = (f"{one:.0f}" if one >= 2.0 else f"{one:.1f}" for one in (found[0], found[-1]))
+    return f"{least} s" if least == most else f"{least} to {most} s"
 
 
 def figures() -> dict[str, str]:

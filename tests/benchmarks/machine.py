@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from pathlib import Path
 
 
@@ -11,6 +12,7 @@ def machine() -> str:
     """Processor, cores and Python."""
     lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     name = next(line.partition(": ")[2] for line in lines if line.startswith("model name"))
+    name = re.sub(r"\((R|TM)\)| Processor| CPU", "", name)
     return f"{name}, {os.cpu_count()} cores, shared; Python {platform.python_version()}"
 
 

@@ -1,12 +1,13 @@
 """What a run takes, stage by stage: one after another, side by side, and with what was kept.
 
-    python -m tests.benchmarks.run_stages [SCENE] > reports/data/run_stages.csv
+    python -m tests.benchmarks.run_stages [SCENE]
 
-takes some eight minutes on two quiet cores for the built-in liver. Each case is a process of its
+takes some five minutes on two quiet cores for the built-in liver. It writes the rows of this
+machine to reports/data/run_stages.csv and leaves those of others. Each case is a process of its
 own with its report, on a store that is empty at first; the first case compiles the kernels too. A
 stage has the wall time that its record has; a whole run also the processor time of all its
-processes, which other work on the machine touches least, and the largest memory of all together at
-one time, what they share counted once. `load` is what the machine had to do as the case ended.
+processes, which other work on the machine touches least, and the largest memory of all together
+at one time, what they share counted once. `load` is what the machine had to do as the case ended.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from threading import Event, Thread
 
 import psutil
 
+from tests.benchmarks.machine import load, machine
+
 COLD = "after install"
 """The case whose kernels are compiled within it, as in the first run of all."""
 CASES = {
@@ -40,18 +43,31 @@ CASES = {
 """Flags by case; those between are of the first, whose stages are kept, or change it."""
 PAUSE = 0.5
 """Seconds between two looks at the memory."""
-COLUMNS = ("case", "stage", "kept", "wall_s", "processor_s", "memory_mb", "load")
+TABLE = Path(__file__).parents[2] / "reports" / "data" / "run_stages.csv"
+COLUMNS = ("machine", "case", "stage", "kept", "wall_s", "processor_s", "memory_mb", "load")
 
 
 def main(scene: str) -> None:
-    """Measure all cases and write them as a table."""
-    table = csv.writer(sys.stdout, lineterminator="\n")
-    table.writerow(COLUMNS)
+    """Measure all cases and write them to the table."""
+    here = machine()
     with tempfile.TemporaryDirectory() as folder:
         os.environ["LIVER_STUDY_STORE"] = str(Path(folder) / "store")
-        for case, flags in CASES.items():
-            table.writerows(measured(case, scene, flags, Path(folder)))
-            sys.stdout.flush()
+        rows = [
+            (here, *row)
+            for case, flags in CASES.items()
+            for row in measured(case, scene, flags, Path(folder))
+        ]
+    others = [row for row in read(TABLE) if row[0] != here]
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *others, *rows])
+
+
+def read(path: Path) -> list[tuple[str, ...]]:
+    """Rows of a table without its head; none if there is no table."""
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return [tuple(row) for row in csv.reader(file)][1:]
 
 
 def measured(
@@ -75,7 +91,7 @@ def measured(
         wall = time.perf_counter() - started
     if status:
         sys.exit(said)
-    spent, load = used.ru_utime + used.ru_stime, os.getloadavg()[0]
+    spent = used.ru_utime + used.ru_stime
     yield (
         case,
         "whole",
@@ -83,7 +99,7 @@ def measured(
         f"{wall:.2f}",
         f"{spent:.2f}",
         f"{max(sizes) / 1e6:.0f}",
-        f"{load:.1f}",
+        f"{load():.1f}",
     )
     if "nothing to compute" in said:
         return
