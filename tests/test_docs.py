@@ -2,7 +2,6 @@
 
 import csv
 import functools
-import importlib.util
 import io
 import json
 import os
@@ -16,6 +15,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from docs.figures import figures, tables
+from docs.figures.lattice import field_error
+from docs.figures.pages import MARK, pages, updated
 from study.commands import app
 from study.scene.file import read_scene
 
@@ -26,16 +28,7 @@ PATH = re.compile(r"`((?:study|fem_reference|msm|fuzzy|reports|tests|docs)/[\w./
 COMMAND = re.compile(r"`liver-study ([a-z]+)([^`]*)`")
 
 
-def load(name):
-    """A program of the pages, which are no package."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-figures = load("figures")
-PAGES = figures.pages()
+PAGES = pages()
 
 
 def blocks(page, kind):
@@ -67,13 +60,13 @@ def is_quick(block):
 
 @pytest.fixture(scope="module")
 def known():
-    return figures.figures()
+    return figures()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_figures_are_those_of_the_tables(page, known):
     text = page.read_text()
-    assert text == figures.updated(text, known), "stale: python docs/figures.py"
+    assert text == updated(text, known), "stale: python -m docs.figures"
 
 
 def test_a_wrong_figure_and_an_unknown_one_are_seen(known):
@@ -81,22 +74,22 @@ def test_a_wrong_figure_and_an_unknown_one_are_seen(known):
     page = (ROOT / "README.md").read_text()
     wrong = re.sub(r"(<!-- figure: springs-10mm -->)24 %", r"\g<1>23 %", page)
     assert wrong != page
-    assert figures.updated(wrong, known) == page
+    assert updated(wrong, known) == page
     with pytest.raises(ValueError, match="figure springs-11mm"):
-        figures.updated("<!-- figure: springs-11mm -->1 %<!-- -->", known)
+        updated("<!-- figure: springs-11mm -->1 %<!-- -->", known)
 
 
 def test_a_figure_follows_its_table(monkeypatch):
     """Negative control: another table gives other figures."""
-    read = figures.read
+    read = tables.read
 
     def doubled(path):
         lines = read(path)
         return [line | {"error": str(2 * float(line["error"]))} for line in lines]
 
-    before = dict(figures.field_error())
-    monkeypatch.setattr(figures, "read", doubled)
-    after = dict(figures.field_error())
+    before = dict(field_error())
+    monkeypatch.setattr(tables, "read", doubled)
+    after = dict(field_error())
     assert before["volume-10mm"] == "4.0 %"
     assert after["volume-10mm"] == "8.0 %"
 
@@ -104,13 +97,13 @@ def test_a_figure_follows_its_table(monkeypatch):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_mark_is_closed_and_opens_no_line_of_prose(page):
     text = page.read_text()
-    assert text.count("<!-- figure:") == len(figures.MARK.findall(text))
+    assert text.count("<!-- figure:") == len(MARK.findall(text))
     # A comment at the start of a line ends the paragraph in Markdown.
     assert not re.search(r"^ *<!-- figure: [\w.-]+ -->[^\n]", text, re.MULTILINE)
 
 
 def test_every_figure_is_quoted(known):
-    quoted = {name for page in PAGES for _, name, _, _ in figures.MARK.findall(page.read_text())}
+    quoted = {name for page in PAGES for _, name, _, _ in MARK.findall(page.read_text())}
     assert quoted == set(known)
 
 
@@ -124,7 +117,7 @@ def test_the_kept_estimates_are_those_of_the_program():
         cwd=ROOT,
     )
     answers = json.loads(done.stdout)
-    kept = {line["model"]: line for line in figures.read("docs/data/liver.csv")}
+    kept = {line["model"]: line for line in tables.read("docs/data/liver.csv")}
     for system in ("mamdani", "sugeno", "interval-type-2"):
         found = next(value for key, value in walk(answers) if key == system)
         estimate = found["estimate_pa"] if isinstance(found, dict) else found
@@ -145,7 +138,7 @@ def test_the_kept_run_is_that_of_today():
         pytest.skip("no results/liver: run liver-study run first")
     with (folder / "errors.csv").open(newline="") as file:
         errors = {tuple(row[:3]): float(row[3]) for row in list(csv.reader(file))[1:]}
-    for line in figures.read("docs/data/liver.csv"):
+    for line in tables.read("docs/data/liver.csv"):
         key = (line["model"], "fem", "field-relative-l2-peak")
         if line["field_difference"]:
             assert errors[key] == pytest.approx(float(line["field_difference"]), abs=5e-4)

@@ -1,0 +1,85 @@
+"""Predictions of `liver-study plan` against the errors found."""
+
+from collections.abc import Iterator
+from statistics import median
+
+from docs.figures.formats import table
+from docs.figures.places import place
+from docs.figures.tables import Line, grouped, measured, ratios
+
+PREDICTED = {
+    "geometry": ("large displacements left out", "nonlinear"),
+    "remainder_20": ("the same on a corrected lattice of 20 mm", "error_20"),
+    "remainder_15": ("15 mm", "error_15"),
+    "remainder_10": ("10 mm", "error_10"),
+    "near": ("graded, 5 mm to 0.6 radii", "graded_near_error"),
+    "far": ("graded, 5 mm to 1 radius", "graded_error"),
+    "alone_10": ("a lattice of 10 mm alone", "uniform_10"),
+    "alone_5": ("5 mm alone", "uniform_5"),
+    "mesh": ("elements' mesh, at rest", "mesh_found"),
+}
+"""By columns of `planned_places`: words, and the column of what was found."""
+PLACES_HEAD = (
+    "prediction of",
+    "places",
+    "error within twice",
+    "error / prediction: median, largest",
+)
+TOOLS_HEAD = (
+    *("quantity", "lattices", "error within prediction", "within 1.5 times"),
+    *("error / prediction: median, largest", "from two lattices: within", "largest"),
+)
+STATED = (("index", 3.0), ("bare", 1.0))
+"""Factors on the difference of two lattices, by the names of figures."""
+
+
+def planned() -> Iterator[tuple[str, str]]:
+    """What a plan predicts at random places of the tool, against the error found there."""
+    corrected = {place(one): one for one in measured("corrected_places")}
+    graded = {place(one): one for one in measured("graded_places")}
+    lines = [
+        graded.get(place(one), {}) | corrected[place(one)] | one
+        for one in measured("planned_places")
+    ]
+    yield "planned-count", str(len(lines))
+    rows = [_predicted(lines, prediction, *known) for prediction, known in PREDICTED.items()]
+    yield "planned-places", table(PLACES_HEAD, rows)
+    control = ratios(lines, "static_20", over="remainder_20")
+    yield "planned-control", str(sum(one <= 2.0 for one in control))
+    yield "planned-elements", str(sum(map(_elements_within_twice, lines)))
+
+
+def _predicted(lines: list[Line], prediction: str, words: str, found: str) -> list[str]:
+    """How often the error found is within twice the prediction."""
+    known = ratios((one for one in lines if found in one), found, over=prediction)
+    within = sum(one <= 2.0 for one in known)
+    return [words, str(len(known)), str(within), f"{median(known):.2g}, {max(known):.2g}"]
+
+
+def _elements_within_twice(line: Line) -> bool:
+    """Whether linear elements are as exact as predicted: large displacements and mesh together."""
+    found = float(line["nonlinear"]) + float(line["mesh_found"])
+    return found <= 2.0 * (float(line["geometry"]) + float(line["mesh"]))
+
+
+def planned_tools() -> Iterator[tuple[str, str]]:
+    """What a plan predicts under moved tools, and what two lattices would."""
+    every = measured("planned_tools")
+    lines = [one for one in every if float(one["found"]) > 1e-3]  # else a bonded tool holds it
+    quantities = grouped(lines, lambda line: line["quantity"])
+    yield "planned-tools-scenes", str(len({one["scene"] for one in lines}))
+    for quantity, of in quantities.items():
+        by_two = ratios(of, "found", over="by_two")
+        if quantity != "at all points":
+            for name, factor in STATED:
+                covered = f"{sum(one <= factor for one in by_two)} of {len(by_two)}"
+                yield f"spacing-{name}-{quantity.replace(' ', '-')}", covered
+    yield "planned-tools", table(TOOLS_HEAD, [_tools(*one) for one in quantities.items()])
+
+
+def _tools(quantity: str, lines: list[Line]) -> list[str]:
+    plan, by_two = (ratios(lines, "found", over=name) for name in ("foretold", "by_two"))
+    within = [str(sum(one <= limit for one in plan)) for limit in (1.0, 1.5)]
+    spread = f"{median(plan):.2g}, {max(plan):.2g}"
+    other = [str(sum(one <= 1.0 for one in by_two)), f"{max(by_two):.2g}"]
+    return [quantity, str(len(plan)), *within, spread, *other]
