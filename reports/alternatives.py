@@ -11,7 +11,7 @@ from reports.digits import percent, short, significant, words
 from reports.motion_figures import peak, probe_groups
 from reports.ranking import tool_probe
 from reports.rule_view import view_names
-from study.results.folder import Results
+from study.results import Results
 
 MILLI = 1e3
 PEAK = "field-relative-l2-peak"

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from study.results.folder import Results
+from study.results import Results
 
 SYSTEM_NAMES = {"mamdani": "Mamdani", "sugeno": "Sugeno", "interval-type-2": "Interval type-2"}
 REFERENCE_NAMES = {

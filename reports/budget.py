@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from reports.appearance import labels, reference_name
 from reports.differences import resolved
 from reports.digits import DASH, Table, fixed, percent
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import BudgetPart, ErrorBudget
 
 CAUSES = {"stiffness": "estimate of stiffness"}

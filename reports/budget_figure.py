@@ -10,7 +10,7 @@ from reports import canvas
 from reports.appearance import looks
 from reports.budget import SMALL, by_reference, cause_name, signed
 from reports.digits import percent
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

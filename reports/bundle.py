@@ -21,9 +21,8 @@ from importlib.metadata import distributions, metadata
 from pathlib import Path
 
 from reports.credibility import credibility
+from study.results import Results, ResultsError, manifest
 from study.results import folder as results_folder
-from study.results import manifest
-from study.results.folder import Results, ResultsError
 from study.results.provenance import (
     ROOT,
     mesh_sha256,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from reports.digits import DASH, Table, percent, significant, words
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import CertifiedReduction, ModelRecord
 
 DIGITS = 2

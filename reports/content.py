@@ -16,7 +16,7 @@ from reports.reference import is_built_in_liver, reference
 from reports.reference_spacing import reference_spacing
 from reports.rule_view import view_names
 from reports.tool_force import force_rows, overlap
-from study.results.folder import Results
+from study.results import Results
 
 SCENE_COLUMNS = 4
 

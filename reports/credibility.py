@@ -16,7 +16,7 @@ from reports.page.answer import answer, curve_error, question
 from reports.ranking import tool_probe
 from reports.validation import validation
 from reports.verification import outcomes
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import ModelRecord
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from reports import canvas
 from reports.appearance import labels
 from reports.field_figures import BLUE, HELD, PEAK, RED, colour_limit, drawable
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

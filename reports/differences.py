@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from reports.digits import percent
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import ModelRecord
 
 ELEMENTS = ("fem", "hyperelastic")

@@ -15,7 +15,7 @@ from reports.camera import Camera, facing_tool
 from reports.differences import elements
 from reports.digits import fixed, short, significant
 from reports.renders import Job, Pictures
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from reports.digits import short
 from reports.motion_figures import draw_motion, motions
 from reports.page.answer import nearest
 from reports.ranking import tool_probe
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

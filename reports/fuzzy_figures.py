@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reports import canvas
 from reports.appearance import SYSTEM_NAMES, Dashes, Style, system_colour, system_name
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

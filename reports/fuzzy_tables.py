@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from reports.appearance import system_name
 from reports.digits import DASH, PA_PER_KPA, Table, fixed, percent, words
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import StiffnessSet
 from study.results.tables import SensitivityEntry
 

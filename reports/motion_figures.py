@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from reports import canvas
 from reports.appearance import Look, looks
 from reports.digits import short
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

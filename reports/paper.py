@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study.results.folder import Results
+from study.results import Results
 from study.robustness.paper import TABLE_III, elastography_sources, table_i
 
 __all__ = ["TABLE_I", "TABLE_III", "TABLE_III_SPREAD", "sources"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.results.folder import Results
+from study.results import Results
 from study.results.numerical import numerical_errors
 from study.results.tables import ScoreDifference
 

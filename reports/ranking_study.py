@@ -11,7 +11,7 @@ from reports.benchmarks import Line, read
 from reports.digits import Table, count, fixed, interval, percent, significant, symbols, words
 from reports.paper import TABLE_III
 from reports.tables import CURVE_NAMES, MEASURE_NAMES
-from study.results.folder import Results
+from study.results import Results
 
 NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
     "ranking_nearest",

@@ -8,7 +8,7 @@ from functools import partial
 from reports.differences import finite_elements
 from reports.digits import DASH, count, fixed, percent, significant, words
 from reports.summary import LAWS, printed_peak
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import ElementsRecord, MeshLevel, ModelRecord
 from study.scene.schema import Scene
 

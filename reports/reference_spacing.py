@@ -16,7 +16,7 @@ from reports.benchmarks import Line, read
 from reports.digits import fixed
 from reports.paper import TABLE_III
 from reports.ranking_study import SPACING, is_ranked, winners_over_spacing
-from study.results.folder import Results
+from study.results import Results
 
 MILLI = 1e3
 

@@ -31,7 +31,8 @@ from reports.renders import Pictures, render
 from reports.rule_view import rule_figures
 from reports.sensitivity_figure import sensitivity_figure
 from reports.tool_force import force_figure
-from study.results.folder import Results, ResultsError, read
+from study.results import Results, ResultsError
+from study.results.folder import read
 from study.results.records import Provenance
 from study.stages.cached_arrays import cached_arrays, kept
 from study.stages.job_pool import Job, available, job_pool

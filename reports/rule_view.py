@@ -11,7 +11,7 @@ from reports import canvas
 from reports.appearance import Style, system_colour, system_name
 from reports.digits import fixed
 from reports.fuzzy_figures import Arrays, still_moving
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import floor, log10
 
 from reports.digits import fixed
-from study.results.folder import Results
+from study.results import Results
 
 MOST = 4
 """Decimals of a score that is known to more."""

@@ -8,7 +8,7 @@ from reports.appearance import labels
 from reports.digits import DASH, Table, fixed
 from reports.ranking import columns, rank_table, references, times_first, tool_probe
 from reports.tables import CURVE_NAMES, MEASURE_NAMES, tiny_too
-from study.results.folder import Results
+from study.results import Results
 from study.results.tables import ScoreError
 
 

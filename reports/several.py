@@ -13,7 +13,7 @@ from reports.digits import DASH, PA_PER_KPA, significant, with_error
 from reports.motion_figures import peak
 from reports.page.answer import curve_error
 from reports.ranking import tool_probe
-from study.results.folder import Results
+from study.results import Results
 
 PEAK = "field-relative-l2-peak"
 HEADER = ("quantity", "model", "unit")

@@ -15,7 +15,7 @@ from reports.page.answer import curve_error
 from reports.ranking import tool_probe
 from reports.report import compile_pdf
 from reports.several import Compared
-from study.results.folder import Results
+from study.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -33,7 +33,7 @@ from reports.ranking import (
     tool_probe,
 )
 from reports.score_digits import decimals
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import LargeStrain, LatticeLimits, ModelRecord
 
 GLANCE = (

@@ -34,7 +34,7 @@ from reports.ranking import (
 )
 from reports.score_digits import printed_score, score_decimals
 from reports.summary import printed_margin, real_time_factor, status
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import CorrectionRecord, CurveErrors, ModelRecord, SystemEstimate
 from study.scene.file import resolved as resolved_scene
 from study.similarity.score import FORMULAS

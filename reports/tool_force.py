@@ -8,7 +8,7 @@ from reports import canvas
 from reports.appearance import labels, looks
 from reports.digits import DASH, Table, fixed, short, significant, with_error
 from reports.score_digits import LARGEST, NOT_RESOLVED, UNKNOWN, decimals
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import ToolForce
 
 if TYPE_CHECKING:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from study.results.folder import MARK, Results, ResultsError, read
+from study.results import Results, ResultsError
+from study.results.folder import MARK, read
 from study.results.provenance import provenance
 from study.scene import Scene
 from study.scene.file import write_scene

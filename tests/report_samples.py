@@ -16,7 +16,7 @@ import typst
 
 from reports import measured, report
 from reports.content import document
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import (
     Check,
     CurveErrors,

@@ -14,8 +14,8 @@ from reports.bundle import bundle as pack
 from reports.credibility import credibility
 from study.commands.bundle import bundle as bundle_command
 from study.commands.report import report as report_command
+from study.results import ResultsError
 from study.results import folder as results_folder
-from study.results.folder import ResultsError
 from study.results.provenance import tissue_sha256
 from study.scene.file import read_scene, write_scene
 from study.scene.schema import Inclusion, OrganTissue, StiffnessMap

@@ -13,8 +13,9 @@ import pytest
 
 from reports import canvas, several, several_pdf
 from study.commands.compare import compare as command
+from study.results import Results
 from study.results.comparison import differences, other_words
-from study.results.folder import Results, write
+from study.results.folder import write
 from study.similarity.time_history import relative_l2_distance
 from tests.report_samples import results_of, whole, with_model, with_record
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from msm.integrators import INTEGRATORS
-from study.results.folder import Results, ResultsError, read, replacing
+from study.results import Results, ResultsError
+from study.results.folder import read, replacing
 from study.results.folder import write as write_files
 from study.run.study import run_study
 from study.similarity.fields import best_factor, relative_l2

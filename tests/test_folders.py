@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from study.results.folder import ResultsError, continuing
+from study.results import ResultsError
+from study.results.folder import continuing
 from study.scene import Scene
 from study.system import folders, lock
 from study.system.folders import FolderError, claimed, replacing, write_text

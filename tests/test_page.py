@@ -21,8 +21,8 @@ from reports.page import write
 from reports.page.answer import answer, nearest, question
 from reports.page.data import film, interpolation_error, page
 from study.commands.view import view
+from study.results import ResultsError
 from study.results import folder as results_folder
-from study.results.folder import ResultsError
 from study.results.records import BudgetPart, CurveErrors, ErrorBudget
 from tests.report_samples import (
     MODELS,

@@ -23,7 +23,8 @@ from reports.field_figures import views
 from reports.ranking import leads
 from reports.tables import lead_rows
 from study.commands.report import report as report_command
-from study.results.folder import Results, ResultsError, write
+from study.results import Results, ResultsError
+from study.results.folder import write
 from study.results.records import SCHEMA_VERSION
 from study.stages.job_pool import available, job_pool
 from study.stages.threads import threads

@@ -28,7 +28,7 @@ from reports.fuzzy_tables import (
 )
 from reports.rule_view import draw_rules, kinds, rule_figures, view_names
 from reports.sensitivity_figure import layout, sensitivity_figure
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import StiffnessSet
 from study.results.tables import SensitivityEntry
 from tests.report_samples import results_of, with_record

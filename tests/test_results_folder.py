@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from reports import report
-from study.results import manifest
-from study.results.content import check
-from study.results.folder import ResultsError, read, write
+from study.results import ResultsError, manifest
+from study.results.consistency import check
+from study.results.folder import read, write
 from study.results.tables import QUANTITIES
 from study.run.study import run_study
 from study.scene.file import read_scene

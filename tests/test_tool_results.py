@@ -10,7 +10,7 @@ import pytest
 from reports.digits import with_error
 from reports.report import pdf
 from reports.tool_force import force_figure, force_rows
-from study.results.content import check
+from study.results.consistency import check
 from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import read_scene

@@ -13,7 +13,7 @@ from reports.page.write import page_of
 from study.models.lattice import PreparedLattice
 from study.problem.unfinished import UnfinishedError
 from study.results.comparison import differences
-from study.results.content import check
+from study.results.consistency import check
 from study.results.folder import read, write
 from study.run.stages import RunOptions
 from study.run.study import run_study

@@ -12,7 +12,8 @@ from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.sets import FuzzySet
 from fuzzy.systems.system import FuzzySystem, Rule, Term, Variable
 from reports.report import make_report
-from study.results.folder import ResultsError, read, write
+from study.results import ResultsError
+from study.results.folder import read, write
 from study.run.study import run_study
 from study.scene.file import SceneError, read_scene
 

@@ -24,7 +24,7 @@ from reports.ranking import references, tool_probe
 from reports.reference import is_built_in_liver
 from reports.summary import printed_peak, status
 from reports.tool_force import MOST_TOOLS, printed_force, tools
-from study.results.folder import Results
+from study.results import Results
 from study.results.numerical import numerical_errors, whole_error
 from study.results.records import BudgetPart, ModelRecord
 

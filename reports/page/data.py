@@ -19,7 +19,7 @@ from reports.page.answer import curve_error, nearest
 from reports.ranking import columns, references, score_table, tool_probe
 from reports.score_digits import Key, printed_score, score_decimals
 from reports.tables import CURVE_NAMES, MEASURE_NAMES
-from study.results.folder import Results
+from study.results import Results
 
 Floats = NDArray[np.float64]
 

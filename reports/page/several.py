@@ -14,7 +14,7 @@ from reports.page.write import head, inert, part, plotly, table
 from reports.ranking import tool_probe
 from reports.several import Compared
 from reports.several_pdf import LOOKS_FROM, alternative, moved, shared_models
-from study.results.folder import Results
+from study.results import Results
 
 MILLI = 1e3
 COLUMNS = 3

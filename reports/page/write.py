@@ -19,7 +19,8 @@ from reports.digits import Table, symbols, unbroken, words
 from reports.page.answer import Answer, answer, question
 from reports.page.data import page
 from reports.tables import provenance_rows
-from study.results.folder import Results, ResultsError, read
+from study.results import Results, ResultsError
+from study.results.folder import read
 from study.scene.file import write_scene
 from study.system.folders import FolderError, check_file, write_bytes
 

@@ -38,6 +38,7 @@ from study.models.finite_elements import PreparedElements, reference_of
 from study.organ.geometry import Level
 from study.problem.features import FEATURES
 from study.problem.problem import Problem
+from study.results import Results
 from study.results import folder as results
 from study.run.suiting import read_suited
 from study.scene import Scene
@@ -90,7 +91,7 @@ class _Target:
     scene: Scene
     folder: Path
     elements: int | None = None
-    curves: results.Results | None = None
+    curves: Results | None = None
 
 
 def export(request: ExportRequest, progress: Progress) -> Path:

@@ -5,7 +5,8 @@
 >>> plt.plot(motion.time, motion.displacement)
 """
 
-from study.results.folder import Results, ResultsError
+from study.results.errors import ResultsError
 from study.results.records import ModelRecord, StudyRecord
+from study.results.results import Results
 
 __all__ = ["ModelRecord", "Results", "ResultsError", "StudyRecord"]

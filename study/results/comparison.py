@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.results.arrays import Arrays
-from study.results.folder import Results
+from study.results.results import Results
 from study.results.tables import TABLES, TableFile
 from study.scene.file import resolved
 

@@ -22,44 +22,24 @@ import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from study.problem.response import Motion, ToolCurve
 from study.results import arrays as npz
 from study.results import manifest
-from study.results.arrays import Arrays
-from study.results.content import check
+from study.results.consistency import check
 from study.results.errors import ResultsError
-from study.results.records import SCHEMA_VERSION, ModelRecord, StudyRecord
-from study.results.tables import (
-    TABLES,
-    BandSample,
-    CertifiedSample,
-    CurveSample,
-    FieldDifference,
-    Iso18571Rating,
-    ScoreDifference,
-    ScoreError,
-    SensitivityEntry,
-    SimilarityScore,
-    TableFile,
-    ToolForceSample,
-    ToolForceScore,
-    read_table,
-    write_table,
-)
+from study.results.records import SCHEMA_VERSION, StudyRecord
+from study.results.results import Results
+from study.results.tables import TABLES, FieldDifference, TableFile, read_table, write_table
 from study.scene.file import validate, write_scene
 from study.scene.schema import Scene
 from study.system import folders
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
-
-__all__ = ["Arrays", "Results", "ResultsError", "read", "replacing", "write"]
 
 MARK, SCENE = "results.json", "scene.toml"
 FILES = manifest.DATA | {manifest.NAME, manifest.REPORT, manifest.PAGE, "export"}
@@ -68,67 +48,6 @@ CHECKSUMS = "sha256"
 """Where results.json has the checksums of the other files, so that two runs are not mixed."""
 
 START_AGAIN = "start again: stages that had ended are kept, and no model had a state to --resume"
-
-
-@dataclass(frozen=True)
-class Results:
-    """Content of a results folder.
-
-    `record`: the numbers; then the rows of the tables. `fields`: arrays of the surface and of each
-    model's displacement on it; `fuzzy`: sets and output surfaces. Both are for figures, and empty
-    where a scene has none.
-    """
-
-    scene: Scene
-    record: StudyRecord
-    curves: tuple[CurveSample, ...] = ()
-    bands: tuple[BandSample, ...] = ()
-    certified: tuple[CertifiedSample, ...] = ()
-    tool_forces: tuple[ToolForceSample, ...] = ()
-    tool_scores: tuple[ToolForceScore, ...] = ()
-    scores: tuple[SimilarityScore, ...] = ()
-    ratings: tuple[Iso18571Rating, ...] = ()
-    score_errors: tuple[ScoreError, ...] = ()
-    score_differences: tuple[ScoreDifference, ...] = ()
-    field_differences: tuple[FieldDifference, ...] = ()
-    sensitivity: tuple[SensitivityEntry, ...] = ()
-    fields: Arrays = field(default_factory=dict)
-    fuzzy: Arrays = field(default_factory=dict)
-
-    @classmethod
-    def load(cls, folder: Path | str) -> Results:
-        """Content of a folder, fully checked; see `read`."""
-        return read(Path(folder))
-
-    def model(self, name: str) -> ModelRecord:
-        """Record of a model. KeyError with the names there are."""
-        for record in self.record.models:
-            if record.name == name:
-                return record
-        raise KeyError(f"{name}: not among {', '.join(one.name for one in self.record.models)}")
-
-    def tool_force(self, model: str, tool: str) -> ToolCurve:
-        """Force of a rigid tool on a model's body, up to the end of the run.
-
-        KeyError for an unknown model or tool.
-        """
-        self.model(model)
-        if tool not in {one.tool for one in self.record.tools}:
-            raise KeyError(f"{tool}: is no rigid tool of this scene")
-        rows = [row[2:] for row in self.tool_forces if row.model == model and row.tool == tool]
-        return ToolCurve(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
-
-    def curve(self, model: str, probe: str) -> Motion:
-        """Time [s], displacement [m] and velocity [m/s] along the push, (samples,) each.
-
-        Samples after the divergence of a run are missing. KeyError for an unknown model or control
-        point.
-        """
-        self.model(model)
-        if probe not in self.record.probes:
-            raise KeyError(f"{probe}: not among {', '.join(self.record.probes)}")
-        rows = [row[2:] for row in self.curves if row.model == model and row.probe == probe]
-        return Motion(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
 def write(results: Results, folder: Path) -> None:

@@ -19,7 +19,8 @@ from study.models.model import SILENT, ModelRun, Watch
 from study.models.table import is_tuned, references
 from study.problem.response import Response
 from study.problem.trajectory import Trajectory
-from study.results.folder import Arrays, Results
+from study.results import Results
+from study.results.arrays import Arrays
 from study.results.provenance import mesh_sha256, organ_sha256, provenance, tissue_sha256
 from study.results.records import (
     ControlPoint,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from study.problem.trajectory import Status
 from study.results.arrays import Shapes, check_names, check_numbers, check_shapes
 from study.results.records import DiscretisationError, ModelRecord, StudyRecord
+from study.results.results import Results
 from study.results.tables import (
     QUANTITIES,
     BandSample,
@@ -27,9 +28,6 @@ from study.results.tables import (
     pairs,
 )
 from study.scene.schema import Scene
-
-if TYPE_CHECKING:
-    from study.results.folder import Results
 
 Floats = NDArray[np.float64]
 
