@@ -30,7 +30,9 @@ def _rows(model: ModelRecord) -> Iterator[list[str]]:
 
 def _bounds(found: CertifiedReduction, probe: str) -> list[str]:
     shares = (found.displacement[probe], found.energy, found.rest)
-    curve, energy, rest = (f"{_above(100.0 * share)} %" for share in shares)
+    curve, energy, rest = (
+        DASH if share is None else f"{_above(100.0 * share)} %" for share in shares
+    )
     return [curve, _above(1e3 * found.largest_m[probe]), energy, rest]
 
 

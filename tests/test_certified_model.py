@@ -11,7 +11,8 @@ import pytest
 from fem_reference.certified import Bound
 from fem_reference.subspace import ritz_subspace, superposition
 from reports import report
-from reports.certified import certified_rows
+from reports.certified import _bounds, certified_rows
+from reports.digits import DASH
 from study.models import certified as summary
 from study.models import superposition as model
 from study.models.model import SILENT
@@ -108,6 +109,27 @@ def test_the_record_is_that_of_planted_bounds(monkeypatch):
     share = np.hypot(0.2, 0.4) * 1e-3 / 5.0
     assert record.displacement == pytest.approx({"tool": share, "far": 2.0 * share})
     assert record.largest_m == pytest.approx({"tool": 4e-4, "far": 8e-4})
+
+
+def test_what_stays_where_it_is_has_a_bound_in_metres_but_no_relative_one(monkeypatch):
+    """Neither a point that never moves, nor a motion without any energy."""
+    monkeypatch.setattr(summary, "CertifiedMotion", Planted)
+    monkeypatch.setattr(Planted, "norms", (0.0,) * 5)
+    seen = SimpleNamespace(times=np.array([0.0, 0.2, 0.4]))
+    problem = SimpleNamespace(observation=seen, factor=None, probes=("tool", "far"))
+    given = SimpleNamespace(squares=np.ones(7), error_at_rest=0.01, rounding=0.02)
+    curves = np.zeros((3, 2, 3))
+    curves[1:, 0, 0] = 3.0, 4.0
+    record, _ = summary.certified(given, None, problem, 2, curves)
+    assert record.displacement == {
+        "tool": pytest.approx(np.hypot(0.2, 0.4) * 1e-3 / 5.0),
+        "far": None,
+    }
+    assert record.largest_m == pytest.approx({"tool": 4e-4, "far": 8e-4})
+    assert record.energy is None
+    printed = _bounds(record, "far")
+    assert printed[0] == printed[2] == DASH
+    assert printed[1] == "0.80"
 
 
 def test_results_keep_it_and_the_report_prints_it_apart(found, tmp_path):

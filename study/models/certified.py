@@ -39,16 +39,22 @@ def certified(
         bounds.append(moving.bound.displacement)
     found = np.array(bounds)
     curves = np.linalg.norm(motion, axis=(0, 2))
-    shares = np.linalg.norm(found, axis=0) / np.where(curves > 0.0, curves, 1.0)
+    over_time = np.linalg.norm(found, axis=0)
+    shares = [share(bound, size) for bound, size in zip(over_time, curves, strict=True)]
     record = CertifiedReduction(
         vectors=len(given.squares),
-        energy=energy / (largest or 1.0),
+        energy=share(energy, largest),
         rest=given.error_at_rest,
         rounding=given.rounding,
-        displacement=dict(zip(problem.probes, shares.tolist(), strict=True)),
+        displacement=dict(zip(problem.probes, shares, strict=True)),
         largest_m=dict(zip(problem.probes, found.max(axis=0).tolist(), strict=True)),
     )
     return Certified(record, found)
+
+
+def share(bound: float, size: float) -> float | None:
+    """A bound over the size of what it bounds; None of what is zero."""
+    return float(bound / size) if size > 0.0 else None
 
 
 def bound_on_demand(

@@ -10,8 +10,10 @@ from study.results.records import CurveErrors, ModelRecord
 def numerical_errors(
     reference: ModelRecord, models: Sequence[ModelRecord], probe: str, curve: str
 ) -> list[float | None]:
-    """Relative L2 errors of curves: time step and rounding, mesh and subspace of the reference.
+    """Relative L2 errors of curves: time step and rounding, and mesh of the reference.
 
+    The error by its mesh includes that by its subspace, which is stated alone where the former is
+    not estimated.
     Their sum approximately bounds the change of a relative L2 score of these models, or of their
     difference; for other measures it is a yardstick. None stands for an error that is not
     estimated. A spring lattice is a model at its spacing, and has no discretisation error of its
@@ -29,8 +31,10 @@ def numerical_errors(
         return steps
     mesh = elements.mesh_error
     by_mesh = None if mesh is None else _of_curve(curve, mesh.by_probe.get(probe))
+    if by_mesh is not None:
+        return [*steps, by_mesh]
     left = _of_curve(curve, elements.truncation)
-    return [*steps, by_mesh, (elements.truncation_error if left is None else left) or 0.0]
+    return [*steps, None, (elements.truncation_error if left is None else left) or 0.0]
 
 
 def whole_error(parts: Sequence[float | None]) -> float | None:

@@ -89,16 +89,17 @@ class CertifiedReduction:
     For the same load, linear over the same steps; discretisation and time-step errors are not
     included. `energy`: largest bound on the error's energy norm over the largest norm of the
     motion; by control point the bound on the displacement error in relative L2 of its curve, and
-    the largest [m]. `rest`: of the energy norm at rest under the full load. `vectors`: dimension of
-    the Krylov space that bounds the error; `rounding`: contribution of rounding to `energy` where
-    the whole load is applied at once.
+    the largest [m]. Relative bounds are None of a motion, or a point, that stays where it is.
+    `rest`: of the energy norm at rest under the full load. `vectors`: dimension of the Krylov space
+    that bounds the error; `rounding`: contribution of rounding to `energy` where the whole load is
+    applied at once.
     """
 
     vectors: int
-    energy: float
+    energy: float | None
     rest: float
     rounding: float
-    displacement: dict[str, float]
+    displacement: dict[str, float | None]
     largest_m: dict[str, float]
 
 

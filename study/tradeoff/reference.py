@@ -72,16 +72,17 @@ def solve(scene: Plain, mesh_sha256: str | None) -> Plain:
     run = reference.prepare(given.problem).run(SILENT)
     elements, steps = run.record.elements, run.record.time_step_errors
     assert isinstance(elements, ElementsRecord)  # noqa: S101 - finite elements have one
-    rest = (elements.truncation_error or 0.0) + max(one.displacement for one in steps.values())
-    mesh = elements.mesh_error
+    by_steps = max(one.displacement for one in steps.values())
+    by_vectors = elements.truncation_error or 0.0
+    mesh = elements.mesh_error  # of curves, it includes that by the vectors
     probes, finished = given.problem.probes, run.trajectory.status == "finished"
     return asdict(
         SolvedReference(
             field=plain(run.trajectory.volume_field[0]) if finished else [],
             curves=plain(run.trajectory.displacement) if finished else [],
-            field_error=None if mesh is None else mesh.field_peak + rest,
+            field_error=None if mesh is None else mesh.field_peak + by_vectors + by_steps,
             curve_errors=(
-                None if mesh is None else [mesh.by_probe[p].displacement + rest for p in probes]
+                None if mesh is None else [mesh.by_probe[p].displacement + by_steps for p in probes]
             ),
             unknowns=elements.unknowns,
             element=elements.element,
