@@ -121,7 +121,7 @@ def test_a_run_states_sizes_and_errors(scene):
     (words,) = [text for text in found.record.assumptions if "within 2 %" in text]
     assert "2.5 mm" in words
     lines = model(given, "region").prepare(problem_of(given)).describe()
-    assert any("nodes hang" in text and "at rest" in text for text in lines)
+    assert any("hanging nodes" in text and "at rest" in text for text in lines)
 
 
 def test_a_graded_lattice_is_corrected(scene):
