@@ -25,7 +25,7 @@ LARGEST_COUNT = 200_000
 
 # ROS4 with an L-stable choice of gamma: Hairer and Wanner, Solving Ordinary Differential Equations
 # II, table IV.7.2 (order 4, embedded order 3), in the form that needs no product with a Jacobian.
-_GAMMA = 0.57282062500000000
+_GAMMA = 0.57282
 _A21, _A31, _A32 = 2.0, 1.867943637803922, 0.2344449711399156
 _C21, _C31, _C32 = -7.137615036412310, 2.580708087951457, 0.6515950076447975
 _C41, _C42, _C43 = -2.137148994382534, -0.3214669691237626, -0.6949742501781779

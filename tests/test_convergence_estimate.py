@@ -75,6 +75,16 @@ def test_two_meshes_take_the_assumed_order_with_a_larger_factor():
     assert found.error == pytest.approx(SAFETY_ASSUMED * true_error(results))
 
 
+@pytest.mark.parametrize("factors", [(0.16, 0.04, 0.01), (0.03, -0.02, 0.01), (0.0, 0.01, 0.05)])
+def test_meshes_before_the_last_three_do_not_count(factors):
+    """Where an order is seen, where results alternate and where they diverge."""
+    sizes = (0.4, 0.2, 0.1)
+    results = [LIMIT + s * ERROR for s in factors]
+    far = LIMIT + 7.0 * ERROR
+    found = discretisation_error([far, *results], (0.7, *sizes), 3.0)
+    assert found == discretisation_error(results, sizes, 3.0)
+
+
 def test_weights_count():
     sizes, weights = (0.4, 0.2, 0.1), np.array([1.0, 0.0])
     results = sequence(sizes, 2.0)

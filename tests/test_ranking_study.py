@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.stats import qmc, sobol_indices
 
 from msm import control_point, oscillators
@@ -57,6 +58,32 @@ def test_a_point_let_go_swings_as_the_damped_oscillator_of_eq_1():
     decay, w = c / (2 * m), np.sqrt(k / m - (c / (2 * m)) ** 2)
     exact = x0 * np.exp(-decay * TIMES) * (np.cos(w * TIMES) + decay / w * np.sin(w * TIMES))
     assert found == pytest.approx(exact, abs=1e-6 * x0)
+
+
+def test_the_steps_of_a_point_are_of_order_four_and_their_error_estimates_of_order_three():
+    """Of equal steps: adaptive ones would become shorter and hide a wrong coefficient."""
+    m, k1, k2, c0, c1 = 0.06, 9.0, 4e3, 0.7, 200.0
+    point = oscillators.Oscillator(m, H0, k1, k2, 1.0, c0, c1, 5e-4)
+    load = oscillators.Load(oscillators.SINUSOID, 20e-3, (0.0, 0.0, 0.0), 15.0)
+
+    def rates(t, state):
+        x, v = state
+        spring = k1 * x + k2 * x**3 / H0**2
+        return v, (20e-3 * np.sin(15.0 * t) - spring - (c0 + c1 * abs(x)) * v) / m
+
+    exact = solve_ivp(rates, (0.0, 0.2), (5e-4, 0.0), "DOP853", rtol=1e-13, atol=1e-16)
+    assert exact.y[0].min() > 0.0  # the damping has no derivative at 0
+    errors, estimates = [], []
+    for count in (80, 160, 320):
+        h, state = 0.2 / count, (5e-4, 0.0)
+        for n in range(count):
+            *state, _, _ = oscillators._step(point, load, n * h, *state, h)
+        errors.append(np.abs(state - exact.y[:, -1]))
+        *_, in_x, in_v = oscillators._step(point, load, 0.1, 6e-4, 3e-3, h)
+        estimates.append([in_x, in_v])
+    orders, local = (np.log2(np.divide(e[:-1], e[1:])) for e in (errors, estimates))
+    assert orders[-1] == pytest.approx([4.0, 4.0], abs=0.2)
+    assert local[-1] == pytest.approx([4.0, 4.0], abs=0.3)
 
 
 def motion(seed):

@@ -16,6 +16,7 @@ from msm.integrators import INTEGRATORS, UNBOUNDED
 from msm.kinematics import inverted_cells
 from msm.lattice import build, node_volumes
 from msm.laws import Basafa, Hooke, piecewise
+from msm.linearised import largest_strain, largest_vector_change
 from msm.model import (
     Automatic,
     Counts,
@@ -106,6 +107,46 @@ def test_the_frequency_of_a_deformed_lattice_is_that_of_its_forces(law, nu, line
     exact = dense_frequency(stiffness_by_differences(law, net, u), body.mass)
     assert largest_frequency(law, net, u)[0] == pytest.approx(exact, rel=5e-4)
     assert frequency_bound(law, net, u) >= exact
+
+
+@pytest.mark.parametrize("stretch", [0.0, 0.3, -0.3])
+def test_one_spring_reaches_the_bound_along_it_or_across(stretch):
+    """Beyond the kink the tension has hardly a slope, and the spring is stiffest across."""
+    law = piecewise([-0.5, 0.0, 0.1, 0.5], [-5.0, 0.0, 2.0, 2.1])
+    body, material = column((1, 1, 1), 0.45, held=False)
+    net = arrays(body, material)
+    one = net._replace(
+        ends=net.ends[:1], rest=net.rest[:1], length=net.length[:1], scale=net.scale[:1]
+    )
+    one = one._replace(bulk=np.zeros_like(net.bulk))
+    u = stretch * body.lattice.nodes
+    exact = largest_frequency(law, one, u)[0]
+    assert frequency_bound(law, one, u) == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_one_cell_at_rest_reaches_the_bound_as_it_swells(linear):
+    body, material = column((1, 1, 1), 0.45, held=False)
+    net = arrays(body, material, linear=linear)
+    net = net._replace(scale=np.zeros_like(net.scale))
+    still = np.zeros_like(body.load)
+    exact = largest_frequency(material.law, net, still)[0]
+    assert frequency_bound(material.law, net, still) == pytest.approx(exact, rel=1e-6)
+
+
+def test_strains_and_changes_of_springs_are_those_of_the_deformation():
+    """Of a stretch by axes, whose edges change most, and of a turn, which strains nothing."""
+    body, material = column((2, 2, 2))
+    net, nodes = arrays(body, material), body.lattice.nodes
+    still = np.zeros_like(nodes)
+    u = nodes * [0.1, -0.3, 0.2]
+    assert largest_strain(net, u) == pytest.approx(0.3, rel=1e-12)
+    assert largest_vector_change(net, u, still) == pytest.approx(0.3, rel=1e-12)
+    assert largest_vector_change(net, u + 0.01, nodes * [0.1, 0.1, 0.3]) == pytest.approx(0.4)
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = nodes @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) - nodes
+    assert largest_strain(net, turned) < 1e-12
+    assert largest_vector_change(net, turned, still) == pytest.approx(2.0 * np.sin(0.35))
 
 
 def test_springs_alone_outgrow_their_frequency_at_rest_but_never_its_bound(rng):

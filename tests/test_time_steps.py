@@ -92,6 +92,17 @@ def test_samples_within_steps_are_as_good_as_the_steps(method, coarse, small_pos
         assert error < 0.01 * np.linalg.norm(c)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.7, 1.0])
+def test_a_cubic_motion_is_exact_within_a_step(share, rng):
+    """Displacement and velocity between the ends of a step of 0.3 s."""
+    motion = np.polynomial.Polynomial(rng.standard_normal(4))
+    speed, step = motion.deriv(), 0.3
+    start, end = ((motion(t), speed(t)) for t in (1.0, 1.0 + step))
+    found = dynamics.hermite(start, end, share, step)
+    at = 1.0 + share * step
+    assert found == pytest.approx((motion(at), speed(at)), rel=1e-12)
+
+
 def test_a_superposition_is_exact_within_its_steps(coarse):
     ritz = fem.ritz_subspace(coarse, 6)
     times = np.linspace(0.0, 0.5, 11)

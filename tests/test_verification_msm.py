@@ -61,6 +61,22 @@ def test_uniform_strain_stores_the_energy_of_e_and_a_quarter(make, flexion, body
         assert strain_energy(lattice, springs, strain) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.parametrize(("flexion", "body_diagonals"), MIXES)
+def test_each_family_has_its_share_of_the_stiffness(flexion, body_diagonals):
+    """Of the springs centred in one inner cell, which make up the whole lattice by translation."""
+    lattice = block_lattice((6, 6, 6))
+    springs = connect(lattice, flexion, body_diagonals)
+    middle = lattice.nodes[springs.ends[:, 0]] + 0.5 * springs.rest
+    inner = (np.floor(middle / H + 1e-9) == 3).all(axis=1)
+    along = np.abs(springs.rest[inner] / H)
+    axial = springs.weight[inner] * along[:, 0] ** 2 * (along[:, 1:] < 1e-9).all(axis=1)
+    assert axial[along[:, 0] > 1.5].sum() == pytest.approx(flexion * axial.sum(), rel=1e-12)
+    sheared = along[:, 0] * along[:, 1] / np.linalg.norm(along, axis=1)
+    shear = springs.weight[inner] * sheared**2
+    of_body = shear[along[:, 2] > 0.5].sum()
+    assert of_body == pytest.approx(body_diagonals * shear.sum(), rel=1e-12)
+
+
 def test_springs_without_boundary_shares_are_too_stiff():
     """Negative control: full springs on the surface must be seen, as +38 % on 4 cells a side."""
     lattice = block_lattice((4, 4, 4))
