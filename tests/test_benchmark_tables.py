@@ -6,6 +6,7 @@ from typing import NamedTuple
 import pytest
 
 from tests.benchmarks import (
+    bench_fem,
     bench_lattice,
     bench_peers,
     corrected_gravity,
@@ -13,6 +14,7 @@ from tests.benchmarks import (
     error_bar,
     error_bar_livers,
     field_error,
+    graded_cells,
     graded_places,
     large_strain,
     lattice_growth,
@@ -24,6 +26,7 @@ from tests.benchmarks import (
 from tests.benchmarks.tables import complete, read, write
 
 COMMITTED = (
+    (bench_fem.TABLE, bench_fem.Row, 4),
     (bench_lattice.TABLE, bench_lattice.Row, 6),
     (bench_lattice.KERNELS, bench_lattice.Kernel, 6),
     (bench_peers.TABLE, bench_peers.Row, 4),
@@ -33,6 +36,7 @@ COMMITTED = (
     (error_bar.TABLE, error_bar.Row, 4),
     (error_bar_livers.TABLE, error_bar_livers.Row, 4),
     (field_error.TABLE, field_error.Row, 8),
+    (graded_cells.OWN, graded_cells.Row, 4),
     (graded_places.TABLE, graded_places.Row, 4),
     (large_strain.TABLE, large_strain.Row, 6),
     (large_strain.ELEMENTS_TABLE, large_strain.Compared, 6),

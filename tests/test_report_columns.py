@@ -53,6 +53,7 @@ from study.results.records import (
     SystemEstimate,
 )
 from study.results.tables import BandSample, CurveSample, SensitivityEntry, SimilarityScore
+from study.scene.file import read_scene, write_scene
 from study.similarity.score import MEASURES
 from tests.report_samples import LATTICE, known, results_of, with_model, with_record
 
@@ -635,6 +636,46 @@ def test_a_configuration_of_the_trade_off(frame, slow, share, tmp_path):
     name = "springs and volume term, 20 mm"
     assert answers([one])[0] == ["60 Hz", "any", name, "11.0 ± 0.4 %", share, "0.66"]
     assert answers([one])[1] == ["60 Hz", "known beforehand", "none", "–", "–", "–"]
+
+
+def test_the_share_of_a_period_is_that_of_the_rate(tmp_path):
+    """Half a millisecond is half of the period at 1 kHz, and a fortieth of one of 20 ms."""
+    for rate, share in (("1khz", 0.5), ("50hz", 0.025)):
+        text = TRADEOFF.format(frame="0.4", slow="0.5").replace("60hz", rate)
+        (tmp_path / "tradeoff.csv").write_text(text)
+        (one,) = tradeoff.configurations(tmp_path)
+        assert tradeoff.share(one, rate) == pytest.approx(share)
+
+
+def test_a_configuration_under_moved_tools_has_the_error_of_their_force(tmp_path):
+    text = TRADEOFF.format(frame="3", slow="6").replace(
+        "field_error_bar,", "field_error_bar,force_error,force_error_bar,"
+    )
+    (tmp_path / "tradeoff.csv").write_text(text.replace(",0.004,", ",0.004,0.077,0.0088,"))
+    (one,) = tradeoff.configurations(tmp_path)
+    assert (one.of_force, one.error, one.bar) == (True, 0.077, 0.0088)
+    assert one.stated_error == "7.7 ± 0.9 %"
+
+
+@pytest.mark.parametrize(
+    ("scene", "mesh"),
+    [
+        ("liver", "elements of 24 mm"),
+        ("block", "mesh 2 steps coarser"),  # which has other ratios of its levels
+        (None, "mesh 2 steps coarser"),
+    ],
+)
+def test_a_mesh_is_told_by_its_elements_where_the_scene_is_the_built_in_liver(
+    scene, mesh, tmp_path
+):
+    text = TRADEOFF.format(frame="3", slow="6")
+    text = text.replace("spacing=0.02 volume_term=True", "element=p1 level=-2")
+    (tmp_path / "tradeoff.csv").write_text(text)
+    if scene is not None:
+        sized = read_scene(scene, ("reference.element_size=13.5 mm",))
+        (tmp_path / "scene.toml").write_text(write_scene(sized))
+    (one,) = tradeoff.configurations(tmp_path)
+    assert (one.name, one.mark) == (f"springs alone, linear, {mesh}", f"linear, {mesh}")
 
 
 def test_a_case_of_the_stability_study(tmp_path):

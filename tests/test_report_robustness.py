@@ -134,7 +134,9 @@ def test_the_sentence_changes_with_the_data(tmp_path):
 
 def test_an_accuracy_that_the_reference_cannot_tell_is_not_paid_for(tmp_path):
     lines = [*sample(), row("spacing=0.009", 0.04 - 0.5 * BAR, 0.45)]
-    assert "is springs and volume term, 10 mm" in sentences(write(lines, tmp_path))[0]
+    said = sentences(write(lines, tmp_path))[0]
+    assert "is springs and volume term, 10 mm" in said
+    assert "the next more accurate is springs and volume term, 5 mm" in said
     lines[-1] |= {"field_error": 0.04 - 1.5 * BAR}  # and one that it can tell is
     assert "is springs alone, 9 mm" in sentences(write(lines, tmp_path))[0]
 
@@ -143,7 +145,10 @@ def test_where_nothing_is_in_time_the_nearest_is_named(tmp_path):
     lines = [line | {"real_time_1khz": False} for line in sample()]
     found = write(lines, tmp_path)
     said = sentences(found)[1]
-    assert "no configuration for any load is real time; the fastest is springs and volume" in said
+    assert (
+        "no configuration for any load is real time; the fastest is springs and volume term, 20 mm "
+        "(error 11.0 ± 0.3 %, 4.0 % of the period)" in said
+    )
     assert [line[2] for line in answers(found)] == [
         "springs and volume term, 10 mm",
         "none",
@@ -254,6 +259,13 @@ def test_a_case_that_failed_is_counted_named_and_drawn_in_alarm(folder):
     )
     assert stability_map.ALARM.lower().encode() in stability_map.stability_map(found)
     assert stability_map.ALARM.lower().encode() in stability_map.critical_step_figure(found)
+
+
+def test_three_cases_that_failed_are_named_and_more_are_counted(folder):
+    (folder / "stability.csv").write_text(CASES.replace("True", "False"))
+    ended = told(cases(folder))[0]
+    assert ended.startswith("Of 7 cases in 3 families 7 do not end as expected: critical step, E 1")
+    assert ended.endswith("; collapse, 1 times its weight: euler and 4 more.")
 
 
 def test_the_sentences_say_how_well_steps_are_predicted_and_where_models_break(folder):

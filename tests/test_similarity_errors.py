@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from reports.ranking import leads, times_first
+from reports.ranking import Lead, leads, rank_table, times_first
 from study.problem.response import Motion
 from study.results.tables import ScoreDifference
 from study.similarity import batch, uncertainty
@@ -71,6 +72,16 @@ def test_the_interval_covers_the_score_of_an_endless_motion():
     assert 1.0 < np.mean(halves) / (1.96 * np.std(found)) < 2.0
 
 
+@pytest.mark.parametrize("count", uncertainty.BLOCK_COUNTS)
+def test_the_interval_of_a_mean_is_students(count):
+    """Means without each value in turn: their jackknife is the standard error of the mean."""
+    values = np.random.default_rng(count).normal(size=count)
+    without = (values.sum() - values) / (count - 1)
+    exact = stats.t.interval(0.95, count - 1, values.mean(), stats.sem(values))
+    half = uncertainty._half_interval(without[:, None])
+    assert half == pytest.approx(0.5 * np.ptp(exact), rel=1e-12)
+
+
 def test_the_interval_narrows_with_the_length_of_the_motion():
     rng = np.random.default_rng(7)
     halves = []
@@ -119,7 +130,8 @@ def test_the_error_of_a_difference_is_paired():
     apart = spread(first - second).interval
     alone = np.hypot(spread(first).interval, spread(second).interval)
     assert (apart < 0.25 * alone).all()
-    assert spread(first - first).interval == pytest.approx(np.zeros(7))
+    for part in spread(first - first):
+        assert part == pytest.approx(np.zeros(7))
 
 
 # --- sampling, window, axes ---------------------------------------------------------------------
@@ -170,6 +182,25 @@ def test_other_axes_move_the_phase_plane_alone():
     distance = 1.0 / found.whole[frechet] - 1.0
     assert 1.0 / found.axes[0, frechet] - 1.0 == pytest.approx(0.5 * distance, rel=1e-9)
     assert spread(found).axes[frechet] == np.abs(found.axes - found.whole)[:, frechet].max()
+
+
+def test_axes_that_lower_a_score_count_as_those_that_raise_it():
+    """A root mean square is below the reach, by which half of the reference is no longer."""
+    _, true = pair()
+    half = Motion(true.time, 0.5 * true.displacement, 0.5 * true.velocity)
+    found = variants(half, true)
+    by_reach, by_mean_square = found.axes[:, 4:]
+    assert by_reach == pytest.approx(found.whole[4:], abs=1e-12)
+    assert (by_mean_square < found.whole[4:] - 0.01).all()
+    assert spread(found).axes[4:] == pytest.approx(found.whole[4:] - by_mean_square)
+
+
+def test_the_unit_of_both_motions_moves_no_variant():
+    own, true = pair()
+    found = variants(own, true)
+    other = variants(*(Motion(m.time, 1e3 * m.displacement, 1e-2 * m.velocity) for m in pair()))
+    for name in ("whole", "halved", "windows", "axes"):
+        assert getattr(other, name) == pytest.approx(getattr(found, name), abs=1e-9), name
 
 
 def test_a_window_that_leaves_out_the_error_is_seen():
@@ -235,6 +266,21 @@ def test_a_first_rank_is_alone_or_shared():
     assert times_first(ranks) == (1, 1)
 
 
+def test_ranks_are_of_their_reference_and_control_point():
+    results = results_of()
+    numbered = tuple(
+        row._replace(first_rank=k, last_rank=k + 100) for k, row in enumerate(results.score_errors)
+    )
+    results = replace(results, score_errors=numbered)
+    for reference, probe in (("fem", "tool"), ("fem", "far"), ("basafa", "tool")):
+        own = [row for row in numbered if (row.reference, row.probe) == (reference, probe)]
+        table = rank_table(results, reference, probe)
+        assert sum(map(len, table.values())) == len(own) > 0
+        for row in own:
+            ranks = table[row.model][row.curve, row.measure]
+            assert ranks == (row.first_rank, row.last_rank)
+
+
 def difference(**changes):
     row = ScoreDifference("a", "b", "r", "p", "c", "m", 0.1, 0.05, 0.15, 0.01, 0.5, 0.5, 0.02)
     return row._replace(**changes)
@@ -248,6 +294,32 @@ def test_a_difference_is_resolved_beyond_each_of_its_errors():
     assert difference(numerical=0.1).is_resolved is False
     assert difference(numerical=None).is_resolved is None
     assert difference(numerical=None, low=-0.01).is_resolved is False
+
+
+LEAD = Lead("fem", ("c", "m"), "a", "b", 0.1, 0.05, 0.15, 0.01, 0.02, 0.03, True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "resolved"),
+    [
+        ({}, True),
+        ({"low": 0.0}, False),
+        ({"resampled": 0.1}, False),
+        ({"error": 0.1}, False),
+        ({"is_whole": False}, None),
+        ({"is_whole": False, "error": 0.1}, False),
+        ({"is_whole": False, "error": None}, None),
+        ({"is_whole": False, "error": None, "low": 0.0}, False),
+        ({"error": None}, None),  # of curves of which none has an error to be known
+    ],
+)
+def test_a_lead_is_resolved_beyond_each_of_its_errors(changes, resolved):
+    assert replace(LEAD, **changes).is_resolved is resolved
+
+
+def test_a_lead_no_larger_than_its_range_over_views_depends_on_them():
+    assert not LEAD.hangs_on_view
+    assert replace(LEAD, observed=0.1).hangs_on_view
 
 
 @pytest.mark.parametrize("changes", [{"low": -0.2, "high": 0.2}, {"resampled": 0.3}])

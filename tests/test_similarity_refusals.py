@@ -67,11 +67,19 @@ def test_eight_samples_are_the_least(samples, refused):
 
 
 @pytest.mark.parametrize("name", ["displacement", "velocity"])
-@pytest.mark.parametrize("level", [0.0, 1e-40, 0.3])
+@pytest.mark.parametrize("level", [0.0, 1e-40, 0.3, -0.3])
 def test_a_flat_reference_is_refused(name, level):
     flat = replace(motion(), **{name: np.full(50, level)})
     with pytest.raises(ValueError, match=f"reference {name} is flat"):
         scores(motion(), flat)
+
+
+@pytest.mark.parametrize("level", [0.3, -0.3])
+def test_a_reference_that_only_rounding_moves_is_flat(level):
+    values = np.full(50, level)
+    values[17:] = np.nextafter(level, 1.0)
+    with pytest.raises(ValueError, match="reference displacement is flat"):
+        scores(motion(), replace(motion(), displacement=values))
 
 
 def test_a_flat_candidate_is_a_result():
@@ -79,9 +87,27 @@ def test_a_flat_candidate_is_a_result():
     assert all(0.0 <= s.value < 0.6 for s in scores(still, motion()))
 
 
-def test_different_times_are_refused():
+@pytest.mark.parametrize("step", [0.0101, 0.0099])
+def test_different_times_are_refused(step):
     with pytest.raises(ValueError, match="times differ"):
-        scores(motion(step=0.0101), motion())
+        scores(motion(step=step), motion())
+
+
+@pytest.mark.parametrize("shift", [0.01, -0.01])
+def test_times_that_start_elsewhere_are_refused(shift):
+    with pytest.raises(ValueError, match="times differ"):
+        scores(replace(motion(), time=motion().time + shift), motion())
+
+
+def test_times_may_start_anywhere():
+    later = replace(motion(), time=motion().time + 5.0)
+    assert scores(later, later) == scores(motion(), motion())
+
+
+def test_times_that_stand_still_are_refused():
+    still = replace(motion(), time=np.full(50, 0.2))
+    with pytest.raises(ValueError, match="not uniform and increasing"):
+        scores(still, still)
 
 
 def test_uneven_times_are_refused():

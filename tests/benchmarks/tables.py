@@ -6,6 +6,7 @@ import csv
 import sys
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 R = TypeVar("R", bound=NamedTuple)
@@ -13,7 +14,10 @@ K = TypeVar("K", bound=Hashable)
 
 
 def read(path: Path, row: type[R]) -> list[R]:
-    """Rows of a table as written, with fields of type str, int, float or bool; none without it."""
+    """Rows of a table as written; none without it.
+
+    Their fields are of type str, int, float or bool, or of one that may be None, if empty.
+    """
     if not path.exists():
         return []
     kinds = get_type_hints(row)
@@ -24,7 +28,11 @@ def read(path: Path, row: type[R]) -> list[R]:
         ]
 
 
-def _value(kind: type, text: str) -> Any:
+def _value(kind: Any, text: str) -> Any:
+    if isinstance(kind, UnionType):
+        (kind,) = set(kind.__args__) - {NoneType}
+        if not text:
+            return None
     return text == "True" if kind is bool else kind(text)
 
 
