@@ -151,6 +151,10 @@ _REFUSED = {
         both(after("cube", "*PARAMETER", "x = 0.12"), swap("\n27, 0.12", "\n27, <x>")),
         "line 32: expected 4 numbers",
     ),
+    "decimal commas": (
+        swap("\n27, 0.12, 0.12, 0.12", "\n27, 0,12, 0,12, 0,12"),
+        "line 30: 7 entries without a decimal point",
+    ),
     "an unknown keyword": (at_end("*NODES", "1, 0., 0., 0."), "line 80: *NODES is not known"),
     "an unknown option of `*NODE` or `*ELEMENT`": (
         swap("TYPE=C3D4", "TYPE=C3D4, OFFSET=3"),
@@ -464,6 +468,19 @@ _GMSH = [
         "section $Nodes announces 28 rows but has 27",
     ),
     _gmsh(
+        "format 2: a node of five numbers", "refused",
+        lambda: gmsh_bytes("2").replace(b"\n1 0.0 0.0 0.0\n", b"\n1 0.0 0.0 0.0 0.1\n"),
+        "line 6: a node, with its number, has 4 numbers",
+    ),
+    _gmsh(
+        "format 2: digits grouped by underscores", "refused",
+        lambda: gmsh_bytes("2").replace(b" 4 2 7 1 1 ", b" 4 2 7 1 0_1 "), "not an element",
+    ),
+    _gmsh(
+        "format 4: digits grouped by underscores", "refused",
+        lambda: numbered_4(True).replace(b"\n1 1 ", b"\n1 0_1 "), "`0_1` is no number",
+    ),
+    _gmsh(
         "format 3 and others", "refused",
         lambda: gmsh_bytes("2").replace(b"2.2 0 8", b"3 0 8"), "Gmsh format 3",
     ),
@@ -598,6 +615,8 @@ _MEDIT = [
             "keyword 133 at byte 796"),
     _medit("a count other than announced", "refused", swap("Tetrahedra\n48", "Tetrahedra\n49"),
            "line 32: TETRAHEDRA announces 49"),
+    _medit("digits grouped by underscores", "refused", swap("0.12 0\n", "0.1_2 0\n"),
+           "line 3: VERTICES: `0.1_2` is no number"),
     _medit("a missing node", "refused", before_end("Tetrahedra 1", "1 2 5 99 0"),
            "use node numbers outside 0 to 26"),
     _medit("`Vertices` twice", "refused", before_end("Vertices", "1", "0 0 0 0"),

@@ -264,12 +264,24 @@ def _coordinates(lines: Sequence[NumberedLine]) -> tuple[FloatArray, list[str]]:
         raise MeshError(
             f"line {longest[0]}: {len(longest[1])} entries, a node has at most {_NODE_COLUMNS}"
         )
+    _refuse_decimal_commas(lines)
     short = [number for number, words in lines if len(words) < 4 or "" in words[:4]]
     whole = [
         (number, [word or "0" for word in [*words, "", "", ""][:4]]) for number, words in lines
     ]
     note = f"{len(short)} nodes lack coordinates, which are zero then; first lines: {some(short)}"
     return floats(whole, 4), [note] if short else []
+
+
+def _refuse_decimal_commas(lines: Sequence[NumberedLine]) -> None:
+    """A decimal comma separates too: `1, 0,12, 3,5, 0,1` would be a node at (0, 12, 3)."""
+    for number, words in lines:
+        if 4 < len(words) <= _NODE_COLUMNS and not any("." in word for word in words):
+            raise MeshError(
+                f"line {number}: {len(words)} entries without a decimal point for a node, "
+                f"`{', '.join(words)[:60]}`: write points instead of decimal commas; a node with a "
+                "normal needs a point in one of its numbers"
+            )
 
 
 def _cells(keyword: _Keyword) -> list[_Cells]:

@@ -13,7 +13,7 @@ from study.mesh.gmsh_cells import CELLS, Section, cell_of, node_rows, section, s
 from study.mesh.kinds import MeshError
 from study.mesh.numerals import read_numbers
 from study.mesh.raw import Block, RawMesh, raw_mesh
-from study.mesh.text import NumberedLine, floats
+from study.mesh.text import NumberedLine, floats, refuse_surplus, whole
 
 _FORMAT = re.compile(rb"\s*(\d(?:\.\d+)?)[ \t]+([01])[ \t]+(\d+)[^\n]*\n")
 
@@ -70,7 +70,9 @@ def read_gmsh(data: bytes) -> RawMesh:
 
 
 def _read_text(data: bytes, found: dict[str, Section], layout: _Layout) -> RawMesh:
-    nodes = floats(_lines(data, found, layout.nodes), 4)
+    rows = _lines(data, found, layout.nodes)
+    refuse_surplus(rows, 4, "a node, with its number,")
+    nodes = floats(rows, 4)
     elements = _lines(data, found, layout.elements)
     blocks = [(name, node_rows(rows, nodes[:, 0])) for name, rows in _blocks(elements, layout)]
     return raw_mesh(nodes[:, 1:], blocks)
@@ -102,7 +104,7 @@ def _blocks(lines: list[NumberedLine], layout: _Layout) -> list[Block]:
 
 def _element(number: int, words: list[str], layout: _Layout) -> tuple[int, list[int]]:
     try:
-        row = [int(word) for word in words]
+        row = [whole(word) for word in words]
         kind, variable = row[1], row[layout.count_column]
     except (ValueError, IndexError):
         raise MeshError(f"line {number}: not an element: `{' '.join(words)[:60]}`") from None

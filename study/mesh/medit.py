@@ -166,6 +166,9 @@ def _table(section: _Section, columns: int) -> FloatArray:
             f"line {section.line}: {section.name} announces {rows} entries of {columns} numbers, "
             f"but {len(words) - 1} numbers follow: truncated or damaged"
         )
+    if any("_" in word for word in words):  # Python reads 1_0 as 10, which no mesh file means
+        word = next(word for word in words if "_" in word)
+        raise MeshError(f"line {section.line}: {section.name}: `{word[:40]}` is no number")
     try:
         return np.array(words[1:], dtype=float).reshape(rows, columns)
     except ValueError as error:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from study.mesh.kinds import MeshError
 from study.mesh.raw import RawMesh, by_corner_count, raw_mesh
-from study.mesh.text import NumberedLine, floats, text_lines, unit_note
+from study.mesh.text import NumberedLine, floats, text_lines, unit_note, whole
 
 _FACES = {"f", "fo"}  # the second name is an old one
 # What would add to the surface and is not read: free forms, old patches, other files.
@@ -97,7 +97,7 @@ def _position(number: int, words: list[str]) -> list[str]:
 
 def _face(number: int, corners: list[str], position_count: int) -> list[int]:
     try:
-        given = [int(corner.partition("/")[0]) for corner in corners]
+        given = [whole(corner.partition("/")[0]) for corner in corners]
     except ValueError:
         raise MeshError(f"line {number}: cannot read the face `{' '.join(corners)[:60]}`") from None
     if len(given) < 3:

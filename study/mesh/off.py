@@ -6,7 +6,7 @@ import re
 
 from study.mesh.kinds import MeshError
 from study.mesh.raw import Block, RawMesh, by_corner_count, raw_mesh
-from study.mesh.text import NumberedLine, floats, text_lines, unit_note
+from study.mesh.text import NumberedLine, floats, text_lines, unit_note, whole
 
 _KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF")
 _NUMBERS = {"ST": 2, "C": 3, "N": 3}
@@ -100,8 +100,8 @@ def _polygons(rows: list[NumberedLine]) -> tuple[list[Block], int]:
 
 def _corners(number: int, words: list[str]) -> list[int]:
     try:
-        count = int(words[0])
-        nodes = [int(word) for word in words[1 : 1 + count]]
+        count = whole(words[0])
+        nodes = [whole(word) for word in words[1 : 1 + count]]
     except ValueError:
         count, nodes = -1, []
     if count < 1 or len(nodes) != count:

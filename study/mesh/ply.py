@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study.mesh.kinds import FloatArray, MeshError
 from study.mesh.raw import Block, RawMesh, by_corner_count, raw_mesh, strip_triangles
-from study.mesh.text import text_lines, unit_note
+from study.mesh.text import is_number, text_lines, unit_note, whole
 
 _TYPES = {
     "char": "i1",
@@ -100,10 +100,12 @@ def _elements(lines: list[str]) -> tuple[str, list[_Element]]:
         if words in ([], ["ply"]):
             continue
         try:
+            if len(words) > _header_words(words):
+                raise MeshError(_unreadable(number, line))
             if words[0] == "format":
                 form = words[1]
             elif words[0] == "element":
-                elements.append(_Element(words[1], int(words[2]), number))
+                elements.append(_Element(words[1], whole(words[2]), number))
             elif words[0] == "property":
                 old = elements[-1]
                 given = (*old.properties, _property(words[1:], form))
@@ -116,6 +118,13 @@ def _elements(lines: list[str]) -> tuple[str, list[_Element]]:
         raise MeshError(f"format `{form[:40]}` is not one of {', '.join(_ORDERS)}")
     _check_elements(elements)
     return form, elements
+
+
+def _header_words(words: list[str]) -> int:
+    """Most words that a line of the header may have; a comment has any number."""
+    if words[0] == "property":
+        return 5 if words[1:2] == ["list"] else 3
+    return 3 if words[0] in {"format", "element"} else len(words)
 
 
 def _unreadable(number: int, line: str) -> str:
@@ -151,6 +160,8 @@ def _check_elements(elements: list[_Element]) -> None:
 def _doubles(body: bytes) -> bytes:
     """The numbers of a text as the bytes of doubles, to be read like the binary form."""
     words = body.split()
+    if b"_" in body:  # Python reads 1_0 as 10, which no mesh file means
+        raise MeshError(_not_a_number(words))
     try:
         return np.array(words, dtype=bytes).astype(float).tobytes() if words else b""
     except ValueError:
@@ -158,14 +169,8 @@ def _doubles(body: bytes) -> bytes:
 
 
 def _not_a_number(words: list[bytes]) -> str:
-    for place, word in enumerate(words):
-        try:
-            float(word)
-        except ValueError:
-            return (
-                f"`{word.decode('latin-1')[:40]}`, word {place} (0-based) of the body, is no number"
-            )
-    raise AssertionError("every word is a number")  # pragma: no cover
+    place, word = next((i, one) for i, one in enumerate(words) if not is_number(one))
+    return f"`{word.decode('latin-1')[:40]}`, word {place} (0-based) of the body, is no number"
 
 
 def _bodies(body: bytes, elements: list[_Element]) -> tuple[dict[str, list[Values]], int]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from study.mesh.kinds import FloatArray, MeshError
 from study.mesh.raw import RawMesh, raw_mesh
-from study.mesh.text import NumberedLine, floats, text_lines, unit_note
+from study.mesh.text import NumberedLine, floats, refuse_surplus, text_lines, unit_note
 
 _HEADER = 84  # 80 bytes of anything, then the number of triangles
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -81,10 +81,10 @@ def _refuse_more_triangles(
 
 
 def _read_ascii(data: bytes) -> RawMesh:
-    corners = _plain_facets(data)
+    corners, notes = _plain_facets(data), list[str]()
     if corners is None:
-        corners = _corners_by_line(text_lines(data))
-    notes = unit_note(text_lines(data[:1000])[0])
+        corners, notes = _corners_by_line(text_lines(data))
+    notes = [*unit_note(text_lines(data[:1000])[0]), *notes]
     return raw_mesh(corners, [("triangle", np.arange(len(corners)).reshape(-1, 3))], notes)
 
 
@@ -102,7 +102,7 @@ def _plain_facets(data: bytes) -> FloatArray | None:
             solids += -1 if found[0].lstrip()[:3].lower() == b"end" else 1
         else:
             rows.append(found.groups())
-    if solids or data[place:].strip():
+    if solids or data[place:].strip() or any(b"_" in word for row in rows for word in row):
         return None
     try:
         return np.array(rows, dtype=bytes).astype(float).reshape(-1, 3)
@@ -110,7 +110,8 @@ def _plain_facets(data: bytes) -> FloatArray | None:
         return None
 
 
-def _corners_by_line(lines: list[str]) -> FloatArray:
+def _corners_by_line(lines: list[str]) -> tuple[FloatArray, list[str]]:
+    """Corners, and notes on lines that are no part of a facet."""
     vertices: list[NumberedLine] = []
     counts: Counter[str] = Counter()
     for number, keyword, words in _statements(lines):
@@ -119,9 +120,15 @@ def _corners_by_line(lines: list[str]) -> FloatArray:
             vertices.append((number, words))
         elif keyword == "endfacet":
             _check_facet(number, counts)
+    refuse_surplus(vertices, 3, "a vertex")
     corners = floats(vertices, 3)
     _check_ascii_end(counts)
-    return corners
+    notes = [
+        f"{count} lines `{word[:40]}`, unknown in STL, ignored"
+        for word, count in counts.items()
+        if word not in _KEYWORDS | {"solid", "endsolid"}
+    ]
+    return corners, notes
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -46,16 +46,44 @@ def floats(lines: Sequence[NumberedLine], count: int) -> FloatArray:
     raise MeshError(_complaint(lines, count))
 
 
+def whole(word: str) -> int:
+    """The whole number a word stands for; ValueError if it is none.
+
+    Python reads 1_0 as 10, which no mesh file means.
+    """
+    if not re.fullmatch(r"[+-]?[0-9]{1,18}", word):
+        raise ValueError(f"`{word[:40]}` is not a whole number")
+    return int(word)
+
+
+def refuse_surplus(lines: Sequence[NumberedLine], count: int, what: str) -> None:
+    """MeshError naming the first line with more words than it should have."""
+    for number, words in lines:
+        if len(words) > count:
+            raise MeshError(
+                f"line {number}: {what} has {count} numbers, found `{' '.join(words)[:60]}`: "
+                "damaged, export it again"
+            )
+
+
+def refuse_grouped(words: Iterable[bytes]) -> None:
+    """MeshError for the first word with an underscore, which NumPy would skip within a number."""
+    for word in words:
+        if b"_" in word:
+            raise MeshError(f"`{word.decode('latin-1')[:40]}` is no number")
+
+
 def _complaint(lines: Sequence[NumberedLine], count: int) -> str:
     for number, words in lines:
-        if len(words) < count or not all(_is_number(word) for word in words[:count]):
+        if len(words) < count or not all(is_number(word) for word in words[:count]):
             return f"line {number}: expected {count} numbers, found `{' '.join(words)[:60]}`"
     raise AssertionError("every line is readable")  # pragma: no cover
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str | bytes) -> bool:
+    """Whether a word is one number; with an underscore it is none, though Python takes it."""
     try:
         float(word)
     except ValueError:
         return False
-    return "_" not in word
+    return b"_" not in word if isinstance(word, bytes) else "_" not in word

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import MeshError
+from study.mesh.text import refuse_grouped
 from study.mesh.vtk_tags import Tag
 
 _TYPES = {
@@ -72,6 +73,7 @@ def _array(tag: Tag, tags: list[Tag], data: bytes) -> NDArray[Any]:
     order = ">" if file.get("byte_order") == "BigEndian" else "<"
     if tag.given.get("format", "ascii") == "ascii":
         words = _content(tag, data).split()
+        refuse_grouped(words)
         return np.array(words, dtype=bytes).astype(_TYPES[kind]) if words else np.empty(0)
     word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
     stored = _stored(tag, tags, data)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from study.mesh.kinds import IndexArray, MeshError
 from study.mesh.numerals import read_numbers
 from study.mesh.raw import RawMesh, raw_mesh
-from study.mesh.vtk_cells import LINES, POINTS, POLYGON, STRIP, vtk_blocks
+from study.mesh.vtk_cells import EMPTY, LINES, POINTS, POLYGON, STRIP, vtk_blocks
 
 _MAX_COUNT = 200_000_000
 _TYPES = {
@@ -37,6 +37,8 @@ _TYPES = {
     "double": "f8",
 }
 _SURFACE = {"VERTICES": POINTS, "LINES": LINES, "POLYGONS": POLYGON, "TRIANGLE_STRIPS": STRIP}
+_ORDER = {kind: place for place, kind in enumerate(_SURFACE.values())}
+_GHOST = re.compile(rb"^\s*vtkGhostType\s+1\s+(\d{1,9})\s+unsigned_char[ \t\r]*\n", re.MULTILINE)
 _Cells = tuple[IndexArray, IndexArray, IndexArray]  # types, offsets and nodes
 
 
@@ -69,6 +71,8 @@ def _read_sections(stream: BytesIO, binary: bool) -> RawMesh:
     while (words := _line(stream)) and words[0].upper() not in {"POINT_DATA", "CELL_DATA"}:
         section = words[0].upper()
         if section == "POINTS":
+            if len(points):
+                raise MeshError("a second section POINTS; keep one mesh in the file")
             numbers = _numbers(stream, _word(words, 2), 3 * _count(words, 1), binary)
             points = numbers.reshape(-1, 3).astype(float)
         elif section == "CELLS":
@@ -87,7 +91,8 @@ def _read_sections(stream: BytesIO, binary: bool) -> RawMesh:
             _check_data_set(_word(words, 1).upper())
         else:
             raise MeshError(f"unknown VTK section `{section[:40]}`: damaged, export it again")
-    return raw_mesh(points, [b for part in _typed(cells, types) for b in vtk_blocks(*part)])
+    shown, notes = _without_hidden(_typed(cells, types), _data(stream, words), binary)
+    return raw_mesh(points, [b for part in shown for b in vtk_blocks(*part)], notes)
 
 
 def _check_data_set(name: str) -> None:
@@ -104,6 +109,39 @@ def _typed(cells: list[_Cells], types: IndexArray | None) -> list[_Cells]:
     if count != given:
         raise MeshError(f"{count} CELLS but {given} CELL_TYPES: truncated, export it again")
     return [part if part[0].any() or types is None else (types, *part[1:]) for part in cells]
+
+
+def _data(stream: BytesIO, words: list[str]) -> bytes:
+    """What is stored of the cells: from the line CELL_DATA, if there is one, to POINT_DATA."""
+    rest = stream.read()
+    if words and words[0].upper() == "POINT_DATA":
+        start = re.search(rb"^\s*CELL_DATA\s+\d+\s*$", rest, re.MULTILINE | re.IGNORECASE)
+        rest = rest[start.end() :] if start else b""
+    end = re.search(rb"^\s*POINT_DATA\s+\d+\s*$", rest, re.MULTILINE | re.IGNORECASE)
+    return rest[: end.start()] if end else rest
+
+
+def _without_hidden(
+    cells: list[_Cells], data: bytes, binary: bool
+) -> tuple[list[_Cells], list[str]]:
+    """Cells of which those marked in the array vtkGhostType are empty, and a note on them."""
+    mark = _GHOST.search(data)
+    if mark is None:
+        if b"vtkGhostType" in data:
+            raise MeshError("cells are marked as ghosts or hidden; remove these, or save as .vtu")
+        return cells, []
+    stream = BytesIO(data)
+    stream.seek(mark.end())
+    hidden = read_numbers(stream, "u1", int(mark[1]), binary) != 0
+    # VTK numbers vertices, lines, polygons and strips in this order, whatever that of the file.
+    order = sorted(range(len(cells)), key=lambda i: _ORDER.get(int(cells[i][0].max(initial=0)), 0))
+    ends = np.cumsum([len(cells[i][0]) for i in order])
+    if not len(ends) or ends[-1] != len(hidden):
+        raise MeshError(f"vtkGhostType marks {len(hidden)} cells, but there are others: damaged")
+    parts = dict(zip(order, np.split(hidden, ends[:-1]), strict=True))
+    shown = [(np.where(parts[i], EMPTY, part[0]), *part[1:]) for i, part in enumerate(cells)]
+    count = int(hidden.sum())
+    return shown, [f"{count} cells marked as ghosts or hidden left out"] if count else []
 
 
 def _connectivity(stream: BytesIO, words: list[str], binary: bool) -> tuple[IndexArray, IndexArray]:
