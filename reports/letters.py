@@ -63,7 +63,7 @@ def boxes(letters: Iterable[str]) -> str:
         return ""
     found = ", ".join(f"{count} of {name}" for name, count in sorted(scripts.items()))
     return (
-        f"Boxes stand for letters that no font at hand has ({found}). {REMEDY} adds fonts of most "
+        f"Boxes replace letters that no available font has ({found}). {REMEDY} adds fonts of most "
         "scripts; then liver-study makes the document again without them."
     )
 

@@ -102,7 +102,7 @@ def test_what_a_curve_does_not_determine_is_refused():
     other = Free("support.stiffness", "Pa/m", 1.0, 1e12, 1e6)
     with pytest.raises(ValueError, match="does not change with it"):
         solve(lambda _: TIMES, curve(TIMES), [E])
-    with pytest.raises(ValueError, match="does not tell them apart"):
+    with pytest.raises(ValueError, match="does not distinguish them"):
         solve(lambda v: 5.0 * TIMES / (v[0] * v[1]) * 1e6, curve(TIMES * 1e-3), [E, other])
     with pytest.raises(ValueError, match="goes beyond"):
         solve(compliant, curve(compliant([6e3]), 1.0), [E])
@@ -130,7 +130,7 @@ def test_models_that_there_are_not_are_refused():
         ("corrected", MOVED, "--model corrected: .*corrected cannot follow rigid tools"),
         ("superposition", ('gravity={acceleration="9.81 m/s^2"}',), "cannot follow gravity"),
         ("reading", ("patient={}",), "reading needs a reading"),
-        ("msm", (), "--model msm: stands for 3 models; name one system"),
+        ("msm", (), "--model msm: is a kind of 3 models; name one system"),
     ],
 )
 def test_a_model_that_cannot_follow_the_scene_or_is_several_is_refused(model, overrides, message):
@@ -174,7 +174,7 @@ def write(path, header, rows):
         ("time_s,displacement_m", ["0,0", "1,1", "1,2"], r":4: time_s does not grow"),
         ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r":5: time_s does not grow"),
         ("time_s,displacement_m", ["0,0", ",", "1,1"], r":3: time_s: the cell is empty"),
-        ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' stands there twice"),
+        ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' appears twice"),
         ("time_s,displacement_m", ["0,0"], r":2: 1 lines of numbers; give 3 or more"),
         ("time_s,displacement_m,force_N", ["0,0,0"], r":1: give one of the columns"),
         ("depth_m,force_N", ["0,0", "1,1", "2,2"], r":1: .* time_s is missing.*force over depth"),

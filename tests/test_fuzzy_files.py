@@ -708,7 +708,7 @@ TABLE_FLAWS = {
     "no such column": ("service,Food\n1,2", 1, "no column 'food' among .* did you mean 'Food'"),
     "a column with its unit": ("service,food [1]\n1,2", 1, r"did you mean 'food \[1\]'\? Rename"),
     "no column alike": ("service,x\n1,2", 1, "no column 'food' among 'service', 'x'; add it"),
-    "a column twice": ("food,service,food\n1,2,3", 1, "column 'food' stands there twice"),
+    "a column twice": ("food,service,food\n1,2,3", 1, "column 'food' appears twice"),
     "decimal commas between commas": (
         'service,food\n"1,5",2',
         2,

@@ -245,7 +245,7 @@ def said(**settings):
         ({"reading": "R4-pair"}, "No source was found for the centre of NAFLD F3"),
         ({"consequent": "mean"}, "mean severity of the antecedents, rounded up"),
         ({"placement": "cut-off"}, "Centres of HCV F2, HCV F4, HBV F2"),
-        ({"footprint_factor": 0.0}, "interval type-2 repeats Mamdani"),
+        ({"footprint_factor": 0.0}, "interval type-2 equals Mamdani"),
         ({"footprint_factor": 2.0}, "43 % (F1, F2), 19 % (F3), 50 % (F4), 2 times the published"),
         ({"footprint": "uncertain-spread"}, "the width of every set's flanks"),
         ({"footprint": "scaled"}, "every lower membership"),

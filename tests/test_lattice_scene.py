@@ -176,7 +176,7 @@ def test_the_report_states_the_slopes_of_a_law_at_rest():
         (("gravity.acceleration=9.81 m/s^2",), "that without load, from which the organ sags"),
         (
             ("gravity.acceleration=9.81 m/s^2", "gravity.given=loaded"),
-            ": the shape given is that at rest under it",
+            ": the given shape is that at rest under it",
         ),
     ],
 )

@@ -53,7 +53,7 @@ def fonts(monkeypatch, tmp_path):
 def test_letters_without_a_font_are_told_by_script_with_the_remedy(capsys):
     assert b"pdfuaid:part" not in made(f"a {TIFINAGH} b")
     told = capsys.readouterr().err
-    assert "Boxes stand for letters that no font at hand has (3 of Tifinagh)" in told
+    assert "Boxes replace letters that no available font has (3 of Tifinagh)" in told
     assert letters.REMEDY in told
 
 

@@ -284,7 +284,7 @@ def test_a_row_that_does_not_belong_is_named_by_its_line(name, change, said, sig
         ("bands.csv", lambda lines: lines[:-1], "bands.csv, line 302: sample 301 of 301"),
         ("bands.csv", lambda lines: lines[:1], "bands.csv, line 2: sample 1"),
         ("sensitivity.csv", lambda lines: lines[:1], "sensitivity.csv: 0 rows"),
-        ("sensitivity.csv", lambda lines: [*lines, lines[-1]], "stands there twice"),
+        ("sensitivity.csv", lambda lines: [*lines, lines[-1]], "appears twice"),
         ("errors.csv", lambda lines: [*lines, "msm-sugeno,basafa,a,1\n"], "errors.csv, line 2"),
         ("score_differences.csv", lambda lines: lines[:-1], "line 43: msm-interval-type-2"),
         (

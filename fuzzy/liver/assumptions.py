@@ -46,7 +46,7 @@ SCALE = (
 OUT_OF_RANGE = {
     "clamp": "are taken at its nearer end, with a note",
     "raise": "are refused",
-    "matlab": "are taken as they are, with a note; where nothing fires the answer is the middle "
+    "matlab": "are used as they are, with a note; where no rule fires the answer is the middle "
     "of the output's universe, as in MATLAB",
 }
 
@@ -78,7 +78,7 @@ def _count(name: str, reading: TableReading) -> str:
     others = [x for x in READINGS if x != name and rule_count(READINGS[x]) == PAPER_RULES]
     verdict = (
         f"gives the paper's {PAPER_RULES} rules, but so do {len(others)} other readings here: the "
-        "count does not tell which one the authors had in mind"
+        "count does not determine which one the authors used"
         if number == PAPER_RULES
         else f"gives {number} rules where the paper counts {PAPER_RULES}"
     )
@@ -124,7 +124,7 @@ def _following_rules(settings: LiverSettings) -> tuple[str, ...]:
         "Consequents are not in the paper: each is the stiffness expected of readings at the "
         "centres of the rule's sets, near their geometric mean, as readings of several aetiologies "
         "are of one liver.",
-        "Rules on most diseases outweigh those on fewer, which speak for patients with fewer "
+        "Rules on more diseases outweigh those on fewer, which are meant for patients with fewer "
         f"readings: a rule on one disease less weighs {parameters()['outweighed']:g} of it.",
         CHOLESTATIC,
     )
@@ -137,8 +137,8 @@ def _following_data(settings: LiverSettings) -> tuple[str, ...]:
         "That a reading is the modulus, without a bias, is an assumption: no reading paired with a "
         "mechanical test of the same liver was found.",
         "Neighbouring input sets cross at one half; each is a Gaussian with a width for either "
-        "flank. They stand for levels of stiffness, not for stages of fibrosis.",
-        f"Output sets are Gaussians of {p['output_sd']:g} kPa, alike at every level, each "
+        "flank. They represent levels of stiffness, not stages of fibrosis.",
+        f"Output sets are Gaussians of {p['output_sd']:g} kPa, the same at every level, each "
         f"{100 * (p['output_ratio'] - 1):.0f} % above the one before.",
         _missing(settings),
         _band(settings),
@@ -147,13 +147,13 @@ def _following_data(settings: LiverSettings) -> tuple[str, ...]:
 
 def _band(settings: LiverSettings) -> str:
     if settings.footprint_factor == 0:
-        return "The footprint is switched off, so interval type-2 repeats Mamdani."
+        return "The footprint is switched off, so interval type-2 equals Mamdani."
     one, noise = footprint_half_width(settings, 1), reading_noise()
     words = FOOTPRINTS[settings.footprint].words.replace(", input and output,", "")
     return (
         f"Interval type-2: {words} {100 * one:.0f} % for one reading and by less for several, over "
         f"the root of their number: {one / noise:.2g} times the noise of one "
-        f"reading, {100 * noise:.0f} %, which joins that of the exam (nhanes2017) and "
+        f"reading, {100 * noise:.0f} %, which combines that of the exam (nhanes2017) and "
         "that between operators (fraquelli2007, liv12551). Input sets alone have it."
     )
 
@@ -164,10 +164,10 @@ def _data(settings: LiverSettings) -> tuple[str, ...]:
     normal = parameters()["normal_liver"]
     return (
         SCALE,
-        "Two sets of an aetiology stand for stages F2 and F4, three for F2, F3 and F4, four for F1 "
+        "Two sets of an aetiology represent stages F2 and F4, three F2, F3 and F4, four F1 "
         "to F4; F1 and F2 count as mild, F3 as moderate, F4 as severe.",
-        "The set counts of HCV and HBV come from counting rules: at equal stage the data do not "
-        "tell the two diseases apart (sporea2010).",
+        "The set counts of HCV and HBV follow from the number of rules: at equal stage the data do "
+        "not distinguish the two diseases (sporea2010).",
         *_centres(settings, inputs),
         *_graded(inputs),
         "Output sets are the pooled stages F1 and F2 (mild), F3 (moderate) and F4 (severe) of HBV "
@@ -212,7 +212,7 @@ def _graded(inputs: list[SetRecord]) -> Iterable[str]:
 
 def _footprints(settings: LiverSettings) -> tuple[str, ...]:
     if settings.footprint_factor == 0:
-        return ("The footprint is switched off, so interval type-2 repeats Mamdani.",)
+        return ("The footprint is switched off, so interval type-2 equals Mamdani.",)
     by_stage = {record.stage: record for record in elastography()}
     shares = ", ".join(
         f"{100 * relative_half_width(by_stage[stage], settings):.0f} % ({stages})"
@@ -222,7 +222,7 @@ def _footprints(settings: LiverSettings) -> tuple[str, ...]:
     return (
         f"Interval type-2: {FOOTPRINTS[settings.footprint].words} {shares}, {times}the published "
         "spread.",
-        "The published spread joins, as independent, that between studies and that between "
+        "The published spread combines, as independent, that between studies and that between "
         f"operators. Between studies it is the SD {_between_studies(by_stage)} of the centre at "
         "F2, F3, F4, from the ranges of HBV's cut-offs over 18 studies (chon2012) by the expected "
         "range of 18 normal values; fewer studies behind a range would make it larger. Between two "
@@ -231,7 +231,7 @@ def _footprints(settings: LiverSettings) -> tuple[str, ...]:
         "HCV; both are transferred to the other sets by stage. F4 cut-offs of other causes differ "
         "as much between sources: 12.5 and 22.6 kPa in ALD, 12.5 and 9.3 kPa in HCV.",
         "The type-1 width is the spread between patients of one stage; the footprint is the spread "
-        "between studies and operators; neither stands for the other.",
+        "between studies and operators; neither replaces the other.",
     )
 
 
@@ -244,9 +244,9 @@ def _inference(settings: LiverSettings) -> tuple[str, ...]:
     return (
         "The lowest set of each input stays at 1 below its centre and the highest at 1 above, "
         "where the paper has plain Gaussians; the output sets are plain Gaussians.",
-        f"Inputs live on {p['input_low']:g}-{p['input_high']:g} kPa, the instrument's scale from a "
-        f"weak source; readings beyond {OUT_OF_RANGE[settings.options.out_of_range]}. The output "
-        f"lives on {p['output_low']:g}-{p['output_high']:g} kPa.",
+        f"Inputs range over {p['input_low']:g}-{p['input_high']:g} kPa, the instrument's scale "
+        f"from a weak source; readings beyond {OUT_OF_RANGE[settings.options.out_of_range]}. The "
+        f"output ranges over {p['output_low']:g}-{p['output_high']:g} kPa.",
         *(f"{kind.method(system, settings.options)}." for kind in SYSTEMS.values()),
     )
 

@@ -133,7 +133,7 @@ class LiverSettings:
         """What an aetiology without a reading does."""
         found = ABSENT[self.absence]
         if found is None:
-            raise ValueError(f"absent = {self.absence!r}: stands for no use of a missing reading")
+            raise ValueError(f"absent = {self.absence!r}: gives a missing reading no meaning")
         return found
 
 

@@ -29,7 +29,7 @@ class StiffnessEstimate:
 
     `interval` is the range of centroids of interval type-2, None for the others.
     `quadrature_error` is the distance to the same system without sampling, or the tolerance of
-    exact sampling; it says nothing about the data or the rules. `notes` tell what was done to the
+    exact sampling; it says nothing about the data or the rules. `notes` state what was done to the
     readings, `method` how the answer was computed.
     """
 

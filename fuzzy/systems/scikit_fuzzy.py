@@ -93,7 +93,7 @@ def _check(system: FuzzySystem) -> None:
     if system.output.name in {variable.name for variable in system.inputs}:
         raise ValueError(
             f"output {system.output.name!r} has the name of an input, which scikit-fuzzy cannot "
-            "tell apart; rename one"
+            "distinguish; rename one"
         )
 
 

@@ -148,7 +148,7 @@ def _check_header(table: Table, added: Sequence[str]) -> None:
     for name in names:
         if name and names.count(name) > 1:
             raise table.fault(
-                table.header_line, f"column {name!r} stands there twice; rename or remove one"
+                table.header_line, f"column {name!r} appears twice; rename or remove one"
             )
         if name in added:
             raise table.fault(

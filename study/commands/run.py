@@ -47,8 +47,8 @@ class RunFlags:
         Processors to use, all by default: stages run side by side in as many processes, the
         products of the finite elements in two threads. With 1 all is done one after another.
     minutes
-        Most that a model may take; one that needs longer is told as not finished, and the others
-        go on.
+        Most that a model may take; one that needs longer is reported as not finished, and the
+        others go on.
     """
 
     report: bool = True

@@ -1,4 +1,4 @@
-"""What the command line asks of the fuzzy systems, and what it is told."""
+"""Requests of the command line to the fuzzy systems, and the lines that answer them."""
 
 from __future__ import annotations
 

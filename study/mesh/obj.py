@@ -54,7 +54,7 @@ def read_obj(data: bytes) -> RawMesh:
             faces.append(_face(number, words[1:], len(positions)))
         elif keyword in _REFUSED:
             raise MeshError(
-                f"line {number}: `{keyword}` stands for {_REFUSED[keyword]}, which cannot be "
+                f"line {number}: `{keyword}` is {_REFUSED[keyword]}, which cannot be "
                 "read; export polygons"
             )
         elif keyword not in _IGNORED:

@@ -302,7 +302,7 @@ class PreparedHyperelastic:
         write_motion(watch.persistence, self.model.name, shown, times, states)
 
     def _of_overlooked(self, found: LargeSolution) -> Iterator[str]:
-        """A note where a tool is inside the organ that no contact was sought with."""
+        """A note where a tool is inside tissue with which contact was not considered."""
         times, tools = self.problem.observation.times, self.problem.rigid_tools
         travel = max(
             (float(np.linalg.norm(one.travel(times), axis=1).max()) for one in tools), default=0.0
@@ -310,8 +310,8 @@ class PreparedHyperelastic:
         if found.overlooked > OVERLOOKED * travel:
             yield (
                 f"In {self.model.name} {1e3 * found.overlooked:.2g} mm of a tool are inside the "
-                "organ where no contact is sought, beside what it would meet of the undeformed "
-                "surface."
+                "organ where contact is not considered, apart from what it would touch of the "
+                "undeformed surface."
             )
 
 

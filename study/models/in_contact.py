@@ -35,7 +35,7 @@ HALF = 0.5
 
 
 def resolving(problem: Problem, level: Level) -> Level:
-    """A mesh on which what the tools touch is seen at all, for its error to tell of the rest."""
+    """A mesh fine enough to resolve the contact area, so that its error estimate is meaningful."""
     return resolved(problem.geometry, level, partial(_wanted, problem)) or level
 
 

@@ -18,13 +18,13 @@ def _layout(scene: Scene) -> str:
     if scene.lattice.springs == "tetrahedra":
         return (
             "Springs run along the edges of the finite-element mesh, each with k = E V / L^2, V "
-            "the volume of the tetrahedra round it (Van Gelder 1998). That is the modulus E only "
-            "where edges point evenly in all directions: modulus, Poisson ratio and anisotropy "
-            "are those of the mesh, and refining it does not cure them."
+            "the volume of the tetrahedra around it (Van Gelder 1998). That is the modulus E only "
+            "where edge directions are isotropic: modulus, Poisson ratio and anisotropy "
+            "depend on the mesh, and refinement does not correct them."
         )
     return (
         "Face diagonals have sqrt(2) times the force constants of edges, and springs on the "
-        "surface carry the share of the cells they belong to; otherwise the lattice would be "
+        "surface have the share of the cells that they belong to; otherwise the lattice would be "
         "anisotropic and up to 38 % too stiff."
     )
 
@@ -67,8 +67,8 @@ def _damping(scene: Scene) -> str:
     return (
         f"Rayleigh damping C = alpha M + beta K with alpha = {damping.mass:g} 1/s and beta = "
         f"{damping.stiffness:g} s in place of eq. (2), K each model's own stiffness, support "
-        "included; the part beta K is a dashpot on each spring, cell and foundation and leaves "
-        "rigid motion of the body itself free."
+        "included; the part beta K is a dashpot on each spring, cell and foundation and does not "
+        "damp rigid motion of the body itself."
     )
 
 
@@ -81,7 +81,7 @@ def _calibration(scene: Scene) -> str:
             "there is no volume term, as in the paper."
         )
     return (
-        "Springs of k = mu h carry the shear modulus mu, and one energy per cell in its volume, "
+        "Springs of k = mu h represent the shear modulus mu; an energy of the volume of each cell, "
         "1/2 kappa V (J - 1)^2 with kappa = lambda - mu, which the paper does not have, the rest; "
         f"the Poisson ratio is the tissue's {scene.tissue.poisson_ratio:g}."
     )

@@ -167,7 +167,7 @@ class PointModel(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class ModelKind:
-    """What a name in a scene's list of models stands for.
+    """A kind of model, named in a scene's list of models.
 
     `models` makes one model, or several as for `msm`, from a scene and the fuzzy estimates.
     `on_point` does so for a scene that is a single control mass point; None if the kind needs an

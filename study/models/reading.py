@@ -42,7 +42,7 @@ def on_point(scene: Scene, _: Estimates) -> Iterator[PointSpring]:
 
 
 def assumptions(scene: Scene) -> list[str]:
-    """On the springs, and on what the reading stands for."""
+    """On the springs, and on the use of the reading."""
     on_organ = [] if scene.is_point else layout(scene)
     return [
         *on_organ,

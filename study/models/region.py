@@ -32,15 +32,15 @@ def assumptions(scene: Scene) -> list[str]:
     size = (
         f"{1e3 * region.radius:.3g} mm"
         if region.radius is not None
-        else f"as far as rest under the load, small displacements, needs to be within "
+        else f"as far as is needed at rest under the load, with small displacements, to be within "
         f"{100 * region.tolerance:.3g} % of a lattice of the finest cells throughout"
     )
     return [
-        f"The region of interest has cells of {1e3 * edge:.3g} mm round the tools and "
+        f"The region of interest has cells of {1e3 * edge:.3g} mm around the tools and "
         f"{', '.join(region.at) or 'no other place'}, {size}; beyond, they double "
         f"{region.levels - 1} times, each size twice as far as the one before. Where sizes meet, "
-        "nodes hang on the larger cell. What motion in time and large displacements add to the "
-        "difference from the finest cells throughout is not estimated.",
+        "hanging nodes follow the larger cell. The contribution of motion in time and of large "
+        "displacements to the difference from the finest cells throughout is not estimated.",
         *layout(scene),
         *springs(scene),
     ]

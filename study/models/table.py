@@ -62,7 +62,9 @@ def model(scene: Scene, name: str) -> Model:
     """The single model of a kind. ValueError for a kind of several, such as fuzzy estimates."""
     found = list(kind(name).models(kind(name).relevant_part(scene), {}))
     if len(found) != 1:
-        raise ValueError(f"models: {name} stands for several models; name a kind that is one model")
+        raise ValueError(
+            f"models: {name} is a kind of several models; name a kind that is one model"
+        )
     return found[0]
 
 

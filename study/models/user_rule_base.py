@@ -51,10 +51,10 @@ def _row(system: FuzzySystem, given: Mapping[str, float]) -> Floats:
     names = [one.name for one in system.inputs]
     missing, unknown = [n for n in names if n not in given], sorted(given.keys() - set(names))
     if missing or unknown:
-        told = [f"{', '.join(missing)} missing"] if missing else []
-        told += [f"{', '.join(unknown)} unknown"] if unknown else []
+        faults = [f"{', '.join(missing)} missing"] if missing else []
+        faults += [f"{', '.join(unknown)} unknown"] if unknown else []
         raise ValueError(
-            f"fuzzy.inputs: {' and '.join(told)}; fuzzy.rule_base takes {', '.join(names)}"
+            f"fuzzy.inputs: {' and '.join(faults)}; fuzzy.rule_base takes {', '.join(names)}"
         )
     return np.array([[float(given[name]) for name in names]])
 

@@ -292,7 +292,7 @@ def _step(chosen: Candidate, required: Require) -> str:
 def _reference(chosen: Candidate) -> tuple[str, str]:
     if len(chosen.scene.models) > 1:
         return "finite elements", "a lattice does not know its own error"
-    return "none", "the parts of the error are told without one"
+    return "none", "the parts of the error are stated without one"
 
 
 def _output(required: Require) -> tuple[str, str]:

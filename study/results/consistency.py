@@ -242,12 +242,12 @@ def _check_motions(
             found = rows[at] if at < len(rows) else None
             if found is None or (found.model, found.probe) != (model, probe):
                 if sample < fewest:
-                    told = f"sample {sample + 1} of {fewest} of {model} at {probe} is missing"
-                    raise ValueError(f"{file}, line {at + FIRST_LINE}: {told}")
+                    reason = f"sample {sample + 1} of {fewest} of {model} at {probe} is missing"
+                    raise ValueError(f"{file}, line {at + FIRST_LINE}: {reason}")
                 break
             if not abs(found.time_s - times[sample]) <= SAME_TIME * times[-1]:
-                told = f"time {found.time_s:g} s, not {times[sample]:g} s of sample {sample + 1}"
-                raise ValueError(f"{file}, line {at + FIRST_LINE}: {told} of {model} at {probe}")
+                reason = f"time {found.time_s:g} s, not {times[sample]:g} s of sample {sample + 1}"
+                raise ValueError(f"{file}, line {at + FIRST_LINE}: {reason} of {model} at {probe}")
             at += 1
     if at < len(rows):
         raise ValueError(
@@ -262,7 +262,7 @@ def _check_keys(
     """The rows are those expected, in order."""
     for line, (row, key) in enumerate(zip(found, wanted, strict=False), FIRST_LINE):
         if row != key:
-            raise ValueError(f"{file}, line {line}: {_words(row)}, where {_words(key)} is to stand")
+            raise ValueError(f"{file}, line {line}: {_words(row)}, where {_words(key)} is expected")
     line = min(len(found), len(wanted)) + FIRST_LINE
     if len(found) < len(wanted):
         raise ValueError(f"{file}, line {line}: {_words(wanted[len(found)])} is missing")
@@ -300,8 +300,8 @@ def _check_ratings(results: Results) -> None:
         if not all(0.0 <= part <= 1.0 for part in row[4:]):
             raise ValueError(f"iso_18571.csv, line {line}: a part is not in [0, 1]")
         if abs(row.overall - score.score) > SAME_SCORE:
-            told = f"parts rate {row.overall:g}, and similarity.csv has {score.score:g}"
-            raise ValueError(f"iso_18571.csv, line {line}: {told}")
+            reason = f"parts rate {row.overall:g}, and similarity.csv has {score.score:g}"
+            raise ValueError(f"iso_18571.csv, line {line}: {reason}")
 
 
 def _check_score_errors(results: Results) -> None:
@@ -336,11 +336,11 @@ def _check_score_differences(results: Results) -> None:
         where, place = f"{file}, line {line}", row[2:6]
         apart = scores[row.model, *place] - scores[row.other, *place]
         if abs(apart - row.difference) > SAME_SCORE:
-            told = f"difference {row.difference:g}, and {apart:g} in similarity.csv"
-            raise ValueError(f"{where}: {told}")
+            reason = f"difference {row.difference:g}, and {apart:g} in similarity.csv"
+            raise ValueError(f"{where}: {reason}")
         low, high = row.low - SAME_SCORE, row.high + SAME_SCORE
         if row.low < -1.0 or row.high > 1.0 or not low <= row.difference <= high:
-            raise ValueError(f"{where}: low and high do not hold the difference")
+            raise ValueError(f"{where}: the difference is not between low and high")
         _check_parts(where, row)
 
 
@@ -377,7 +377,7 @@ def _check_sensitivity(results: Results) -> None:
     keys = [row[:4] for row in rows]
     for line, (key, row) in enumerate(zip(keys, rows, strict=True), FIRST_LINE):
         if key in keys[: line - FIRST_LINE]:
-            raise ValueError(f"sensitivity.csv, line {line}: {_words(key)} stands there twice")
+            raise ValueError(f"sensitivity.csv, line {line}: {_words(key)} appears twice")
         if not 0.0 <= row.rms_change_pa <= row.largest_change_pa * (1.0 + SAME_TIME):
             raise ValueError(
                 f"sensitivity.csv, line {line}: rms_change_pa {row.rms_change_pa:g} is not between "

@@ -27,7 +27,7 @@ STAGES = "severity"
 class Range:
     """A number between two bounds in SI units, each share of it (or of its logarithm) as likely.
 
-    Unknowns of one `group` change together where indices are told; without, each is its own.
+    Unknowns of one `group` change together in sensitivity indices; without, each is its own.
     """
 
     name: str

@@ -20,7 +20,7 @@ def _point(scene: Scene, mass: float) -> list[str]:
         "declared in the scene"
         if scene.organ.mass is not None
         else f"that for which eq. (2) at zeta = {scene.damping.ratio:g} with the benchmark's "
-        "stiffness at rest meets gamma_0"
+        "stiffness at rest equals gamma_0"
     )
     return [
         f"The control mass point weighs {mass:.4g} kg, {source}; the paper gives no mass.",
@@ -47,9 +47,9 @@ def _travelling(scene: Scene) -> list[str]:
     if not any(tool.travels for tool in scene.tools):
         return []
     return [
-        "A blunt tool that travels keeps its direction and stands for patches at stations on its "
-        f"way, at most {APART:g} radii apart, whose shares follow it as cubic splines: its force "
-        "and centre are exact, and the displacement under it is off by less than "
+        "A blunt tool that travels keeps its direction and is represented by patches at stations "
+        f"on its path, at most {APART:g} radii apart, whose shares follow it as cubic splines: its "
+        "force and centre are exact, and the displacement under it is off by less than "
         f"{100 * MEASURED:g} % on the built-in liver. Control points are those of the tissue and "
         "stay where they are."
     ]
@@ -58,15 +58,15 @@ def _travelling(scene: Scene) -> list[str]:
 def _given(scene: Scene) -> str:
     """On the shape that a scene gives."""
     if not scene.gravity.acceleration:
-        return "There is no gravity: the shape given is the shape at rest."
+        return "There is no gravity: the given shape is the shape at rest."
     weight = f"Gravity is {scene.gravity.acceleration:g} m/s^2 towards {scene.gravity.towards}"
     if scene.gravity.given == "loaded":
         return (
-            f"{weight}: the shape given is that at rest under it. Small displacements from there "
+            f"{weight}: the given shape is that at rest under it. Small displacements from there "
             "are those of a weightless organ; models of large ones first find the shape without "
             "load."
         )
-    return f"{weight}: the shape given is that without load, from which the organ sags first."
+    return f"{weight}: the given shape is that without load, from which the organ sags first."
 
 
 def _held(support: Support) -> str:
@@ -84,7 +84,7 @@ def _held(support: Support) -> str:
     how = "is clamped" if support.kind == CLAMPED else f"slides across the line to {support.side}"
     return (
         f"The organ {how} over {where}: finite elements hold the nodes of the facets there, a "
-        "lattice the nodes nearest to it, which lie up to half a spacing off, so that a clamped "
+        "lattice the nodes nearest to it, which are up to half a spacing away, so that a clamped "
         "lattice is thinner or thicker by as much."
     )
 
@@ -94,8 +94,8 @@ def _tissue(scene: Scene) -> list[str]:
     if "inclusions" not in scene.features:
         return []
     found = [
-        "Inclusions and the map of stiffness have the modulus that they are given in every model, "
-        "an estimate or the benchmark's law that of the tissue around; all springs share one law "
+        "Inclusions and the map of stiffness have their given modulus in every model; an estimate "
+        "and the benchmark's law are those of the surrounding tissue; all springs share one law "
         "in proportion. An element or cell that an interface cuts has the mean compliance of its "
         "parts by volume; results converge at first order in its size, and the elements' own "
         "error bar is found by meshes that do not follow the interface.",

@@ -134,7 +134,7 @@ def _mesh_warnings(scene: Scene, elements: ElementsRecord) -> Iterator[str]:
         yield (
             "The finite elements state an error of "
             f"{100 * elements.mesh_error.worst.displacement:.2g} %, as their meshes are too coarse "
-            "to tell a smaller one. Set reference.accuracy, or reduce reference.element_size."
+            "to resolve a smaller one. Set reference.accuracy, or reduce reference.element_size."
         )
 
 

@@ -38,7 +38,7 @@ def read_image(path: Path) -> tuple[Floats, Floats]:
     try:
         image: Any = nibabel.load(path, mmap=False)
         if not isinstance(image, nibabel.Nifti1Pair):
-            raise ImageFileError("another format, which may not tell where its voxels are")
+            raise ImageFileError("another format, which may not state where its voxels are")
         frames = _frames(image)
         kind = image.get_data_dtype()
         voxels = np.asarray(image.dataobj) if kind.kind in "biuf" else np.empty(0)

@@ -1,4 +1,4 @@
-"""Scene: everything a study of one organ under one tool is told, in SI units.
+"""Scene: all inputs of a study of one organ under its tools, in SI units.
 
 A scene is written as TOML; `study.scene.file` reads, checks and writes it. The annotations state
 the unit and the allowed range of each quantity.

@@ -25,14 +25,14 @@ IN_OTHER_WORDS = {
     "Cannot declare": "the table is given twice, or a key has its name; join them",
     "Cannot mutate immutable namespace": "the table is closed on its line; write the key in it",
     "Invalid value": (
-        'neither a number nor true or false; text and quantities stand in quotes, "1 N"'
+        'neither a number nor true or false; text and quantities are put in quotes, "1 N"'
     ),
     "Invalid statement": "not `key = value`",
     "Expected '=' after a key": "not `key = value`",
     "Illegal character '\\n'": "the closing quote is missing",
     "Unterminated string": "the closing quote is missing",
     "Expected newline or end of document after a statement": (
-        'more than one value; a number with a unit stands in quotes, "1 N"'
+        'more than one value; a number with a unit is put in quotes, "1 N"'
     ),
 }
 """Beginnings of the parser's messages, and what a person does about them."""

@@ -39,7 +39,7 @@ PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
 PIECES = re.compile(r"keep one piece \(`organ\.pieces`[^)]*\), or join them")
 """What is said of an organ of several pieces."""
 FEWEST = 8
-"""Points that tell shares of elements, in an inclusion: with fewer its volume is chance."""
+"""Sampling points that an inclusion needs: with fewer, its shares of elements are arbitrary."""
 RANGE = (10.0, 1e9)
 """Young's moduli [Pa] that a map may have."""
 MEAN_RANGE = (100.0, 1e6)

@@ -113,7 +113,7 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
     """The finest lattice of a family as reference solution, from both runs of `lattices`.
 
     Its own errors are Richardson's estimates from the changes due to halving the spacing, without
-    the safety factor of a run's: with it, lattices of a few spacings could not be told from it.
+    the safety factor of a run's: with it, errors of lattices of a few spacings would be below them.
     ValueError where one of the two did not finish.
     """
     finest, coarser = (_whole(one, given) for one in outcomes)

@@ -107,8 +107,8 @@ def truth(value: Plain, given: SceneProblem) -> ReferenceSolution:
         raise ValueError("the reference's motion was lost before its end")
     if found.field_error is None or found.curve_errors is None:
         raise ValueError(
-            "the organ has one mesh only, so the error of its reference is unknown and none of a "
-            "model can be told from it; refine organ.mesh or give a surface"
+            "the organ has one mesh only, so the error of its reference is unknown and that of a "
+            "model cannot be separated from it; refine organ.mesh or give a surface"
         )
     seen, tools = given.problem.observation, len(given.problem.rigid_tools)
     if tools and found.force_errors is None:

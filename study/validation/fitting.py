@@ -182,7 +182,7 @@ class _Runs:
         found = list(models_of(scene, estimates(scene) if is_tuned(scene) else {}))
         if len(found) > 1:
             raise ValueError(
-                f"--model {self.model}: stands for {len(found)} models; name one system in "
+                f"--model {self.model}: is a kind of {len(found)} models; name one system in "
                 "fuzzy.systems, or another model"
             )
         return found[0], problem_of(scene)
@@ -294,7 +294,7 @@ def _refuse_undetermined(slope: Floats, free: Sequence[Free]) -> None:
         raise ValueError(f"--free {names}: the curve does not change with it; fit another quantity")
     if sizes[-1] * LARGEST_CONDITION < sizes[0] or len(sizes) < len(free):
         raise ValueError(
-            f"--free {names}: the curve does not tell them apart; fit fewer, or measure elsewhere"
+            f"--free {names}: the curve does not distinguish them; fit fewer, or measure elsewhere"
         )
 
 

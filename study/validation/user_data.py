@@ -95,7 +95,7 @@ def read_markers(path: Path) -> UserMarkers:
 
 
 def _names(table: Table, known: Sequence[str]) -> list[str]:
-    """Names of the columns, each a known one that stands there once."""
+    """Names of the columns, each a known one that appears once."""
     names = [name.strip() for name in table.header]
     for name in names:
         if name not in known:
@@ -106,7 +106,7 @@ def _names(table: Table, known: Sequence[str]) -> list[str]:
             )
         if names.count(name) > 1:
             raise table.fault(
-                table.header_line, f"column {name!r} stands there twice; rename or remove one"
+                table.header_line, f"column {name!r} appears twice; rename or remove one"
             )
     return names
 
