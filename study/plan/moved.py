@@ -164,7 +164,7 @@ def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook
 
 
 def _lattice(scene: Scene, settings: Lattice) -> LatticeModel:
-    """That of the tissue's modulus."""
+    """The lattice of the tissue's modulus, with these settings."""
     tissue = model(scene, "tissue")
     assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
     return replace(tissue, scene=replace(tissue.scene, lattice=settings))

@@ -100,7 +100,7 @@ def lattices(scene: Scene, chosen: Iterable[Configuration]) -> dict[Family, list
 
 
 def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
-    """With the settings of the contenders, so that its run is one of theirs."""
+    """A lattice of a family, with the contenders' settings, so that its run is one of theirs."""
     model, volume_term = springs
     spacing, step = times * scene.lattice.spacing, {"step_fraction": fraction(scene)}
     if model != "tissue":
