@@ -184,7 +184,7 @@ def discretise(
     where, by_gradient = pattern(nodes), by_order(nodes, gradient_order(grid, name))
     made = composed(nodes, tissue)
     if isinstance(nodes.mapping, CurvedMapping):
-        nodes.mapping.forget()
+        nodes.mapping.clear()
     whole = by_component(finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)

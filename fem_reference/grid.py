@@ -69,7 +69,7 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
             kept = self._kept = _Derivatives(X, tind, self._derivatives(X, tind), None)
         return kept
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Release the cached derivatives."""
         self._kept = None
 
