@@ -34,7 +34,7 @@ ROUNDING = 1e-9
 """Rounding of lambda, a difference of two moduli, relative to mu."""
 
 
-def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
+def elastic(grid: skfem.Mesh, name: ElementName, tissue: Tissue) -> Stiffness:
     """Stiffness without support; Taylor-Hood elements have the volumetric part by the pressure."""
     nodes = skfem.Basis(
         grid, ELEMENTS[name].shapes(), mapping(grid), intorder=gradient_order(grid, name)
@@ -44,19 +44,19 @@ def elastic(grid: Any, name: ElementName, tissue: Tissue) -> Stiffness:
     )
 
 
-def gradient_order(grid: Any, name: ElementName) -> int:
+def gradient_order(grid: skfem.Mesh, name: ElementName) -> int:
     """Degree of the quadrature of the stiffness."""
     return CURVED_ORDER if isinstance(grid, skfem.MeshTet2) else ELEMENTS[name].gradient_order
 
 
-def by_order(nodes: Any, order: int) -> Any:
+def by_order(nodes: skfem.Basis, order: int) -> skfem.Basis:
     """The basis with quadrature of another order, itself where that is the order of the mass."""
     if order == MASS_ORDER:
         return nodes
     return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=order)
 
 
-def composed(nodes: Any, tissue: Tissue) -> Composition | None:
+def composed(nodes: skfem.Basis, tissue: Tissue) -> Composition | None:
     """Tissue of the cells of a basis, straight or curved; None for a homogeneous body."""
 
     def points(cells: slice) -> Floats:
@@ -77,7 +77,7 @@ def cell_moduli(made: Composition | None, tissue: Tissue) -> Moduli:
 
 def elastic_stiffness(
     integrals: Gradients,
-    nodes: Any,
+    nodes: skfem.Basis,
     name: ElementName,
     tissue: Tissue,
     made: Composition | None = None,
@@ -95,7 +95,7 @@ def elastic_stiffness(
     return Stiffness(matrix, Pressure(*known, lame, mu))
 
 
-def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
+def _varied(nodes: skfem.Basis, name: ElementName, tissue: Tissue, made: Composition) -> Stiffness:
     """Stiffness without support of cells with moduli of their own, which weight the integrals.
 
     The continuous pressure smears the jump of the exact one at an interface over the elements
@@ -118,7 +118,7 @@ def _varied(nodes: Any, name: ElementName, tissue: Tissue, made: Composition) ->
 
 
 def _pressure(
-    nodes: Any, name: ElementName, density: Floats | None = None
+    nodes: skfem.Basis, name: ElementName, density: Floats | None = None
 ) -> tuple[csc_array, csc_array]:
     """Integrals of divergence times pressure, and of pressure times pressure, by one quadrature.
 

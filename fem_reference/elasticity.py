@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import skfem
@@ -47,7 +47,7 @@ class Loaded(NamedTuple):
     """The chosen element, and scikit-fem's basis of one component on the boundary facets."""
 
     element: ElementName
-    surface: Any
+    surface: skfem.FacetBasis
 
 
 class Outline(NamedTuple):
@@ -58,7 +58,7 @@ class Outline(NamedTuple):
 
     mesh: TetrahedralMesh
     element: ElementName
-    nodes: Any
+    nodes: skfem.Basis
     unknowns: int
 
 
@@ -79,7 +79,7 @@ class Body:
 
     mesh: TetrahedralMesh
     element: ElementName
-    nodes: Any
+    nodes: skfem.Basis
     stiffness: Stiffness
     mass: csc_array
     nodal_mass: Floats
@@ -154,7 +154,7 @@ class Body:
         return found if alike else None
 
     @cached_property
-    def basis(self) -> Any:
+    def basis(self) -> skfem.Basis:
         """scikit-fem's vector basis of displacements, with the order of unknowns of the body."""
         element = skfem.ElementVector(ELEMENTS[self.element].shapes())
         return skfem.Basis(self.nodes.mesh, element, self.nodes.mapping, intorder=MASS_ORDER)
@@ -184,7 +184,7 @@ def discretise(
     where, by_gradient = pattern(nodes), by_order(nodes, gradient_order(grid, name))
     made = composed(nodes, tissue)
     if isinstance(nodes.mapping, CurvedMapping):
-        nodes.mapping.forget()
+        nodes.mapping.clear()
     whole = by_component(finite(_mass(nodes, where, tissue, made), "the mass"))
     integrals = gradients(by_gradient, where)
     fixed = _fixed(surface, foundation)
@@ -213,7 +213,7 @@ def without_fixed(force: Floats, fixed: Booleans | None) -> Floats:
     return force if fixed is None else np.where(fixed, 0.0, force)
 
 
-def _fixed(surface: Any, foundation: Support) -> Booleans | None:
+def _fixed(surface: skfem.FacetBasis, foundation: Support) -> Booleans | None:
     """Unknowns (3 nodes,) on facets whose centre is fixed; None without any."""
     points = rows(surface.global_coordinates()).mean(axis=1)
     held = foundation.fixed(points, rows(surface.normals).mean(axis=1))
@@ -237,7 +237,9 @@ def decoupled(matrix: csc_array, fixed: Booleans | None) -> csc_array:
     return csc_array(coo_array(entries, shape=found.shape))
 
 
-def _mass(nodes: Any, where: Pattern, tissue: Tissue, made: Composition | None) -> csr_array:
+def _mass(
+    nodes: skfem.Basis, where: Pattern, tissue: Tissue, made: Composition | None
+) -> csr_array:
     """Mass matrix [kg] of one component."""
     if made is None:
         return tissue.density * products(nodes, where)
@@ -315,7 +317,7 @@ def loaded_surface(
     return Loaded(name, surface)
 
 
-def _refuse_untouched(surface: Any, foundation: Support, tool: ToolPatch) -> None:
+def _refuse_untouched(surface: skfem.FacetBasis, foundation: Support, tool: ToolPatch) -> None:
     """ValueError if no integration point of the facets is supported, or none is loaded."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     coarse = f"on a mesh of {surface.mesh.nelements} tetrahedra"
@@ -351,11 +353,11 @@ def _refuse_flat(mesh: TetrahedralMesh) -> None:
         )
 
 
-def _foundation_form(foundation: Support) -> Any:
+def _foundation_form(foundation: Support) -> skfem.BilinearForm:
     return skfem.BilinearForm(lambda u, v, w: foundation.density(rows(w.x), rows(w.n)) * u * v)
 
 
-def patch_load(surface: Any, tool: ToolPatch) -> Floats:
+def patch_load(surface: skfem.FacetBasis, tool: ToolPatch) -> Floats:
     """Nodal forces [N] of the tool's traction, scaled so that they sum to its force."""
     form = skfem.LinearForm(lambda v, w: tool.profile(rows(w.x), rows(w.n)) * v)
     nodal = np.asarray(form.assemble(surface))

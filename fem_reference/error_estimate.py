@@ -82,7 +82,7 @@ def discretisation_error(
 def graded_error(
     results: Sequence[Floats], sizes: Sequence[float], order: float, weights: Floats | None = None
 ) -> ErrorEstimate:
-    """The same for adaptively refined meshes with an assumed `order` of convergence.
+    """Discretisation error on adaptively refined meshes, at an assumed `order` of convergence.
 
     The last change counts at least as much as the one before implies at that order, since a change
     may be small by coincidence.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import skfem
@@ -72,18 +71,18 @@ def weight_forces(body: Body, external: ExternalLoads) -> Floats:
     return without_fixed(nodal * np.tile(external.gravity, body.node_count), body.fixed)
 
 
-def _weight_masses(surface: Any, weights: tuple[Weight, ...]) -> list[csc_array]:
+def _weight_masses(surface: skfem.FacetBasis, weights: tuple[Weight, ...]) -> list[csc_array]:
     return [_weight_mass(surface, one, f"weight.{n}") for n, one in enumerate(weights, 1)]
 
 
-def _patch_forces(surface: Any, patch: ToolPatch) -> Floats:
+def _patch_forces(surface: skfem.FacetBasis, patch: ToolPatch) -> Floats:
     """Nodal forces [N] (n,) of a load."""
     if not patch.profile(rows(surface.global_coordinates()), rows(surface.normals)).any():
         raise _untouched(surface, patch.name)
     return patch_load(surface, patch)
 
 
-def _weight_mass(surface: Any, weight: Weight, name: str) -> csc_array:
+def _weight_mass(surface: skfem.FacetBasis, weight: Weight, name: str) -> csc_array:
     """Mass matrix [kg] (n, n) of a weight distributed over its patch."""
     patch = weight.patch
     form = skfem.BilinearForm(lambda u, v, w: patch.profile(rows(w.x), rows(w.n)) * u * v)
@@ -94,7 +93,7 @@ def _weight_mass(surface: Any, weight: Weight, name: str) -> csc_array:
     return by_component((weight.mass / total) * distribution)
 
 
-def _untouched(surface: Any, name: str) -> ValueError:
+def _untouched(surface: skfem.FacetBasis, name: str) -> ValueError:
     return ValueError(
         f"{name}: touches no surface on a mesh of {surface.mesh.nelements} tetrahedra; enlarge "
         f"{name}.radius, move {name}.place or reduce reference.element_size"

@@ -69,7 +69,7 @@ class CurvedMapping(skfem.MappingIsoparametric):  # type: ignore[misc] # scikit-
             kept = self._kept = _Derivatives(X, tind, self._derivatives(X, tind), None)
         return kept
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Release the cached derivatives."""
         self._kept = None
 
@@ -191,21 +191,21 @@ def _share(known: Any, other: Any) -> None:
             setattr(other, name, getattr(known, name))
 
 
-def mapping(grid: Any) -> Any:
+def mapping(grid: skfem.Mesh) -> skfem.mapping.Mapping:
     """Mapping from the reference cell to the cells of a grid."""
     if isinstance(grid, skfem.MeshTet2):
         return CurvedMapping(grid, grid.elem(), grid.bndelem)
     return grid.mapping()
 
 
-def straight(mesh: TetrahedralMesh) -> Any:
+def straight(mesh: TetrahedralMesh) -> skfem.MeshTet:
     """The mesh with flat facets."""
     return StraightGrid(
         np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.tetrahedra.T)
     )
 
 
-def curved(mesh: TetrahedralMesh, project: Projection) -> Any:
+def curved(mesh: TetrahedralMesh, project: Projection) -> skfem.MeshTet2:
     """The mesh with quadratic geometry, its boundary edge nodes on the surface.
 
     `project` maps points [m] (n, 3) onto the surface. Where a tetrahedron would be distorted, as in

@@ -9,7 +9,6 @@ and the area of the undeformed body, so that only the tissue's law and geometry 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import skfem
@@ -115,7 +114,7 @@ def element_stiffness(moduli: Floats, slopes: Floats) -> Floats:
     return found.reshape(-1, 3 * count, 3 * count)
 
 
-def by_positive_weights(nodes: Any) -> Any:
+def by_positive_weights(nodes: skfem.Basis) -> skfem.Basis:
     """A basis of scikit-fem's with the quadrature of an energy of finite strain."""
     return skfem.Basis(nodes.mesh, nodes.elem, nodes.mapping, intorder=ENERGY_ORDER)
 

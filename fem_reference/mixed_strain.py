@@ -60,7 +60,7 @@ class MixedSolid:
     the mean only.
     """
 
-    nodes: Any
+    nodes: skfem.Basis
     lame: Any
     shear: Any
     slopes: Floats
@@ -224,7 +224,7 @@ class MixedSolid:
         return np.outer(density * share, acceleration).ravel()
 
 
-def mixed_solid(grid: Any, tissue: Tissue) -> MixedSolid:
+def mixed_solid(grid: skfem.Mesh, tissue: Tissue) -> MixedSolid:
     """The body on a mesh of scikit-fem's, straight or curved (`fem_reference.grid`).
 
     ValueError for a Poisson ratio without a mixed formulation: 0 and below, or 1/2.
@@ -234,7 +234,7 @@ def mixed_solid(grid: Any, tissue: Tissue) -> MixedSolid:
 
 
 def on_nodes(
-    nodes: Any,
+    nodes: skfem.Basis,
     tissue: Tissue,
     support: csc_array | None = None,
     made: Composition | None = None,

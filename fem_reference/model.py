@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,32 +125,37 @@ class Solution:
         return moved if self.start is None else moved + self.start
 
 
-MotionMethod = Callable[[Body, RayleighDamping, Factor, Recorder, Method, Near, Advance], Solution]
-"""Motion under a load history, as a recorder observes it, by the settings of a method."""
+class MotionTask(NamedTuple):
+    """A motion under a load history, as a recorder observes it, by the settings of a method.
+
+    `near`: approximations of the vectors of a superposition, see `run`.
+    """
+
+    body: Body
+    damping: RayleighDamping
+    factor: Factor
+    recorder: Recorder
+    method: Method
+    near: Near
+    advance: Advance
 
 
-def _stepped(
-    scheme: March,
-    body: Body,
-    damping: RayleighDamping,
-    factor: Factor,
-    recorder: Recorder,
-    method: Method,
-    near: Near,
-    advance: Advance,
-) -> Solution:
+MotionMethod = Callable[[MotionTask], Solution]
+
+
+def _stepped(scheme: March, task: MotionTask) -> Solution:
     """Direct time integration; samples within a step come from its cubic interpolant."""
-    del near  # a factored step needs no start vectors
+    body, recorder = task.body, task.recorder
     times = recorder.observation.times
-    steps = method.time_steps(factor, times)
+    steps = task.method.time_steps(task.factor, times)
     step, count = steps.step(float(times[1] - times[0])), steps.count(len(times) - 1)
-    system = Oscillator(body.mass, body.stiffness, body.loads, damping)
+    system = Oscillator(body.mass, body.stiffness, body.loads, task.damping)
     started = time.perf_counter()
     before: State | None = None
-    for n, after in enumerate(scheme(system, factor, step, count)):
+    for n, after in enumerate(scheme(system, task.factor, step, count)):
         if n % steps.per_sample == 0:
             _record(recorder, n // steps.per_sample * steps.samples, before, after, step, steps)
-            advance(n / count)
+            task.advance(n / count)
         before = after
     return _solution(body, recorder, step, count, time.perf_counter() - started)
 
@@ -178,21 +184,14 @@ def _at_probes(recorder: Recorder, state: State) -> State:
     return u, v
 
 
-def _superposed(
-    choose: Choose,
-    body: Body,
-    damping: RayleighDamping,
-    factor: Factor,
-    recorder: Recorder,
-    method: Method,
-    near: Near,
-    advance: Advance,
-) -> Solution:
+def _superposed(choose: Choose, task: MotionTask) -> Solution:
     """Superposition in a subspace; strain also where a control point is farthest out."""
     started = time.perf_counter()
-    steps = method.load_steps(factor, recorder.observation.times)
-    excitation = excitation_of(damping, factor, recorder, steps)
-    found = superposed(excitation, choose(body, excitation, method.modes, near, advance))
+    body, recorder = task.body, task.recorder
+    steps = task.method.load_steps(task.factor, recorder.observation.times)
+    excitation = excitation_of(task.damping, task.factor, recorder, steps)
+    chosen = choose(body, excitation, task.method.modes, task.near, task.advance)
+    found = superposed(excitation, chosen)
     wall = time.perf_counter() - started
     for sample in range(len(recorder.observation.times)):
         recorder.motion(sample, *(curve[sample] for curve in found.curves))
@@ -265,9 +264,11 @@ def run(
     if method.name not in METHODS:
         raise ValueError(f"reference.method: {method.name} is not one of {', '.join(METHODS)}")
     start = start_of(body)
-    recorded = (Recorder(body, observation, start), method, near, on_progress)
-    found = METHODS[method.name](body, damping, factor, *recorded)
-    return replace(found, start=start, moving=_moving(found.superposed, recorded[0].start))
+    recorder = Recorder(body, observation, start)
+    found = METHODS[method.name](
+        MotionTask(body, damping, factor, recorder, method, near, on_progress)
+    )
+    return replace(found, start=start, moving=_moving(found.superposed, recorder.start))
 
 
 def _moving(superposed: Superposed | None, start: Floats) -> Callable[[int], State] | None:

@@ -10,8 +10,8 @@ bounds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import skfem
@@ -114,7 +114,7 @@ def energy_products(body: Body, tissue: Tissue, a: Floats, b: Floats) -> Floats:
     return np.asarray((density * body.nodes.dx).sum(axis=1))
 
 
-def _projection(body: Body) -> Any:
+def _projection(body: Body) -> Callable[[Floats], Floats]:
     """L2 projection from values (cells, q) at the integration points to nodal values."""
     basis, products = body.nodes, body.nodal_volume
     shapes = [np.asarray(basis.basis[k][0]) for k in range(basis.Nbfun)]

@@ -57,10 +57,10 @@ def run(
     )
     state = np.full((2, len(times)), np.nan)
     state[:, : solution.y.shape[1]] = solution.y
-    return _as_trajectory(state, times, bool(solution.success))
+    return _as_trajectory(state, times, finished=bool(solution.success))
 
 
-def _as_trajectory(state: Floats, times: Floats, finished: bool) -> Trajectory:
+def _as_trajectory(state: Floats, times: Floats, *, finished: bool) -> Trajectory:
     displacement, velocity = np.zeros((2, len(times), 1, 3))
     displacement[:, 0, 0], velocity[:, 0, 0] = state
     none = np.zeros((0, 0, 3))

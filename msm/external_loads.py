@@ -123,7 +123,7 @@ def external_arrays(
 
 
 def renumbered(external: ExternalArrays, place: Ints) -> ExternalArrays:
-    """The same for arrays of the motion in which the nodes stand at other places (n,)."""
+    """The loads for arrays of the motion that have the nodes at other places (n,)."""
     contact = external.contact
     moved = None if contact is None else contact._replace(place=place)
     return external._replace(place=place, contact=moved)

@@ -188,20 +188,14 @@ def springs(
     `flexion` and `stiffness` (c,) as in `msm.springs`; flexion springs span cells of one size.
     """
     shares = _by_level(lattice, np.ones(len(lattice.edges)) if stiffness is None else stiffness)
-    levels = [one for one in lattice.levels if len(one.cells)]
     parts = [
-        connect(one, flexion, stiffness=share)
+        (one.spacing / lattice.spacing, connect(one, flexion, stiffness=share))
         for one, share in zip(lattice.levels, shares, strict=True)
         if len(one.cells)
     ]
-    ends = np.concatenate([one.ends for one in parts])
-    rest = np.concatenate([one.rest for one in parts])
-    weight = np.concatenate(
-        [
-            one.weight * (level.spacing / lattice.spacing)
-            for one, level in zip(parts, levels, strict=True)
-        ]
-    )
+    ends = np.concatenate([part.ends for _, part in parts])
+    rest = np.concatenate([part.rest for _, part in parts])
+    weight = np.concatenate([edge * part.weight for edge, part in parts])
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     return Springs(ends[order], rest[order], weight[order])
 

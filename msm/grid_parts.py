@@ -176,30 +176,38 @@ def _couplings(net: Network, number: Ints) -> Pairs:
 
 
 def joined(parts: list[Part], place: list[Ints], primary: Ints, net: Network) -> Joints:
-    """Copies with their masters and weights, and the foundation."""
-    count = len(net.mass)
-    hangs = np.zeros(count, dtype=np.bool_)
-    hangs[net.hanging] = True
-    free = np.flatnonzero(~hangs)
-    first = net.first_master.astype(np.int64)
-    rows = np.concatenate([free, np.repeat(net.hanging.astype(np.int64), first[1:] - first[:-1])])
-    columns = np.concatenate([free, net.master.astype(np.int64)])
-    shares = np.concatenate([np.ones(len(free)), net.part])
-    moved = csr_array((shares, (rows, columns)), shape=(count, count))
+    """Copies of nodes with their masters and weights, and the foundation.
+
+    `place` (k,) of each part: of its nodes in the motion; `primary` (n,): that of each node of the
+    network which carries its motion.
+    """
     copies = [
         (part.node[~part.owned], at[~part.owned]) for part, at in zip(parts, place, strict=True)
     ]
     node, copy = (np.concatenate([pair[k] for pair in copies]) for k in (0, 1))
-    of_copies = csr_array(moved[node])
-    held = np.flatnonzero(np.diff(net.row.astype(np.int64)))
-    value, column, row = net.value, net.column.astype(np.int64), net.row.astype(np.int64)
+    masters = csr_array(_masters(net)[node])
+    row = net.row.astype(np.int64)
+    held = np.flatnonzero(np.diff(row))
     return Joints(
         copy.astype(np.int64),
-        of_copies.indptr.astype(np.int64),
-        primary[of_copies.indices],
-        of_copies.data,
+        masters.indptr.astype(np.int64),
+        primary[masters.indices],
+        masters.data,
         primary[held],
         row[np.append(held, len(row) - 1)],
-        primary[column],
-        value,
+        primary[net.column.astype(np.int64)],
+        net.value,
     )
+
+
+def _masters(net: Network) -> csr_array:
+    """Interpolation (n, n) of all nodes from those that do not hang."""
+    count = len(net.mass)
+    is_free = np.ones(count, dtype=np.bool_)
+    is_free[net.hanging] = False
+    free = np.flatnonzero(is_free)
+    first = net.first_master.astype(np.int64)
+    rows = np.concatenate([free, np.repeat(net.hanging.astype(np.int64), first[1:] - first[:-1])])
+    columns = np.concatenate([free, net.master.astype(np.int64)])
+    shares = np.concatenate([np.ones(len(free)), net.part])
+    return csr_array((shares, (rows, columns)), shape=(count, count))

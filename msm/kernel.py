@@ -35,10 +35,10 @@ class _OwnTypes(FunctionCache):  # type: ignore[misc] # numba publishes no types
 
 def _is_ours(sig: Any) -> bool:
     tuples = [kind.instance_class for kind in sig if hasattr(kind, "instance_class")]
-    return all(map(_stands_here, tuples))
+    return all(map(_is_defined_here, tuples))
 
 
-def _stands_here(thing: Any) -> bool:
+def _is_defined_here(thing: Any) -> bool:
     return bool(thing.__module__.partition(".")[0] == OURS)
 
 
@@ -70,7 +70,7 @@ def _compiled(**options: Any) -> Callable[[F], F]:
     def compiled(function: F) -> F:
         # No kernel is passed as a value, so none needs a C wrapper.
         made = numba.njit(error_model="numpy", no_cfunc_wrapper=True, **options)(function)
-        if _stands_here(function):
+        if _is_defined_here(function):
             made._cache = _OwnTypes(function)  # what cache=True sets
         return made  # type: ignore[no-any-return] # numba publishes no types
 

@@ -201,7 +201,7 @@ PAIRED: dict[Callable[..., Any], Callable[..., Any]] = {
 }
 
 
-def _teach_pair(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
+def _register_pair(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
     """Define a binary function for two vectors, or for a vector and a scalar."""
 
     @type_callable(function)
@@ -225,7 +225,7 @@ def _teach_pair(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
         lower_builtin(function, *kinds)(code)
 
 
-def _teach_single(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
+def _register_single(function: Callable[..., Any], emit: Callable[..., Any]) -> None:
     @type_callable(function)
     def _(_: Any) -> Any:
         return lambda a: a if isinstance(a, LanesType) else None
@@ -236,9 +236,9 @@ def _teach_single(function: Callable[..., Any], emit: Callable[..., Any]) -> Non
 
 
 for _two, _emit in PAIRED.items():
-    _teach_pair(_two, _emit)
-_teach_single(operator.neg, lambda builder, a, _: builder.fneg(a))
-_teach_single(abs, lambda builder, a, kind: builder.call(_function(builder, "fabs", kind), [a]))
+    _register_pair(_two, _emit)
+_register_single(operator.neg, lambda builder, a, _: builder.fneg(a))
+_register_single(abs, lambda builder, a, kind: builder.call(_function(builder, "fabs", kind), [a]))
 
 
 @intrinsic

@@ -1,6 +1,6 @@
 """Name and line of each model, the same on every page.
 
-Colours of Okabe and Ito, told apart by the colour-blind; the dashes tell the lines apart in print.
+Colours of Okabe and Ito, which the colour-blind distinguish; dashes distinguish lines in print.
 Mamdani is broad and pale so that type-2, which nearly coincides with it, shows on top.
 """
 

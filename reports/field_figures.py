@@ -310,7 +310,7 @@ def _mark(axes: Axes, views: Views, places: Floats) -> None:
     ring = camera.project(_ring(places[0], views.push, views.radius))
     axes.plot(ring[:, 0], ring[:, 1], color=RED, lw=1.0)
     for i, place in enumerate(camera.project(places[1:])):
-        _mark_point(axes, place, str(i + 1), bool(views.hidden[i + 1]))
+        _mark_point(axes, place, str(i + 1), hidden=bool(views.hidden[i + 1]))
 
 
 def _mark_way(axes: Axes, seen: Floats) -> None:
@@ -336,7 +336,7 @@ def _mark_inclusion(axes: Axes, seen: Floats) -> None:
     axes.plot(closed[:, 0], closed[:, 1], ":", color="black", lw=1.1)
 
 
-def _mark_point(axes: Axes, place: Floats, text: str, hidden: bool) -> None:
+def _mark_point(axes: Axes, place: Floats, text: str, *, hidden: bool) -> None:
     face = "none" if hidden else "white"
     axes.plot(*place, "o", ms=3.0, mfc=face, mec="black", mew=0.6, clip_on=False)
     halo = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}

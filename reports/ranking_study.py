@@ -24,9 +24,9 @@ NEAREST, DIFFERENCES, TABLE_THREE, INDICES, DRAWN, UNKNOWNS, SPACING = (
 )
 MOST_NAMED = 4
 WIDEST = 0.6
-"""Width of the 95 % interval of a total index beyond which it is not printed: it is noise."""
+"""Width of the 95 % interval of a total index beyond which it is not printed, as not resolved."""
 FEWEST = 64
-"""Rows of the design below which a bootstrap over them does not tell that interval either."""
+"""Rows of the design below which a bootstrap over them does not give that interval either."""
 CLAIM = "interval-type-2"
 """The system that the paper finds nearest to the benchmark."""
 

@@ -58,7 +58,7 @@ FLAT = Pictures("matplotlib (flat triangles; VTK could not render here)", None)
 def render(job: Job, unwanted: Event | None = None) -> Pictures:
     """Render a job in a child process, or say that it has to be drawn flat.
 
-    Once the pictures are `unwanted` the child is killed, for nobody waits for it any more.
+    Once the pictures are `unwanted` the child is killed.
     """
     unwanted = unwanted or Event()
     with tempfile.TemporaryDirectory(prefix="liver-study-") as folder:

@@ -104,7 +104,7 @@ def _draw(axes: Axes, run: Results, model: str, k: int, name: str) -> object:
 
 
 def alternative(names: Sequence[str], runs: Sequence[Results]) -> str:
-    """The largest displacement of each model in each run, for whoever does not see the curves."""
+    """The largest displacement of each model in each run, for readers who cannot see the curves."""
     parts = []
     for label in shared_models(runs):
         told = []

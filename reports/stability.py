@@ -90,7 +90,7 @@ def matrix(found: Iterable[StabilityCase]) -> dict[str, Counter[str]]:
 
 @dataclass(frozen=True)
 class Boundary:
-    """Where a series of stability cases, told apart by the number in their names, breaks.
+    """Where a series of stability cases, which differ by the number in their names, breaks.
 
     `held`: the largest that did not diverge, None where all did; `broke`: the smallest that did;
     `those`: which of the integrators or models the two are of.

@@ -138,13 +138,13 @@ def _frame(line: Line, rate: str, hertz: float) -> FrameTime:
 
 
 def rates(columns: Iterable[str]) -> dict[str, float]:
-    """Rates [Hz] that the columns of a table tell of, by their names there."""
+    """Rates [Hz] that a table has columns of, by their names there."""
     found = (RATE.fullmatch(column) for column in columns)
     return {m[1]: float(m[2]) * (1e3 if m[3] else 1.0) for m in found if m}
 
 
 def rates_of(shown: Sequence[MeasuredConfiguration]) -> list[str]:
-    """Names of the rates that timed configurations tell of."""
+    """Names of the rates at which configurations were timed."""
     return list(shown[0].timing.frames) if shown else []
 
 

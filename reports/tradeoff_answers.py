@@ -21,7 +21,7 @@ TOLD = ("60hz", "1khz")
 
 
 def sentences(found: Sequence[MeasuredConfiguration]) -> list[str]:
-    """Sentences on what models that follow any load reach at the rates told."""
+    """Sentences on what models that follow any load reach at the rates of the table."""
     free = [one for one in timed(found) if one.any_load]
     return [_sentence(found, free, rate) for rate in TOLD if rate in rates_of(free)]
 

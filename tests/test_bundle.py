@@ -77,7 +77,7 @@ def test_both_reports_of_a_bundle_come_again_to_the_byte(folder, tmp_path, capsy
     assert (tmp_path / "elsewhere/report.pdf").read_bytes() == (folder / "report.pdf").read_bytes()
 
 
-def test_reports_of_other_bytes_are_told_with_exit_code_1(folder, tmp_path, capsys):
+def test_reports_of_other_bytes_are_listed_with_exit_code_1(folder, tmp_path, capsys):
     """Negative control of the test above."""
     report_command(folder)
     (folder / "report.pdf").write_bytes((folder / "report.pdf").read_bytes() + b"\n")

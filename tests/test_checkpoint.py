@@ -179,7 +179,7 @@ def test_without_resume_a_state_is_left_unread_and_written_over(tmp_path):
     assert len(np.load(path)["stepper.u"]) == 125
 
 
-def test_the_last_sample_told_is_where_the_run_stands(pressed):
+def test_the_last_reported_sample_is_that_of_the_state(pressed):
     told, on_sample = stopping_at(())
     go(press(), on_sample=on_sample)
     final = {sample: (u, v) for sample, u, v in told}

@@ -225,7 +225,7 @@ def test_wang_and_mendel_s_rules_conclude_the_mean_of_those_whose_strongest_they
     assert taught == pytest.approx([(0.9 * 4 + 0.6 * 6) / 1.5, 10.0, 3.0])
 
 
-def test_least_squares_finds_consequents_and_leaves_those_that_nobody_teaches(rng):
+def test_least_squares_finds_consequents_and_leaves_those_without_data(rng):
     shares = rng.dirichlet(np.ones(3), 4000)
     shares = np.hstack([shares, np.zeros((4000, 1))])
     right, base = np.array([4.0, 8.0, 16.0, 5.0]), np.array([5.0, 7.0, 18.0, 5.0])

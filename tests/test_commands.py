@@ -212,7 +212,7 @@ def test_a_mesh_file_that_is_broken_is_refused_by_name(typed, tmp_path):
     assert "broken.stl" in done.stderr
 
 
-def test_check_tells_what_would_be_run(typed, tmp_path):
+def test_check_lists_what_would_be_run(typed, tmp_path):
     done = typed("check", "block")
     assert done.returncode == 0, done.stderr
     assert "msm-mamdani" in done.stdout
@@ -230,7 +230,7 @@ def test_scenes_are_listed_with_their_titles(typed):
     ]
 
 
-def test_estimate_speaks_kpa_to_people_and_si_to_programs(typed):
+def test_estimate_prints_kpa_for_readers_and_si_for_programs(typed):
     shown = typed("estimate", "--hcv", "9.5").stdout
     numbers = json.loads(typed("estimate", "--hcv", "9.5", "--json").stdout)
     assert "kPa" in shown

@@ -109,7 +109,7 @@ def test_every_number_and_text_of_the_record_counts():
     assert found["results.json models.fem.status"].where == "finished and diverged"
 
 
-def test_what_differs_in_the_scene_is_told_and_does_not_count():
+def test_differences_of_the_scene_are_listed_and_do_not_count():
     scene = whole().scene
     other = replace(whole(), scene=replace(scene, tool=replace(scene.tool, force=0.7)))
     assert differences(whole(), other) == []

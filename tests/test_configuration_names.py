@@ -7,7 +7,7 @@ from reports.configuration_names import mark_of, name_of
 SETTINGS = "element=p1 level=-2 rate=60.0"
 
 
-def test_a_mesh_is_told_by_its_elements_or_from_that_of_the_scene():
+def test_a_mesh_is_named_by_its_elements_or_relative_to_that_of_the_scene():
     assert name_of("finite-elements", SETTINGS, 0.0135) == (
         "finite elements in steps, linear, elements of 24 mm, 60.0 Hz steps"
     )

@@ -98,7 +98,7 @@ def test_the_type_2_band_holds_its_own_curve(small_results):
     assert curve[peak] < band[peak].displacement_at_lower_m
 
 
-def test_the_limits_of_the_lattice_are_told(small_results):
+def test_the_limits_of_the_lattice_are_stated(small_results):
     limits = small_results.record.lattice_limits
     assert limits.relative_l2_at_best_factor <= limits.relative_l2
     assert limits.relative_l2_at_quarter < limits.relative_l2

@@ -32,7 +32,7 @@ def test_a_pure_power_is_seen_with_its_order_and_error(sizes, order):
     assert found.error == pytest.approx(SAFETY * true_error(results), rel=1e-9)
 
 
-def test_an_order_above_the_formal_one_is_not_believed():
+def test_an_order_above_the_formal_one_is_not_used():
     """Of a coarse start; the estimate then stays above the true error."""
     sizes = (0.4, 0.2, 0.1)
     results = sequence(sizes, 5.0)

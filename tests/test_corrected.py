@@ -328,7 +328,7 @@ def motion(curve):
     return Trajectory(curve, 2.0 * curve, nothing, nothing)
 
 
-def test_two_remainders_of_the_assumed_order_tell_its_error_exactly():
+def test_two_remainders_of_the_assumed_order_give_its_error_exactly():
     exact = np.random.default_rng(0).normal(size=(5, 2, 3))
     wrong = 0.3 * np.random.default_rng(1).normal(size=(5, 2, 3))
     coarse, fine = motion(exact + wrong), motion(exact + FINER**ORDER * wrong)
@@ -340,7 +340,7 @@ def test_two_remainders_of_the_assumed_order_tell_its_error_exactly():
         assert found[name].velocity == pytest.approx(found[name].displacement)
 
 
-def test_the_error_by_the_spacing_is_at_most_twice_what_is_told_and_no_small_part_of_it(pressed):
+def test_the_error_by_the_spacing_is_at_most_twice_the_estimate_and_no_small_part_of_it(pressed):
     ran = pressed.run(SILENT)
     told = ran.record.correction.remainder_errors["tool"].displacement
     finest = prepared(FEW, "tool.force=0.5 N", spacing=0.0025)

@@ -242,6 +242,6 @@ def test_figures_are_drawn_over_any_two_readings(typed, tmp_path):
     assert names == {"sets.svg", "surfaces.svg", "rules-mamdani.svg"}
 
 
-def test_no_reading_at_all_is_told_with_what_to_give():
+def test_a_request_without_readings_is_refused_with_what_to_give():
     with pytest.raises(ValueError, match=r"no reading is given: .* --hcv 9\.5, .* --absent normal"):
         answer(EstimationRequest())

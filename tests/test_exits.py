@@ -146,5 +146,5 @@ def test_a_second_run_into_a_folder_is_refused_at_once(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_help_tells_the_exit_codes(tmp_path):
+def test_help_states_the_exit_codes(tmp_path):
     assert "3 ended by the" in shell(f"{PROGRAM} --help", tmp_path).stdout

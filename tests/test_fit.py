@@ -307,7 +307,7 @@ def test_a_force_is_that_with_which_the_first_moved_tool_is_pushed():
     assert user_scene.seen(problem, motion, given, 0) == pytest.approx(2.0 * given.times)
 
 
-def test_markers_are_told_by_the_length_of_what_they_are_off():
+def test_the_residual_of_markers_is_the_rms_of_their_distances():
     """An uncertainty is of each component, and the root mean square is of lengths."""
     moved, places = np.tile([3e-3, 0.0, 4e-3], (4, 1)), np.zeros((4, 3))
     markers = UserMarkers(places, 0.0 * moved, np.full(4, 1e-3))
@@ -316,7 +316,7 @@ def test_markers_are_told_by_the_length_of_what_they_are_off():
     assert found.uncertainty == pytest.approx(1e-3 * np.sqrt(3.0))
 
 
-def test_a_modulus_is_found_again_and_its_error_told(posed):
+def test_a_modulus_is_recovered_and_its_error_stated(posed):
     scene, _, _ = posed
     started = replace(scene, tissue=replace(scene.tissue, youngs_modulus=8e3))
     found = fit(started, own_curve(posed, 1e-5), ["tissue.youngs_modulus"], "fem", QUIET)

@@ -116,7 +116,7 @@ def test_a_row_with_blanks_is_explained_by_its_own_system(table):
         assert said.lines == alone.lines[1:]
 
 
-def test_a_rule_base_of_ones_own_knows_no_blanks(table, tmp_path):
+def test_a_user_rule_base_accepts_no_blanks(table, tmp_path):
     write_rule_base(liver_system(LiverSettings()), tmp_path / "own.json")
     request = EstimationRequest(
         inputs=table(),

@@ -98,7 +98,7 @@ def test_an_entry_of_a_table_is_a_choice_everywhere(monkeypatch):
         assert other != pytest.approx(0.75, abs=1e-4)
 
 
-def test_kernels_know_every_kind():
+def test_kernels_support_every_kind():
     assert set(compiled.ONE_ROW) == set(SYSTEMS)
 
 

@@ -457,7 +457,7 @@ def test_one_clamps_and_says_so():
     assert outside[0] == 90.0
 
 
-def test_one_refuses_or_takes_readings_outside_as_told():
+def test_one_refuses_or_takes_readings_outside_as_requested():
     outside = np.array([90.0, 10.0, 10.0, 10.0, 10.0])
     with pytest.raises(ValueError, match="hcv: reading 90"):
         compiled(LIVER, "mamdani", InferenceOptions(out_of_range="raise")).one(outside)

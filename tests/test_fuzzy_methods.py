@@ -72,7 +72,7 @@ def test_answers_are_octaves(methods):
     assert found == pytest.approx(expected, abs=1e-8)
 
 
-def test_smallest_and_largest_are_told_by_size_in_matlab_by_place_in_octave():
+def test_smallest_and_largest_go_by_size_in_matlab_by_place_in_octave():
     flat = Variable("y", -1, 1, (FuzzySet("flat", "trapmf", (-0.7, -0.61, 0.53, 0.6)),))
     x = Variable("x", 0, 1, (FuzzySet("all", "trapmf", (-2, -1, 1, 2)),))
     for method, matlab, octave in (("som", 0.0, -0.6), ("lom", -0.6, 0.52), ("mom", -0.04, -0.04)):

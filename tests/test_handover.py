@@ -144,7 +144,7 @@ def test_results_are_exported_with_their_own_curves_and_those_of_another_run_ref
         export(ExportRequest(target=str(tmp_path / "other"), to="lattice"), Silent())
 
 
-def test_a_force_that_the_stepper_does_not_know_is_refused():
+def test_a_force_that_the_stepper_does_not_support_is_refused():
     given = prepare_scene(scene('models=["basafa"]'))
     one = given.models["basafa"]
     found = lattices(scene('models=["basafa"]'), Silent())

@@ -409,7 +409,7 @@ def test_the_law_of_the_lattice_is_its_springs_and_volume_term(rng):
     assert taylor_order(of_stress, steps) == pytest.approx(2.0, abs=0.1)
 
 
-def test_the_table_tells_the_lattices_cells_from_its_law():
+def test_the_table_distinguishes_the_cells_of_a_lattice_from_its_law():
     found = large_strain.read_compared()
     assert {r.load_n for r in found} == set(large_strain.COMPARED_LOADS)
     for r in found:

@@ -486,7 +486,7 @@ def test_only_kernels_of_the_package_are_kept_on_disk():
     assert "__pycache__" in INTEGRATORS["symplectic-euler"].advance.stats.cache_path
 
 
-def test_an_integrator_added_to_the_table_runs_with_nothing_else_told(monkeypatch):
+def test_an_integrator_added_to_the_table_runs_without_further_changes(monkeypatch):
     toy = Integrator(1, (1.0,), leapfrog, 2.0, UNBOUNDED, linear_only=True)
     monkeypatch.setitem(INTEGRATORS, "toy", toy)
     overrides = (*SMALL, "lattice.integrator=toy", 'models=["fem", "msm"]')

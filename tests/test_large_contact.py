@@ -354,7 +354,7 @@ SCENE = (
 
 
 @pytest.mark.slow
-def test_as_a_model_it_tells_its_errors_and_agrees_with_the_linear_rest(monkeypatch):
+def test_as_a_model_it_states_its_errors_and_agrees_with_the_linear_rest(monkeypatch):
     monkeypatch.setattr(hyperelastic, "OWN_STEPS", 20)
     scene = read_scene("block", ('models=["hyperelastic"]', *SCENE))
     problem = problem_of(scene)

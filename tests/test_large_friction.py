@@ -417,7 +417,7 @@ def test_relaxation_settles_where_whole_sweeps_go_round():
     assert law_residual(gaps, found, friction, 1.0) < 1e-7
 
 
-def test_what_is_off_the_law_of_friction_is_told():
+def test_residuals_of_the_law_of_friction_are_stated():
     friction = np.array([0.5, 0.5, 0.5, np.inf])
     gaps = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]])
     force = np.array([[2.0, 0.0, 0.9], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0], [-1.0, 5.0, 0.0]])

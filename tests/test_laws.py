@@ -256,7 +256,7 @@ def test_a_scene_chooses_a_law_from_a_file_of_its_own(toy, tmp_path):
     ],
 )
 @pytest.mark.usefixtures("toy")
-def test_a_scene_is_told_what_is_wrong_with_a_law_of_any_kind(table, message):
+def test_errors_in_a_law_of_any_kind_are_named(table, message):
     xpbd = ("lattice.integrator=xpbd", 'models=["fem", "msm"]') if "xpbd" in message else ()
     with pytest.raises(SceneError, match=message):
         read_scene("block", (f"lattice.law={table}", "lattice.volume_term=true", *xpbd))

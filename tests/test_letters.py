@@ -50,7 +50,7 @@ def fonts(monkeypatch, tmp_path):
 
 
 @pytest.mark.usefixtures("no_fonts")
-def test_letters_without_a_font_are_told_by_script_with_the_remedy(capsys):
+def test_letters_without_a_font_are_listed_by_script_with_the_remedy(capsys):
     assert b"pdfuaid:part" not in made(f"a {TIFINAGH} b")
     told = capsys.readouterr().err
     assert "Boxes replace letters that no available font has (3 of Tifinagh)" in told

@@ -246,7 +246,7 @@ def test_pieces_hinged_at_an_edge_are_pieces(load_solid):
         load_solid(both, np.vstack([tetrahedra, tetrahedra + 8]))
 
 
-def test_all_problems_are_told_at_once(load_solid):
+def test_all_problems_are_reported_at_once(load_solid):
     points, tetrahedra = cube()
     again = np.vstack([points, points + 1.0])
     fold = np.array([[0, 4, 6, 5]]) + 8

@@ -26,10 +26,12 @@ from study.scene.problem import problem_of
 from study.similarity.fields import relative_l2
 from study.sweep.runner import Backend
 from study.sweep.store import Store
-from study.tradeoff import recommend
 from study.tradeoff import study as study_module
+from study.tradeoff.candidates import Candidate
 from study.tradeoff.contenders import Configuration
+from study.tradeoff.prediction import Prediction
 from study.tradeoff.problem import sampled
+from study.tradeoff.recommendation import Recommended, recommended_scene
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import Timing
 from tests.conftest import SMALL
@@ -107,7 +109,7 @@ def motion(prepared):
     return prepared.simulate()
 
 
-def test_a_model_tells_what_it_would_run(prepared):
+def test_a_model_states_what_it_would_run(prepared):
     lines = prepared.describe()
     assert lines
     assert all(line.strip() for line in lines)
@@ -244,11 +246,11 @@ def test_a_recommended_scene_gives_the_error_that_was_measured(tmp_path):
     assert measured.status == "resolved"
 
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None))
-    promise = recommend.Promise(measured.field, known.field_error)
-    candidate = recommend.Candidate(chosen, promise, cost, None)
-    found = recommend.Recommended(candidate, True, measured, None, 0.01)
+    prediction = Prediction(measured.field, known.field_error)
+    candidate = Candidate(chosen, prediction, cost, None)
+    found = Recommended(candidate, True, measured, None, 0.01)
     path = tmp_path / "advised.toml"
-    path.write_text(recommend.recommended_scene(scene, found), encoding="utf-8")
+    path.write_text(recommended_scene(scene, found), encoding="utf-8")
 
     advised = read_scene(str(path))
     assert advised.models == ("fem", "tissue")

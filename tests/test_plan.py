@@ -108,8 +108,11 @@ def test_memory_leaves_out_what_does_not_fit():
 @pytest.mark.parametrize(
     ("required", "said"),
     [
-        (Require(error=1e-4), r"require\.error: 0\.01 % is not expected of any model; the nearest"),
-        (Require(memory=1.0), r"require: no model keeps this rate or memory; the nearest is a"),
+        (
+            Require(error=1e-4),
+            r"require\.error: 0\.01 % is not expected of any model; the nearest",
+        ),
+        (Require(memory=1.0), r"require: no model meets this rate or memory; the nearest is a"),
     ],
 )
 def test_what_no_candidate_keeps_is_refused_with_the_nearest(required, said):
@@ -128,7 +131,7 @@ def test_a_refusal_lists_the_nearest_error_of_each_control_point():
     with pytest.raises(ValueError, match="not expected") as error:
         planning.plan(scene_of("require.error=0.01 %", *AT_TOOL))
     assert "nearest alone" not in str(error.value)
-    with pytest.raises(ValueError, match="keeps this rate") as error:
+    with pytest.raises(ValueError, match="meets this rate") as error:
         choose(offered(), Require(error=0.5, rate=1e9), lambda: {"tool": offered()})
     assert "require.at" not in str(error.value), "fewer points are no remedy for a rate"
 

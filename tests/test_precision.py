@@ -11,7 +11,7 @@ from study.models.model import SILENT
 from study.results.numerical import numerical_errors
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
-from study.tradeoff.recommend import Fit
+from study.tradeoff.prediction import Fit
 from tests.conftest import SMALL
 from tests.test_grid import apart, bodies, material
 
@@ -118,6 +118,8 @@ def test_other_settings_of_a_model_are_in_double_precision_unless_they_say_so():
     assert model.varied(precision="single").lattice.precision == "single"
 
 
-def test_a_promise_of_single_precision_has_its_rounding_in_its_bar():
+def test_a_prediction_in_single_precision_includes_its_rounding():
     fit = Fit(1.0, 1.0, 0.1, 0.01)
-    assert fit.promise(0.2).rounded(0.05).bar == pytest.approx(fit.promise(0.2).bar + 0.05)
+    assert fit.prediction(0.2).with_rounding(0.05).bar == pytest.approx(
+        fit.prediction(0.2).bar + 0.05
+    )

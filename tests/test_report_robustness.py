@@ -82,7 +82,7 @@ def with_fronts(lines):
     groups = {"pareto": known, "pareto_any_load": [line for line in known if line["any_load"]]}
     for line in lines:
         marks = {
-            name: line in group and not table.is_beaten(place(line), [*map(place, group)])
+            name: line in group and not table.is_dominated(place(line), [*map(place, group)])
             for name, group in groups.items()
         }
         marked.append(line | marks)

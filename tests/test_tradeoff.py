@@ -1,4 +1,4 @@
-"""`liver-study tradeoff` and `recommend`: errors that are resolved, costs, rates, advice."""
+"""`liver-study tradeoff` and `recommend`: errors that are resolved, costs, rates,"""
 
 import csv
 import json
@@ -21,16 +21,19 @@ from study.sweep.runner import Backend, Outcome
 from study.sweep.store import Store
 from study.sweep.task import Task
 from study.system.progress import Silent
-from study.tradeoff import recommend as advice
 from study.tradeoff import study as study_module
 from study.tradeoff import table
+from study.tradeoff.candidates import Candidate, best, place_dependent
 from study.tradeoff.contenders import CONTENDERS, Configuration, configurations
 from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
+from study.tradeoff.prediction import Prediction, added_by_single, fitted
 from study.tradeoff.problem import SAMPLING, plain, sampled
 from study.tradeoff.rates import Frame, frame
+from study.tradeoff.recommend import FITTED
+from study.tradeoff.recommendation import Recommended, recommended_scene, table_of
 from study.tradeoff.reference import ReferenceSolution
 from study.tradeoff.table import Cost, Entry
 from study.tradeoff.timing import FEWEST, Timing, in_turns
@@ -354,28 +357,26 @@ def test_a_mesh_that_changed_since_the_runs_were_planned_is_refused(tmp_path):
 
 
 def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():
-    h = np.array(advice.FITTED) * 0.01
-    exact = advice.fitted(h, 5.0 * h**1.5, 0.004)
+    h = np.array(FITTED) * 0.01
+    exact = fitted(h, 5.0 * h**1.5, 0.004)
     assert exact.order == pytest.approx(1.5)
-    assert exact.promise(0.006).error == pytest.approx(5.0 * 0.006**1.5)
-    assert exact.promise(0.006).bar == pytest.approx(0.004)
+    assert exact.prediction(0.006).error == pytest.approx(5.0 * 0.006**1.5)
+    assert exact.prediction(0.006).bar == pytest.approx(0.004)
     shaken = 1.0 + 0.05 * (-1.0) ** np.arange(len(h))
-    rough = advice.fitted(h, 5.0 * h**1.5 * shaken, 0.004)
-    assert rough.promise(0.01).holds(1.05 * 5e-3)
-    assert rough.promise(0.01).bar > 0.004 + 0.1 * 5e-3
-    assert not exact.promise(0.01).holds(2 * 5e-3)
+    rough = fitted(h, 5.0 * h**1.5 * shaken, 0.004)
+    assert rough.prediction(0.01).contains(1.05 * 5e-3)
+    assert rough.prediction(0.01).bar > 0.004 + 0.1 * 5e-3
+    assert not exact.prediction(0.01).contains(2 * 5e-3)
     with pytest.raises(ValueError, match=r"only 2.*lattice\.spacing"):
-        advice.fitted(h[:2], h[:2], 0.004)
+        fitted(h[:2], h[:2], 0.004)
 
 
 def candidate(error, wall, *, in_time=True, single=False, spacing=0.01):
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), wall * 1e-3), None))
-    promise = advice.Promise(error, 0.01)
+    prediction = Prediction(error, 0.01)
     kind = "single-precision" if single else "springs"
     settings = {"spacing": spacing} | ({"precision": "single"} if single else {})
-    return advice.Candidate(
-        Configuration(kind, settings), promise, cost, Frame(1, wall, wall, in_time)
-    )
+    return Candidate(Configuration(kind, settings), prediction, cost, Frame(1, wall, wall, in_time))
 
 
 COARSE, MIDDLE, FINE = (
@@ -396,28 +397,28 @@ COARSE, MIDDLE, FINE = (
     ],
 )
 def test_the_cheapest_that_meets_a_demand_is_taken_or_the_nearest(wanted, taken, met):
-    found = advice.best([COARSE, MIDDLE, FINE], wanted)
+    found = best([COARSE, MIDDLE, FINE], wanted)
     assert found is taken
     assert found.meets(wanted) is met
 
 
 def test_where_nothing_keeps_up_the_fastest_is_nearest():
     faster = candidate(0.2, 1.0, in_time=False)
-    assert advice.best([FINE, faster], Demand(1e3, None)) is faster
+    assert best([FINE, faster], Demand(1e3, None)) is faster
 
 
 def test_single_precision_is_taken_where_only_it_keeps_up_or_it_is_cheaper():
     fine = candidate(0.03, 1.0, single=True)
-    assert advice.best([MIDDLE, FINE, fine], Demand(60.0, None)) is fine
+    assert best([MIDDLE, FINE, fine], Demand(60.0, None)) is fine
     same = candidate(0.08, 0.2, single=True)
-    assert advice.best([MIDDLE, same], Demand(60.0, None)) is MIDDLE
-    assert advice.best([MIDDLE, same], Demand(60.0, 0.1)) is same
+    assert best([MIDDLE, same], Demand(60.0, None)) is MIDDLE
+    assert best([MIDDLE, same], Demand(60.0, 0.1)) is same
 
 
 def test_a_recommended_scene_says_its_precision():
     one = candidate(0.08, 0.2, single=True, spacing=0.02)
-    found = advice.Recommended(one, True, Errors("resolved", field=0.08), None, 0.2)
-    text = advice.recommended_scene(read_scene("block", SMALL), found)
+    found = Recommended(one, True, Errors("resolved", field=0.08), None, 0.2)
+    text = recommended_scene(read_scene("block", SMALL), found)
     assert 'precision = "single"' in text
     assert "in single precision" in text
 
@@ -433,8 +434,8 @@ def test_what_single_precision_adds_is_the_change_of_the_field():
         Outcome(task, "done", vars(Observed(None, 0, None, 1e-3, [x] * (3 * count), [])), "", 0.0)
         for x in (1.0, 1.1)
     )
-    assert advice._added_by_single([double, single], given) == pytest.approx({"single": 0.1})
-    assert advice._added_by_single([double], given) == {}
+    assert added_by_single([double, single], given) == pytest.approx({"single": 0.1})
+    assert added_by_single([double], given) == {}
 
 
 @pytest.fixture
@@ -454,7 +455,7 @@ def command(monkeypatch, tmp_path, capsys):
     return run
 
 
-def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_path):
+def test_a_recommended_scene_is_ready_to_run_and_is_as_predicted(command, tmp_path):
     code, said = command("recommend", "block", *OVERRIDES, "--error", "30 %")
     assert code == 0, said
     assert "as expected" in said
@@ -472,7 +473,7 @@ def test_a_recommended_scene_is_ready_to_run_and_keeps_its_promise(command, tmp_
 
 @pytest.mark.slow
 def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
-    """On this block no lattice down to half the scene's spacing promises as much."""
+    """On this block no lattice down to half the scene's spacing is predicted to be as exact."""
     words = ("recommend", "block", *OVERRIDES, "--error", "10 %")
     code, said = command(*words)
     assert code == EXIT_FAILED_CHECK, said
@@ -487,11 +488,9 @@ def test_where_the_place_is_known_more_is_chosen_from(command, tmp_path):
 def recommended(settings, contender="corrected"):
     """The text of the block's scene with a configuration that was chosen."""
     cost = Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-5), None), 12_000_000)
-    chosen = advice.Candidate(
-        Configuration(contender, settings), advice.Promise(0.02, 0.01), cost, None
-    )
-    found = advice.Recommended(chosen, True, Errors("resolved", 0.02), None, 0.01, (chosen,))
-    return advice.recommended_scene(read_scene("block", SMALL), found)
+    chosen = Candidate(Configuration(contender, settings), Prediction(0.02, 0.01), cost, None)
+    found = Recommended(chosen, True, Errors("resolved", 0.02), None, 0.01, (chosen,))
+    return recommended_scene(read_scene("block", SMALL), found)
 
 
 def test_a_recommended_corrected_lattice_has_its_spacing_in_the_scene():
@@ -505,15 +504,15 @@ def test_a_table_of_candidates_says_whose_frames_are_late():
     """The more accurate one is faster than real time, and yet its slow frames are not in time."""
     frames = Frame(6, 0.002, 0.004, True), Frame(6, 0.004, 0.03, False)
     cheap, accurate = (
-        advice.Candidate(
+        Candidate(
             Configuration("volume-springs", {"spacing": spacing}),
-            advice.Promise(spacing, 0.001),
+            Prediction(spacing, 0.001),
             Cost(3, 0.0, 1e-3, Timing(np.full((1, 4), 1e-6 / spacing), None)),
             own,
         )
         for spacing, own in zip((0.02, 0.01), frames, strict=True)
     )
-    head, first, second = advice.table_of([cheap, accurate], taken=cheap)
+    head, first, second = table_of([cheap, accurate], taken=cheap)
     assert "95 % of its frames" in head
     assert "4 ms, in time" in first
     assert "<- selected" in first
@@ -538,18 +537,18 @@ def test_a_recommended_superposition_has_its_vectors_in_the_scene(tmp_path):
 
 
 def test_only_what_none_is_cheaper_and_better_than_stands_in_the_table():
-    lines = list(advice.table_of([MIDDLE, COARSE, candidate(0.21, 0.5)]))
+    lines = list(table_of([MIDDLE, COARSE, candidate(0.21, 0.5)]))
     assert len(lines) == 3
     assert lines[1].startswith("     0.1 s   20.0")
     same = candidate(0.08, 0.2, single=True)
-    marked = list(advice.table_of([MIDDLE, same], "field", MIDDLE))
+    marked = list(table_of([MIDDLE, same], "field", MIDDLE))
     assert [line.endswith("<- selected") for line in marked[1:]] == [False, True]
-    assert list(advice.table_of([])) == []
+    assert list(table_of([])) == []
 
 
 def test_what_follows_one_place_is_a_configuration_of_a_contender():
     scene = read_scene("block", SMALL)
-    chosen = list(advice.bound(scene))
+    chosen = list(place_dependent(scene))
     assert not any(one.any_load for one in chosen)
     assert {one.contender for one in chosen} == {
         *("superposition", "corrected", "corrected-graded", "region"),

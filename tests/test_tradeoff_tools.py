@@ -17,12 +17,14 @@ from study.sweep.task import Task
 from study.system.progress import Silent
 from study.tradeoff import study as study_module
 from study.tradeoff import table
+from study.tradeoff.candidates import Candidate
 from study.tradeoff.comparison import FINEST, is_finest, lattices, truth_of
 from study.tradeoff.contenders import Configuration, configurations
 from study.tradeoff.errors import Errors, errors
 from study.tradeoff.observation import Observed
+from study.tradeoff.prediction import Prediction, predictions
 from study.tradeoff.problem import plain, sampled
-from study.tradeoff.recommend import Candidate, Promise, Recommended, _promises, lines
+from study.tradeoff.recommendation import Recommended, lines
 from study.tradeoff.reference import ReferenceSolution
 from study.tradeoff.table import Cost
 from study.tradeoff.timing import Timing
@@ -150,7 +152,7 @@ def test_force_errors_fall_with_the_spacing_and_stand_in_the_table(found, scene,
     assert "finest lattice of the same springs, 10 mm" in found.comparison.words
 
 
-def test_a_promise_is_what_a_run_was_off_the_finest_by_and_the_finest_itself(found):
+def test_a_prediction_is_the_measured_error_and_that_of_the_finest_lattice(found):
     (truth,) = found.comparison.finest.values()
     tried = [of(2.0), of(1.0), of(FINEST)]
     outcomes = [run_of(found.comparison.given, 1.0) for _ in tried]
@@ -158,11 +160,11 @@ def test_a_promise_is_what_a_run_was_off_the_finest_by_and_the_finest_itself(fou
     comparison = replace(found.comparison, finest={("tissue", False): exact})
     outcomes[0] = run_of(found.comparison.given, 1.3)
     outcomes[1] = run_of(found.comparison.given, 1.0, field=None, ended_at_s=0.1)
-    promises = _promises(comparison, tried, outcomes, [])
-    assert list(promises) == [2.0 * SPACING, FINEST * SPACING]
-    assert promises[2.0 * SPACING].error == pytest.approx(0.3)
-    assert promises[2.0 * SPACING].bar == truth.force_bar > 0.0
-    assert promises[FINEST * SPACING].error == 0.0
+    expected = predictions(comparison, tried, outcomes, [])
+    assert list(expected) == [2.0 * SPACING, FINEST * SPACING]
+    assert expected[2.0 * SPACING].error == pytest.approx(0.3)
+    assert expected[2.0 * SPACING].bar == truth.force_bar > 0.0
+    assert expected[FINEST * SPACING].error == 0.0
 
 
 def test_steps_are_timed_where_the_tool_is_deepest(given):
@@ -196,7 +198,7 @@ def test_what_is_recommended_says_what_its_errors_are_of_and_against():
     measured = Errors(
         "resolved", field=0.1, force=0.2, peak_force=0.3, discretisation=0.2, of_force=True
     )
-    chosen = Candidate(of(1.0), Promise(0.2, 0.05), cost, None)
+    chosen = Candidate(of(1.0), Prediction(0.2, 0.05), cost, None)
     found = Recommended(chosen, True, measured, None, 0.01, (chosen,), "a finer one")
     text = "\n".join(lines(found))
     assert "force error expected 20.0 +- 5.0 %, measured 20.0 %, as expected" in text

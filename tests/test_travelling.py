@@ -23,8 +23,8 @@ from study.run.study import run_study
 from study.scene.file import SceneError, read_scene, write_scene
 from study.scene.problem import problem_of
 from study.system.progress import Silent
+from study.tradeoff.candidates import place_dependent
 from study.tradeoff.contenders import contender, contenders_of
-from study.tradeoff.recommend import bound
 from study.tradeoff.request import _refuse_demand
 from tests.benchmarks import travelling
 from tests.benchmarks.corrected_places import TOLERANCE
@@ -391,7 +391,7 @@ def test_contenders_are_those_that_follow(scene):
 
 def test_where_the_way_is_known_all_that_is_chosen_from_follows_it(scene, problem):
     """First the elements alone, which are the linear part of what is beside them, and no more."""
-    chosen = list(bound(scene))
+    chosen = list(place_dependent(scene))
     assert [one.contender for one in chosen] == [
         *("fem", "corrected", "corrected", "corrected"),
         *("corrected-graded", "region", "corrected-graded", "region"),

@@ -9,7 +9,7 @@ and as accurate as the elements: Hueeber and Wohlmuth (2005), Comput. Methods Ap
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import skfem
@@ -168,7 +168,7 @@ def _tangents(normals: Floats) -> Floats:
     return np.stack([first, np.cross(normals, first)])
 
 
-def _slopes(basis: Any, chosen: Bools, direction: Floats) -> csr_array:
+def _slopes(basis: skfem.FacetBasis, chosen: Bools, direction: Floats) -> csr_array:
     """Directional derivatives [1/m] (q, dofs) of the shape functions at the chosen points."""
     whole = np.zeros((len(chosen), 3))
     whole[chosen] = direction
@@ -184,7 +184,7 @@ def _slopes(basis: Any, chosen: Bools, direction: Floats) -> csr_array:
     return _sparse(basis, values)[chosen]
 
 
-def _surface(body: Body, facets: NDArray[np.int64]) -> Any:
+def _surface(body: Body, facets: NDArray[np.int64]) -> skfem.FacetBasis:
     nodes = body.nodes
     return skfem.FacetBasis(
         nodes.mesh, nodes.elem, nodes.mapping, facets=facets, quadrature=_rule()
@@ -204,14 +204,14 @@ def _rule() -> tuple[Floats, Floats]:
     return np.ascontiguousarray(flat), np.full(flat.shape[1], 0.5 / flat.shape[1])
 
 
-def _values(basis: Any) -> csr_array:
+def _values(basis: skfem.FacetBasis) -> csr_array:
     """Shape functions of a basis at its integration points (q, dofs)."""
     values = np.stack([np.asarray(one[0]) for one in basis.basis])
     values[np.abs(values) < ROUNDING] = 0.0  # of nodes off the facet
     return _sparse(basis, values)
 
 
-def _sparse(basis: Any, values: Floats) -> csr_array:
+def _sparse(basis: skfem.FacetBasis, values: Floats) -> csr_array:
     """Values (functions, facets, points) as a matrix (q, dofs)."""
     columns = np.broadcast_to(basis.element_dofs[:, :, None], values.shape)
     points = np.broadcast_to(np.arange(values[0].size).reshape(values[0].shape), values.shape)
@@ -221,7 +221,7 @@ def _sparse(basis: Any, values: Floats) -> csr_array:
     return found
 
 
-def _under(surface: Any, tool: RigidTool, times: Floats, margin: float) -> Bools:
+def _under(surface: skfem.FacetBasis, tool: RigidTool, times: Floats, margin: float) -> Bools:
     """Integration points (facets, q) that a tool may touch, or is bonded to."""
     points, normals = rows(surface.global_coordinates()), rows(surface.normals)
     facing = (normals @ tool.axis) < 0.0

@@ -259,7 +259,7 @@ def _fitted(misfit: Callable[[Array], Array], start: Array, bounds: tuple[Array,
 
 
 def derived() -> dict[str, Placement]:
-    """Both bases by name, derived from published data only."""
+    """Knowledge bases by name, derived from published data only."""
     sets = {"paper-count": paper_count_sets(), "freed": freed_sets()}
     return {name: with_combinations(placed, name) for name, placed in sets.items()}
 

@@ -61,7 +61,7 @@ class Combination(NamedTuple):
         return self.within(tuple(map(log, members)), p["concluded_low"], p["concluded_high"])
 
     def within(self, logarithms: Sequence[float], low: float, high: float) -> float:
-        """The same from logarithms of the members' consequents, within this range [kPa]."""
+        """Consequent [kPa] from logarithms of the members' consequents, within a range [kPa]."""
         expected = exp(self.shift + self.power * sum(logarithms) / len(logarithms))
         return min(max(expected, low), high)
 

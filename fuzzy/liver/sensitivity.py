@@ -111,7 +111,7 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
     ValueError as `estimate` does.
     """
     found: list[Sensitivity] = []
-    answers = _remembered()
+    answers = _cached_answers()
     left_out: list[str] = []
     for system in SYSTEMS:  # so that faulty readings are not taken for a fault of an alternative
         evaluate(_patient(readings), system, base, readings)
@@ -126,7 +126,7 @@ def sensitivity(readings: Mapping[str, float], base: LiverSettings, rows: int = 
     return Screening((*found, *_between_systems(readings, base, rows, answers)), tuple(left_out))
 
 
-def _remembered() -> _Answers:
+def _cached_answers() -> _Answers:
     """Cache of evaluated cases, since the base is compared with every alternative."""
     found: dict[tuple[object, ...], tuple[Array, Array | None]] = {}
 

@@ -80,16 +80,16 @@ def _candidates(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
     yield from _gaussians(samples)
     yield from _splines(samples)
     for left in (True, False):
-        line = _line(samples, left, lambda mu: np.log(mu / (1.0 - mu)))
+        line = _line(samples, lambda mu: np.log(mu / (1.0 - mu)), left=left)
         if line is not None:
             yield "sigmf", (line.slope, line.at(0.0))
-        bell = _bell(samples, left)
+        bell = _bell(samples, left=left)
         if bell is not None:
             yield "gbellmf", bell
 
 
 def _trapezoids(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
-    left, right = (_ends(samples, side, lambda mu: mu) for side in (True, False))
+    left, right = (_ends(samples, lambda mu: mu, left=side) for side in (True, False))
     if left is None or right is None:
         return
     if samples.first == 0 and right[1] <= samples.x[0] + EDGE * samples.width:
@@ -102,7 +102,7 @@ def _trapezoids(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
 
 
 def _splines(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
-    left, right = (_ends(samples, side, _unsplined) for side in (True, False))
+    left, right = (_ends(samples, _unsplined, left=side) for side in (True, False))
     if left is None or right is None:
         return
     if samples.first == 0:
@@ -118,7 +118,7 @@ def _unsplined(mu: Array) -> Array:
 
 def _gaussians(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
     low, high = samples.x[0] - samples.width, samples.x[-1] + samples.width
-    left, right = (_half(samples, side) for side in (True, False))
+    left, right = (_half(samples, left=side) for side in (True, False))
     for one in (left, right):
         if one is not None:
             yield "gaussmf", one
@@ -130,13 +130,13 @@ def _gaussians(samples: _Samples) -> Iterator[tuple[Kind, Parameters]]:
         yield "gauss2mf", (right[0], low, *right)
 
 
-def _half(samples: _Samples, left: bool) -> tuple[float, float] | None:
+def _half(samples: _Samples, *, left: bool) -> tuple[float, float] | None:
     """Width and centre of a Gaussian flank."""
-    line = _line(samples, left, lambda mu: np.sqrt(-2.0 * np.log(mu)))
+    line = _line(samples, lambda mu: np.sqrt(-2.0 * np.log(mu)), left=left)
     return None if line is None else (1.0 / abs(line.slope), line.at(0.0))
 
 
-def _bell(samples: _Samples, left: bool) -> Parameters | None:
+def _bell(samples: _Samples, *, left: bool) -> Parameters | None:
     """Half-width, slope and centre of the bell with a flank.
 
     log(1 / mu - 1) is 2 slope (log |x - centre| - log half-width): the ratio of its two steps
@@ -164,10 +164,10 @@ def _bell(samples: _Samples, left: bool) -> Parameters | None:
 
 
 def _ends(
-    samples: _Samples, left: bool, transform: Callable[[Array], Array]
+    samples: _Samples, transform: Callable[[Array], Array], *, left: bool
 ) -> tuple[float, float] | None:
     """Foot and top of a flank that rises from 0 to 1; beyond the universe if there is none."""
-    line = _line(samples, left, transform)
+    line = _line(samples, transform, left=left)
     if line is not None:
         return line.at(0.0), line.at(1.0)
     x, mu = (samples.x, samples.mu) if left else (-samples.x[::-1], samples.mu[::-1])
@@ -193,7 +193,7 @@ def _short(x: Array, mu: Array, first: int, width: float) -> tuple[float, float]
     return top - float(x[first] - x[first - 1]) / (1.0 - before), top
 
 
-def _line(samples: _Samples, left: bool, transform: Callable[[Array], Array]) -> _Line | None:
+def _line(samples: _Samples, transform: Callable[[Array], Array], *, left: bool) -> _Line | None:
     """The transformed flank beside the largest samples; None if fewer than two lie on it."""
     side = slice(0, samples.first) if left else slice(samples.last + 1, None)
     x, mu = samples.x[side], samples.mu[side]

@@ -68,7 +68,7 @@ def _shown() -> None:
 
 
 def _code(work: Callable[[], None]) -> int:
-    """Exit code of a piece of work, after a message where there is something to tell."""
+    """Exit code of a piece of work, after a message on what failed."""
     try:
         work()
     except SystemExit as left:

@@ -216,13 +216,13 @@ def _computed(
     from study.models.model import Watch
     from study.models.persistence import Persistence
     from study.results import manifest
-    from study.results.folder import continuing, replacing, told_to_start_again, write
+    from study.results.folder import advising_restart, continuing, replacing, write
     from study.run.stages import RunOptions, store_summary
     from study.run.study import run_study
     from study.stages.job_pool import available
 
     with (
-        told_to_start_again(),
+        advising_restart(),
         replacing(folder) as partial,
         continuing(folder, scene, resume=flags.resume) as state,
     ):

@@ -120,7 +120,7 @@ def stability_lines(verdicts: Sequence[CaseVerdict]) -> Iterator[str]:
         yield f"{family:<16} {passed:>4} of {len(found):<4} as expected{_worst(found)}"
     failed = [verdict for verdict in verdicts if not verdict.passed]
     for verdict in failed:
-        yield f"NOT AS EXPECTED: {verdict.case.family}: {verdict.case.name}: {_told(verdict)}"
+        yield f"NOT AS EXPECTED: {verdict.case.family}: {verdict.case.name}: {_outcome(verdict)}"
     seconds = sum(verdict.seconds for verdict in verdicts)
     yield f"{len(verdicts) - len(failed)} of {len(verdicts)} cases as expected, {seconds:.0f} s"
 
@@ -135,7 +135,7 @@ def _worst(verdicts: Sequence[CaseVerdict]) -> str:
     return f", at most {max(shares):.0%} of a tolerance used" if shares else ""
 
 
-def _told(verdict: CaseVerdict) -> str:
+def _outcome(verdict: CaseVerdict) -> str:
     found = verdict.finding
     outcome = f"expected {verdict.case.expectation}; {found.ending}"
     if found.measured is not None:

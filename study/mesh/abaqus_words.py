@@ -16,8 +16,8 @@ _SOLIDS = {
     27: "hexahedron27",
 }
 _FACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
-# D, A, E, F before C3D: heat transfer, acoustic, Eulerian, fluid. Letters behind the number tell
-# the formulation (hybrid, reduced, modified, with temperature ...), and nothing of the shape.
+# D, A, E, F before C3D: heat transfer, acoustic, Eulerian, fluid. Letters behind the number name
+# the formulation (hybrid, reduced, modified, with temperature ...), not the shape.
 _SOLID = re.compile(r"(?:[DAEF]|CIN|ACIN)?C?3D(\d+)[A-Z]*")
 _OTHER_SOLID = re.compile(r"(?:COH3D|GK3D|SC|CSS|Q3D|CAXA|EMC3D|PC3D|CCL)\d+.*")
 # Plane elements too: mesh generators write the triangles of a surface as CPS3.
@@ -52,7 +52,7 @@ def cell_type(element_type: str) -> tuple[str, int]:
 
 # Stems of keywords, without blanks. Materials, sections, sets, surfaces, loads, steps, contact,
 # constraints and output neither make nor move nodes; whatever begins otherwise is refused, since
-# nobody knows what it does.
+# its effect is unknown.
 _STEMS = """
 ACOUSTIC ALLOWABLESTRESS AMPLITUDE ANISOTROPIC ANNEAL AQUA AXIAL BASEMOTION BASELINE BEAM BIAXIAL
 BLOCKAGE BOND BOUNDARY BRITTLE BUCKL BULKVISCOSITY BUOYANCY CADDEDMASS CAP CASTIRON CAVITY CECHARGE

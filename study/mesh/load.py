@@ -127,7 +127,7 @@ def _checked(
     raw: RawMesh, how: Reading, source: Path, sha256: str
 ) -> tuple[TetrahedralMesh | SurfaceMesh, MeshReport]:
     solid = _is_solid(raw)
-    draft = _repaired(raw, solid, how)
+    draft = _repaired(raw, how, solid=solid)
     volume = _volume(draft)
     name, unit_notes = choose_unit(how.unit, volume)
     scale = METRES[name]
@@ -149,7 +149,7 @@ def _checked(
         element_map=element_map(draft, len(raw.tetrahedra if solid else raw.triangles)),
         quality=quality,
         notes=one_per_kind(
-            (*raw.notes, *_unused(raw, solid), *draft.notes, *unit_notes, *shape_notes)
+            (*raw.notes, *_unused(raw, solid=solid), *draft.notes, *unit_notes, *shape_notes)
         ),
     )
     return mesh, report
@@ -169,7 +169,7 @@ def _is_solid(raw: RawMesh) -> bool:
     return len(raw.tetrahedra) > 0
 
 
-def _unused(raw: RawMesh, solid: bool) -> list[str]:
+def _unused(raw: RawMesh, *, solid: bool) -> list[str]:
     if not solid or not len(raw.triangles):
         return []
     return [
@@ -178,7 +178,7 @@ def _unused(raw: RawMesh, solid: bool) -> list[str]:
     ]
 
 
-def _repaired(raw: RawMesh, solid: bool, how: Reading) -> Draft:
+def _repaired(raw: RawMesh, how: Reading, *, solid: bool) -> Draft:
     # Without a declared unit, the finest one that can be guessed sets the limit.
     limit = _MAX_COORDINATE / METRES.get(how.unit or "mm", METRES["mm"])
     elements = raw.tetrahedra if solid else raw.triangles

@@ -16,8 +16,8 @@ _NUMBERS = {"ST": 2, "C": 3, "N": 3}
 def read_off(data: bytes) -> RawMesh:
     """Positions and polygons of an OFF file; normals, colours and texture coordinates are ignored.
 
-    Every position and every face stands on a line of its own: x, y, z, then whatever belongs to
-    the point; the number of corners, the corners, then the colour.
+    Every position and every face has a line of its own: x, y, z, then further values of the
+    point; the number of corners, the corners, then the colour.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _refuse_uneven(rows: list[NumberedLine], prefixes: list[str]) -> None:
 
 
 def _counts(rows: list[NumberedLine]) -> tuple[int, int]:
-    """Numbers of points and faces; that of the edges may be missing, since nobody uses it."""
+    """Numbers of points and faces; that of the edges, which is not used, may be missing."""
     number, words = rows[0] if rows else (1, [])
     if not 2 <= len(words) <= 3 or not all(re.fullmatch(r"[0-9]{1,12}", word) for word in words):
         raise MeshError(

@@ -132,7 +132,7 @@ def _corners_by_line(lines: list[str]) -> tuple[FloatArray, list[str]]:
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
-    """Line number, keyword in lower case and words after it; several may stand on one line."""
+    """Line number, keyword in lower case and words after it; several may share one line."""
     for number, line in enumerate(lines, start=1):
         words = line.split()
         lowered = [word.lower() for word in words]

@@ -154,7 +154,7 @@ def _winding(triangles: FloatArray, point: FloatArray) -> float:
 def _consistent(draft: Draft, edges: IndexArray, pairs: IndexArray) -> Draft:
     """Orient triangles so that neighbours traverse their common edge in opposite directions.
 
-    Every triangle stands for two items, as it is and reversed; compatible items are linked. A
+    Every triangle is two items, as it is and reversed; compatible items are linked. A
     triangle linked to its own reversed form lies on a one-sided surface.
     """
     count = len(draft.elements)

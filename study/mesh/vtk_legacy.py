@@ -103,7 +103,7 @@ def _check_data_set(name: str) -> None:
 
 
 def _typed(cells: list[_Cells], types: IndexArray | None) -> list[_Cells]:
-    """Cells of a grid get their types, which stand in a section of their own."""
+    """Cells of a grid with their types, which have a section of their own."""
     count = sum(len(part[0]) for part in cells if not part[0].any())
     given = 0 if types is None else len(types)
     if count != given:
@@ -198,7 +198,7 @@ def _skip_field(stream: BytesIO, arrays: int, binary: bool) -> None:
 
 
 def _skip_strings(stream: BytesIO, count: int, binary: bool) -> None:
-    """Strings stand on a line each, or after their length, whose first two bits tell its size."""
+    """Strings have a line each, or follow their length, whose first two bits give its size."""
     for _ in range(min(count, stream.getbuffer().nbytes)):
         if binary:
             first = stream.read(1) or b"\0"

@@ -73,7 +73,7 @@ class CorrectedLattice:
         return replace(self, fine=self.fine.varied(**own), coarse=coarse)
 
     def prepare(self, problem: Problem) -> PreparedCorrected:
-        """Set up both; vectors are computed when they are needed.
+        """Set up elements and lattice; vectors are computed when they are needed.
 
         ValueError as of either, and for an integrator whose material depends on its step.
         """
@@ -88,7 +88,7 @@ class CorrectedLattice:
 
 @dataclass(eq=False)
 class PreparedCorrected:
-    """Both on their organ; after a run, `best` is what was solved on the last mesh."""
+    """Finite elements and coarse lattice; after a run, `best` is the solution on the last mesh."""
 
     model: CorrectedLattice
     problem: Problem
@@ -98,11 +98,11 @@ class PreparedCorrected:
 
     @property
     def critical_time_step(self) -> float:
-        """That of the coarse lattice [s]; the linear parts take its steps."""
+        """Critical time step [s] of the coarse lattice, whose steps the linear parts take."""
         return self.coarse.critical_time_step
 
     def describe(self) -> list[str]:
-        """The mesh, then the coarse lattice."""
+        """Sizes of the mesh, then of the coarse lattice, a line each."""
         return [f"{self.model.name}: {text}" for text in self.fine.describe()] + [
             text if text.startswith(self.model.name) else f"{self.model.name}: coarse {text}"
             for text in self.coarse.describe()
@@ -146,7 +146,7 @@ class PreparedCorrected:
         return Deformed.of(solved, self.coarse.assembly.lattice)
 
     def _remainder(self, solved: MeshSolution) -> PreparedRemainder:
-        """That of the coarse lattice, in as many vectors as the elements needed."""
+        """The remainder of the coarse lattice, in as many vectors as the elements needed."""
         return PreparedRemainder(self.coarse, superposed(solved).subspace.load.size)
 
     def rest(self) -> Floats:
@@ -157,7 +157,7 @@ class PreparedCorrected:
         return self.fine.rest()
 
     def run(self, watch: Watch) -> ModelRun:
-        """The motion, and apart the errors of its steps, mesh, vectors and coarse lattice."""
+        """The motion, with the separate errors of its steps, mesh, vectors and coarse lattice."""
         linear = self.fine.run(Watch(watch.progress))
         assert self.fine.best is not None  # noqa: S101 - a run leaves it
         solved = self.best = self.fine.best
@@ -232,7 +232,7 @@ class PreparedCorrected:
         )
 
     def _keep_fields(self, found: Remainder, shape: Deformed, watch: Watch) -> None:
-        """Keep the motion of the mesh's vertices, if it is wanted."""
+        """Keep the motion of the mesh's vertices, if requested."""
         if watch.persistence is None or watch.persistence.fields is None:
             return
         mesh, times = Mesh(shape.mesh.points, shape.mesh.tetrahedra), self.problem.observation.times
@@ -268,7 +268,7 @@ def models(scene: Scene, _: Estimates) -> Iterator[CorrectedLattice]:
 
 
 def _coarse(scene: Scene) -> LatticeModel:
-    """Nonlinear, over the organ, with the volume term where the Poisson ratio asks for it."""
+    """A nonlinear lattice of the organ, with the volume term where the Poisson ratio needs it."""
     graded = scene.corrected.coarse == "graded"
     spacing = scene.corrected.spacing or TIMES * scene.lattice.spacing
     lattice = replace(

@@ -118,7 +118,7 @@ class PreparedElements:
 
     @property
     def critical_time_step(self) -> float:
-        """Infinite: the steps are implicit, or exact in a subspace."""
+        """Critical time step [s]: infinite, since steps are implicit or exact in a subspace."""
         return float("inf")
 
     def describe(self) -> list[str]:

@@ -21,11 +21,12 @@ Floats = NDArray[np.float64]
 GROWTH = 4.0
 """Number of elements of a mesh over that of the previous one."""
 GROWTH_IN_CONTACT = 2.0
-"""The same under moved tools, whose first mesh is already fine there."""
+"""Number of elements of a mesh over that of the previous one under moved tools.
+
+Smaller, since the first mesh is already fine there.
+"""
 LEAST_GROWTH = 1.4
 """Smallest growth for which the difference of two meshes shows the error."""
-
-
 STEERING = 1e-7
 """Residual of the solutions that locate the error.
 

@@ -107,7 +107,7 @@ class PreparedHyperelastic:
 
     @property
     def critical_time_step(self) -> float:
-        """Infinite: the steps are implicit."""
+        """Critical time step [s]: infinite, since the steps are implicit."""
         return float("inf")
 
     def describe(self) -> list[str]:
@@ -116,7 +116,7 @@ class PreparedHyperelastic:
         return [f"{self.model.name}: {count} tetrahedra, small under the tools"]
 
     def refuse(self) -> None:
-        """ValueError for damping or a mesh that this model cannot follow or hold."""
+        """ValueError for damping that it does not have, or a mesh that exceeds the memory."""
         problem, level = self.problem, self.level()
         large_motion.refuse(self.model.linear.damping, problem.tissue)
         refuse_too_large(level.mesh, problem.tissue, ELEMENT, stepping=True)
@@ -140,7 +140,7 @@ class PreparedHyperelastic:
         return self._linear.body(level)
 
     def contact_problem(self, body: Body) -> ContactProblem:
-        """With the tools and loads of the problem."""
+        """The contact problem of a body with the tools and loads of the problem."""
         problem, borne = self.problem, None
         if problem.given_loaded and problem.gravity.any():
             gravity = np.tile(problem.gravity, body.node_count)

@@ -62,11 +62,11 @@ def mesh_error(
     if len(solved) < 2 or locks(problem, solved[-1]) or diverged:
         return None
     weights = problem.volume_rule.weights
-    field = _estimate(solved, [run.volume_field[0] for run in runs], graded, weights)
+    field = _estimate(solved, [run.volume_field[0] for run in runs], weights, graded=graded)
     by_probe, orders = {}, {}
     for i, probe in enumerate(problem.probes):
-        u = _estimate(solved, [run.displacement[:, i] for run in runs], graded)
-        v = _estimate(solved, [run.velocity[:, i] for run in runs], graded)
+        u = _estimate(solved, [run.displacement[:, i] for run in runs], graded=graded)
+        v = _estimate(solved, [run.velocity[:, i] for run in runs], graded=graded)
         left = _truncation(solved[-1])
         by_probe[probe] = CurveErrors(
             displacement=math.hypot(u.error, left.displacement),
@@ -85,8 +85,9 @@ def mesh_error(
 def _estimate(
     solved: Sequence[MeshSolution],
     results: Sequence[Floats],
-    graded: bool,
     weights: Floats | None = None,
+    *,
+    graded: bool,
 ) -> ErrorEstimate:
     sizes, order = [one.level.size for one in solved], formal_order(solved[-1])
     if graded:

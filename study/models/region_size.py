@@ -58,7 +58,7 @@ class RegionRequest:
 
 def sized_region(
     problem: Problem,
-    wanted: RegionRequest,
+    request: RegionRequest,
     of_tissue: Callable[[Assembly], tuple[Assembly, Material]],
 ) -> SizedRegion:
     """The lattice of a given radius, or the smallest one that meets the tolerance.
@@ -66,24 +66,27 @@ def sized_region(
     `of_tissue`: gives a lattice the material of its cells. ValueError for an unknown control point,
     for too many cells, and for a tolerance where more than one load acts.
     """
-    where = places(problem, wanted.at)
-    if wanted.radius is not None:
-        return SizedRegion(_assembled(problem, wanted, where, wanted.radius), wanted.radius, None)
+    centres = places(problem, request.at)
+    if request.radius is not None:
+        return SizedRegion(
+            _assembled(problem, request, centres, request.radius), request.radius, None
+        )
     if problem.has_further_loads:
         raise ValueError(NO_TOLERANCE)
-    whole = _assembled(problem, wanted, where, None)
-    probes = [problem.tool_probe, *(problem.probes.index(name) for name in wanted.at)]
-    aim = _rest(problem, *of_tissue(whole), probes)
-    kept = SizedRegion(whole, float(np.ptp(problem.surface_rule.points, axis=0).max()), 0.0)
+    uniform = _assembled(problem, request, centres, None)
+    probes = [problem.tool_probe, *(problem.probes.index(name) for name in request.at)]
+    exact = _rest(problem, *of_tissue(uniform), probes)
+    kept = SizedRegion(uniform, float(np.ptp(problem.surface_rule.points, axis=0).max()), 0.0)
     radii = list(_radii(problem))
     while radii:  # bisection: the difference falls with the radius but for noise
         middle = len(radii) // 2
-        found = _assembled(problem, wanted, where, radii[middle])
+        found = _assembled(problem, request, centres, radii[middle])
         rest = _rest(problem, *of_tissue(found), probes)
-        apart = float((_size(rest - aim) / _size(aim)).max())
-        if apart <= wanted.tolerance:
-            kept = SizedRegion(found, radii[middle], apart)
-        radii = radii[:middle] if apart <= wanted.tolerance else radii[middle + 1 :]
+        apart = float((_lengths(rest - exact) / _lengths(exact)).max())
+        if apart <= request.tolerance:
+            kept, radii = SizedRegion(found, radii[middle], apart), radii[:middle]
+        else:
+            radii = radii[middle + 1 :]
     return kept
 
 
@@ -110,19 +113,19 @@ def _radii(problem: Problem) -> Iterator[float]:
 
 
 def _assembled(
-    problem: Problem, wanted: RegionRequest, where: Floats, radius: float | None
+    problem: Problem, request: RegionRequest, centres: Floats, radius: float | None
 ) -> Assembly:
     """Graded cells up to a radius [m], or uniform cells throughout."""
-    levels = wanted.levels if radius is not None else 1
+    levels = request.levels if radius is not None else 1
     reach = tuple((radius or 0.0) * 2.0**level for level in range(levels - 1))
     return assemble_graded(
         problem.geometry.body,
         problem.surface_rule,
         problem.tissue.density,
-        Grading(wanted.spacing, where, reach),
+        Grading(request.spacing, centres, reach),
         problem.foundation,
         problem.tool,
-        wanted.flexion,
+        request.flexion,
         problem.tissue,
     )
 
@@ -133,5 +136,5 @@ def _rest(problem: Problem, of: Assembly, material: Material, probes: list[int])
     return np.asarray(weights @ msm.static_displacement(of, material))
 
 
-def _size(of: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(of, axis=1))
+def _lengths(vectors: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(vectors, axis=1))

@@ -63,7 +63,7 @@ class Remainder:
 
     @property
     def samples(self) -> range:
-        """Those up to which the lattice was whole."""
+        """Numbers of the samples before the lattice diverged, all if it did not."""
         return range(int(np.isfinite(self.trajectory.displacement).all(axis=(1, 2)).sum()))
 
 

@@ -117,7 +117,7 @@ class PreparedSuperposition:
 
     @property
     def critical_time_step(self) -> float:
-        """Infinite: each mode is integrated exactly."""
+        """Critical time step [s]: infinite, since each mode is integrated exactly."""
         return float("inf")
 
     def describe(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Sparse factors of symmetric matrices, whose pivots tell how many eigenvalues are negative."""
+"""Sparse factors of symmetric matrices, whose pivots show how many eigenvalues are negative."""
 
 from __future__ import annotations
 

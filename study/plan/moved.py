@@ -164,7 +164,7 @@ def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook
 
 
 def _lattice(scene: Scene, settings: Lattice) -> LatticeModel:
-    """That of the tissue's modulus."""
+    """The lattice of the tissue's modulus, with these settings."""
     tissue = model(scene, "tissue")
     assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
     return replace(tissue, scene=replace(tissue.scene, lattice=settings))
@@ -273,7 +273,7 @@ def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
                 step_wall=coarse.step_wall + 2.0 * loads * fine.step_wall,
                 setup=coarse.setup + loads * fine.setup,
                 memory=2.0 * coarse.memory + fine.memory,
-                leaves_out=("any other way of the loads",),
+                leaves_out=("any other path of the loads",),
             )
 
 
@@ -292,5 +292,5 @@ def lattices(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
             step_wall=seen.step_wall * finer**3,
             setup=seen.setup * finer**3,
             memory=seen.nbytes * finer**3,
-            leaves_out=("what springs cannot do at any spacing",),
+            leaves_out=("the error of springs that does not decrease with the spacing",),
         )

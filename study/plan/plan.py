@@ -27,7 +27,7 @@ FIELD = "field"
 Alone = Callable[[], Mapping[str, Sequence[Candidate]]]
 """The required quantity that includes the whole organ."""
 
-TOLD_BY = {
+ESTIMATED_BY = {
     "tissue": "a lattice of twice the spacing",
     "corrected": "a lattice of half the spacing, and by meshes and vectors",
     "hyperelastic": "a coarser mesh and by longer steps",
@@ -51,7 +51,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """The scene to run, and the decisions that led to it.
+    """The scene to run, and the decisions behind it.
 
     `candidate`: None where the scene's own models are kept.
     """
@@ -203,7 +203,7 @@ def _refusal(offered: Sequence[Candidate], required: Require, alone: Alone) -> s
         )
     fastest = min(offered, key=lambda one: (one.wall_per_s, one.memory))
     return (
-        "require: no model keeps this rate or memory; the nearest is a "
+        "require: no model meets this rate or memory; the nearest is a "
         f"{fastest.name}, {fastest.wall_per_s:.2g} s of wall per simulated second and "
         f"{fastest.memory / 1e6:.0f} MB: relax require.rate or require.memory"
     )
@@ -249,8 +249,8 @@ def _moved_decisions(
     )
     yield Decision("model", chosen.name, _why(chosen, required))
     yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
-    told_by = TOLD_BY[chosen.scene.models[0]]
-    yield Decision("reference", "none", f"a run estimates its own error by {told_by}")
+    by = ESTIMATED_BY[chosen.scene.models[0]]
+    yield Decision("reference", "none", f"a run estimates its own error by {by}")
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
 
@@ -270,7 +270,11 @@ def _geometry(chosen: Candidate) -> str:
 
 def _strain(seen: Look, foresight: Foresight) -> str:
     part = foresight.geometry
-    known = f"about {_percent(part)}" if part < float("inf") else "more than a coarse lattice bears"
+    known = (
+        f"about {_percent(part)}"
+        if part < float("inf")
+        else "more than a coarse lattice can resolve"
+    )
     return f"strain of {_percent(seen.strain)} at rest; small ones alone would be off by {known}"
 
 
@@ -291,7 +295,7 @@ def _step(chosen: Candidate, required: Require) -> str:
 
 def _reference(chosen: Candidate) -> tuple[str, str]:
     if len(chosen.scene.models) > 1:
-        return "finite elements", "a lattice does not know its own error"
+        return "finite elements", "a lattice alone gives no estimate of its error"
     return "none", "the parts of the error are stated without one"
 
 

@@ -248,7 +248,7 @@ def _foreign(present: set[str]) -> str | None:
 
 
 @contextmanager
-def told_to_start_again() -> Iterator[None]:
+def advising_restart() -> Iterator[None]:
     """Add a note on how to continue to an OSError of the block that has none.
 
     Such an error occurs when results are moved into place, after `continuing` removed its states.

@@ -47,8 +47,8 @@ def _travelling(scene: Scene) -> list[str]:
     if not any(tool.travels for tool in scene.tools):
         return []
     return [
-        "A blunt tool that travels keeps its direction and is represented by patches at stations on "
-        f"its path, at most {APART:g} radii apart, whose shares follow it as cubic splines: its "
+        "A blunt tool that travels keeps its direction and is represented by patches at stations "
+        f"on its path, at most {APART:g} radii apart, whose shares follow it as cubic splines: its "
         "force and centre are exact, and the displacement under it is off by less than "
         f"{100 * MEASURED:g} % on the built-in liver. Control points are those of the tissue and "
         "stay where they are."

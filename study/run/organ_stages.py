@@ -219,7 +219,7 @@ class OrganStages:
     def _model_stage(self, name: str, mesh: str) -> PlannedStage:
         model, persistence = self.models[name], self.watch.persistence
         at_rest, at_quarter = self._rest_requests(name)
-        work = partial(self._run_model, name, at_rest, at_quarter)
+        work = partial(self._run_model, name, at_rest=at_rest, at_quarter=at_quarter)
         stage = self._stage(name, ModelResult, work, mesh, model, at_rest, at_quarter)
         # A stored result does not include the fields of all nodes.
         readable = persistence is None or persistence.fields is None
@@ -259,8 +259,9 @@ class OrganStages:
         return self.prepared[name]
 
     def _run_model(
-        self, name: str, at_rest: bool, at_quarter: bool, progress: Progress
+        self, name: str, progress: Progress, *, at_rest: bool, at_quarter: bool
     ) -> ModelResult:
+        """The run of a model and, as requested, its displacement at rest."""
         prepared, watch = self._prepare(name), self.watch
         watch = replace(watch, progress=with_time_limit(progress, self.stages.options.minutes))
         run = with_end_fields_only(

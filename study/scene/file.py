@@ -56,8 +56,8 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     names = set(map(_as_written, _names(table)))
     if name in BUILT_IN:  # its own keys are for whatever the overrides make of it
         names = {key for key in names if any(f"{key}.".startswith(f"{one}.") for one in given)}
-        return _suiting_the_rest(_telling_idle(scene, names), given)
-    return _telling_idle(scene, names)
+        return _suiting_the_rest(_with_remarks_on_idle_keys(scene, names), given)
+    return _with_remarks_on_idle_keys(scene, names)
 
 
 def _refuse_internal_names(table: Table, source: str, lines: Mapping[str, int]) -> None:
@@ -115,7 +115,7 @@ def _suiting_the_rest(scene: Scene, given: Collection[str]) -> Scene:
     return replace(scene, organ=replace(scene.organ, suit=cast(tuple[SuitedKey, ...], suit)))
 
 
-def _telling_idle(scene: Scene, given: Collection[str]) -> Scene:
+def _with_remarks_on_idle_keys(scene: Scene, given: Collection[str]) -> Scene:
     """The scene with a remark on each of the `given` keys that has no effect in it.
 
     They are no error: a file may be run with other tools or supports by an override.

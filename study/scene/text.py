@@ -80,12 +80,12 @@ def parsed(text: str, source: str) -> Table:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(_said(text, source, str(error))) from None
+        raise SceneError(_syntax_fault(text, source, str(error))) from None
     except (ValueError, RecursionError) as error:  # absurd numbers or nesting
         raise SceneError(f"{source}: not valid TOML: {error}") from None
 
 
-def _said(text: str, source: str, message: str) -> str:
+def _syntax_fault(text: str, source: str, message: str) -> str:
     """One line on a fault of syntax: where, the line itself, and what to do."""
     match = _WHERE.fullmatch(message)
     if match is None or match["line"] is None:

@@ -85,7 +85,7 @@ def _run(
             if found.value is not None:
                 store.put(task, found.value, found.wall)
             ended[task.key] = found
-            status = status.counting(found.status == "done", time.perf_counter() - start)
+            status = status.counting(time.perf_counter() - start, done=found.status == "done")
             progress(status)
     return [Outcome(task, *ended[task.key]) for task in tasks]
 

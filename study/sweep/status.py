@@ -30,8 +30,8 @@ class SweepStatus(NamedTuple):
         ran = self.done + self.failed
         return self.seconds / ran * (self.total - self.finished) if ran else None
 
-    def counting(self, done: bool, seconds: float) -> SweepStatus:
-        """The status after one more run, done or not, at so many seconds of the sweep."""
+    def counting(self, seconds: float, *, done: bool) -> SweepStatus:
+        """The status after one more run, done or failed, at a time [s] of the sweep."""
         return self._replace(
             done=self.done + done, failed=self.failed + (not done), seconds=seconds
         )

@@ -100,7 +100,7 @@ def lattices(scene: Scene, chosen: Iterable[Configuration]) -> dict[Family, list
 
 
 def _lattice(scene: Scene, springs: Family, times: float) -> Configuration:
-    """With the settings of the contenders, so that its run is one of theirs."""
+    """A lattice of a family, with the contenders' settings, so that its run is one of theirs."""
     model, volume_term = springs
     spacing, step = times * scene.lattice.spacing, {"step_fraction": fraction(scene)}
     if model != "tissue":
@@ -120,7 +120,7 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
     if finest is None or coarser is None:
         raise ValueError(
             "a lattice that others are to be compared with did not reach the end "
-            f"({_said(outcomes)}); reduce the displacement of the tools or lattice.step_fraction"
+            f"({_causes(outcomes)}); reduce the displacement of the tools or lattice.step_fraction"
         )
     volumes = given.problem.volume_rule.weights
     curves = relative_l2_of_curves(coarser.curves - finest.curves, finest.curves)
@@ -134,7 +134,7 @@ def truth_of(outcomes: Sequence[Outcome], given: SceneProblem) -> ReferenceSolut
     )
 
 
-def _said(outcomes: Sequence[Outcome]) -> str:
+def _causes(outcomes: Sequence[Outcome]) -> str:
     lost = [one for one in outcomes if one.value is None or one.value["field"] is None]
     return ", ".join(one.message or "diverged" for one in lost)
 

@@ -20,7 +20,7 @@ from study.sweep.runner import Backend
 from study.sweep.store import Store
 from study.system.folders import check_file, write_text
 from study.system.progress import Progress
-from study.tradeoff import recommend, study, table
+from study.tradeoff import recommend, recommendation, study, table
 from study.tradeoff.contenders import configurations, is_moved
 from study.tradeoff.demand import Demand, as_share, demand, length
 from study.tradeoff.problem import sampled
@@ -133,7 +133,7 @@ def advise(
     wanted = demand(rate, "1" if absolute else error)
     path = request.out or Path(f"{request.name}-{_suffix(wanted, absolute)}.toml")
     check_file(path)
-    problem = _set_up(recommend.judged_by(sampled(given)))
+    problem = _set_up(recommend.with_finer_reference(sampled(given)))
     lattice = model(given, "tissue").varied().prepare(problem)  # with the scene's own spacing
     if absolute is not None:
         at_rest = model(given, "fem").prepare(problem) if problem.has_further_loads else lattice
@@ -148,15 +148,14 @@ def advise(
     store = _store(Path("results") / f"{request.name}-tradeoff")
     if known_place:
         model(given, "corrected").prepare(problem)
-    found = recommend.recommend(
-        sampled(given), wanted, store, request.backend, progress, known_place=known_place
-    )
+    execution = study.Execution(store, request.backend, progress)
+    found = recommend.recommend(sampled(given), wanted, execution, known_place=known_place)
     noted = dict.fromkeys((*given.remarks, *problem.notes))
     notes = (f"note: {note}" for note in noted)
-    lines = [*preamble, *notes, *recommend.lines(found), *_busy()]
+    lines = [*preamble, *notes, *recommendation.lines(found), *_busy()]
     if not found.met:
         return False, [f"cannot: no lattice tried meets {wanted}; the nearest is", *lines]
-    write_text(path, recommend.recommended_scene(given, found))
+    write_text(path, recommendation.recommended_scene(given, found))
     return True, [*lines, f"scene in {path}"]
 
 

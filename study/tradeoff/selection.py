@@ -9,7 +9,7 @@ from study.models.tissue import FRACTION
 from study.scene import Scene
 from study.tradeoff.contenders import Configuration, is_moved
 
-DOUBLE = "double"
+DOUBLE, SINGLE = "double", "single"
 
 
 def described(one: Configuration) -> str:

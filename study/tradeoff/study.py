@@ -37,6 +37,21 @@ PICTURES = ("tradeoff.svg", "tradeoff.pdf")
 
 
 @dataclass(frozen=True)
+class Execution:
+    """Where runs are kept, what computes them, and where their progress is shown."""
+
+    store: Store
+    backend: Backend
+    progress: Progress
+
+    def judged(
+        self, scene: Scene, chosen: Sequence[Configuration]
+    ) -> tuple[Comparison, list[Outcome]]:
+        """See `judged`."""
+        return judged(scene, chosen, self.store, self.backend)
+
+
+@dataclass(frozen=True)
 class Found:
     """Entries of the table, their reference, and its curves' errors by control point."""
 

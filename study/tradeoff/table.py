@@ -105,7 +105,7 @@ class Entry:
         return self.errors.judged, self.cost.per_second[1]
 
 
-def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]]) -> bool:
+def is_dominated(place: tuple[float, float], places: Sequence[tuple[float, float]]) -> bool:
     """Whether one of the places, each an error and a cost, dominates another.
 
     It does if it is cheaper and as accurate, or more accurate and as cheap. Errors that differ by
@@ -120,7 +120,7 @@ def is_beaten(place: tuple[float, float], places: Sequence[tuple[float, float]])
 def front(entries: Sequence[Entry]) -> list[Entry]:
     """The Pareto front: entries that no other dominates, among those with error and cost."""
     places = [one.place for one in entries if one.place is not None]
-    return [one for one in entries if one.place is not None and not is_beaten(one.place, places)]
+    return [one for one in entries if one.place is not None and not is_dominated(one.place, places)]
 
 
 def fronts(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:

@@ -8,7 +8,7 @@ u_z = P / (4 pi mu) (z^2 / R^3 + 2 (1 - nu) / R)
 Boussinesq (1885); Johnson (1985), Contact Mechanics, eq. 3.18. Summed over the tool's disc of
 radius a with the pressure p (1 - (r / a)^2)^2, the depth at its centre is 16/15 (1 - nu^2) p a / E.
 The mean depth, weighed by the pressure, is 393216 / (155925 pi) (1 - nu^2) p a / E, as the Hankel
-transform 8 p a^2 J_3(k a) / (k a)^3 of the pressure and 2 (1 - nu^2) / (E k) of the surface tell
+transform 8 p a^2 J_3(k a) / (k a)^3 of the pressure and 2 (1 - nu^2) / (E k) of the surface give
 (Sneddon, 1951, Fourier Transforms, ch. 10). A quarter of a block of 2.5 a is solved; on its far
 faces the displacement of the half space is prescribed, so that its size leaves no error.
 """

@@ -118,7 +118,7 @@ def quarter_mesh(finest: float, *, flat: bool) -> TetrahedralMesh:
     mesh = block_mesh((SIZE, SIZE, SIZE), SIZE / COARSEST)
     mesh = TetrahedralMesh(mesh.points * [1.0, 1.0, -1.0], mesh.tetrahedra[:, [0, 2, 1, 3]])
     for _ in range(HALVINGS):
-        size, away = _sizes(mesh, flat)
+        size, away = _sizes(mesh, flat=flat)
         wanted = np.maximum(finest, GROWTH * away)
         if (size <= wanted).all():
             break
@@ -132,7 +132,7 @@ def on_nothing(mesh: TetrahedralMesh, tissue: Tissue, element: str) -> Body:
     return discretise(mesh, tissue, Foundation(DOWN, SIZE, 1e-3, 1.0), blunt, element)
 
 
-def _sizes(mesh: TetrahedralMesh, flat: bool) -> tuple[Floats, Floats]:
+def _sizes(mesh: TetrahedralMesh, *, flat: bool) -> tuple[Floats, Floats]:
     """Longest edge [m] of each tetrahedron, and how far it is from where it has to be short."""
     corner = mesh.points[mesh.tetrahedra]
     edges = corner[:, [0, 0, 0, 1, 1, 2]] - corner[:, [1, 2, 3, 2, 3, 3]]
