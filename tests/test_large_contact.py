@@ -102,6 +102,19 @@ def test_derivatives_of_the_gaps(rng, one):
             assert np.polyfit(np.log(steps), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.parametrize(("shape", "bonded"), [(PLATE, False), (PUNCH, False), (PLATE, True)])
+def test_gaps_of_flat_faces_are_the_ways_of_body_and_tool(shape, bonded):
+    """3 mm of the tool after 1 mm of the body as a whole, both from the middle of its top."""
+    one = steady(3e-3, shape, bonded=bonded)
+    contact = contact_body(block(), TISSUE, (one,), np.array([0.0, 1.0])).contact
+    gaps = contact.at(np.tile(1e-3 * DOWN, contact.size // 3), 1.0).gaps
+    if bonded:
+        assert gaps.reshape(-1, 3) == pytest.approx(np.tile(-2e-3 * DOWN, (len(gaps) // 3, 1)))
+    else:
+        assert gaps[np.isfinite(gaps)] == pytest.approx(-2e-3)
+        assert np.isfinite(gaps).sum() > 3
+
+
 def test_the_body_has_a_potential_whose_second_derivative_is_its_tangent(rng):
     """With a part of the volume's stiffness at each point beside the pressure's."""
     solid = contact_body(block(), TISSUE, (), np.array([0.0, 1.0])).solid
