@@ -14,6 +14,7 @@ from fuzzy.systems.fis_file import FisError, fis_text, read_fis
 from fuzzy.systems.inference import COMPILED_FROM_ROWS, infer
 from fuzzy.systems.json_file import json_text, read_json
 from fuzzy.systems.options import InferenceOptions
+from fuzzy.systems.quadrature import DEFUZZIFICATIONS, defuzzified, sampled
 from fuzzy.systems.scikit_fuzzy import to_skfuzzy
 from fuzzy.systems.sets import FuzzySet
 from fuzzy.systems.system import FuzzySystem, Operators, Rule, Term, Variable
@@ -70,6 +71,23 @@ def test_answers_are_octaves(methods):
     expected = GOLDEN[methods]
     found = infer(system(*methods), X[: len(expected)], "mamdani", OCTAVE).value
     assert found == pytest.approx(expected, abs=1e-8)
+
+
+@pytest.mark.parametrize("sampling", ["matlab", "octave"])
+@pytest.mark.parametrize("method", DEFUZZIFICATIONS)
+def test_a_curve_that_is_zero_has_no_value(method, sampling):
+    quadrature = sampled(system().output, 5, sampling)
+    found = defuzzified(quadrature, np.array([np.zeros(5), np.ones(5)]), method, sampling)
+    assert np.isnan(found[0])
+    assert np.isfinite(found[1])
+
+
+@pytest.mark.parametrize(("sampling", "place"), [("matlab", 0), ("octave", 2)])
+def test_the_bisector_weighs_the_ends_as_the_sampling_does(sampling, place):
+    """Areas up to each sample: 1.0, 1.2, 1.6, 2.0; with half an end 0.5, 0.7, 1.1, 1.5."""
+    quadrature = sampled(system().output, 5, sampling)
+    found = defuzzified(quadrature, np.array([[1.0, 0.2, 0.4, 0.4, 0.0]]), "bisector", sampling)
+    assert found[0] == quadrature.y[place]
 
 
 def test_smallest_and_largest_go_by_size_in_matlab_by_place_in_octave():

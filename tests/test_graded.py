@@ -12,6 +12,7 @@ from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
 from msm.dead_load import from_shape
 from msm.forces import internal_forces
+from msm.graded import build
 from msm.grid import grids_of
 from msm.hanging import interpolate
 from msm.integrators import INTEGRATORS
@@ -23,6 +24,7 @@ from msm.stability import critical_time_step, largest_frequency
 from msm.statics import static_displacement, stiffness_at_rest
 from msm.ties import hanging_nodes
 from msm.volume import volume_term
+from study.organ.occupancy import ImplicitBody
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
 
@@ -130,6 +132,42 @@ def test_one_size_is_the_plain_lattice(problem):
 def test_too_many_cells_are_refused(problem):
     with pytest.raises(ValueError, match=r"region\.spacing: 0\.1 mm.*enlarge it"):
         on(problem, Grading(1e-4, problem.tool.centre[None], (0.01,)))
+
+
+def ball(centre, radius):
+    """Inside where negative."""
+    return lambda points: np.linalg.norm(points - centre, axis=-1) - radius
+
+
+def test_cells_move_with_the_body():
+    found, aside = [], np.array([-0.07, 0.013, 0.31])
+    for centre in (np.zeros(3), aside):
+        place = centre + np.array([0.0, 0.0, 0.02])
+        grading = Grading(FINE, place[None], (0.004, 0.012))
+        box = centre - 0.0208, centre + np.array([0.0208, 0.0208, 0.0308])
+        found.append(build(ImplicitBody(ball(centre, 0.0207)), *box, grading))
+    here, there = found
+    assert all(len(one.cells) for one in here.levels)
+    np.testing.assert_array_equal(there.cells, here.cells)
+    np.testing.assert_allclose(there.fill, here.fill, atol=0.01)
+    np.testing.assert_allclose(there.nodes, here.nodes + aside, atol=1e-12)
+    assert abs(there.masters - here.masters).max() < 1e-12
+    corner = here.nodes[here.cells[:, 0]]
+    np.testing.assert_allclose(here.origin + here.index * here.edges[:, None], corner, atol=1e-12)
+
+
+def test_the_piece_of_the_largest_volume_is_kept_and_not_that_of_most_cells():
+    far, small, large = np.array([0.0, 0.0, 0.06]), 0.008, 0.014
+    both = ImplicitBody(lambda p: np.minimum(ball(0.0, large)(p), ball(far, small)(p)))
+    box = np.full(3, -0.016), np.array([0.016, 0.016, 0.072])
+    kept = build(both, *box, Grading(FINE / 2, far[None], (0.012, 0.025)))
+    assert (kept.nodes[:, 2] < 0.03).all()
+    alone = build(
+        ImplicitBody(ball(far, small)), *box, Grading(FINE / 2, far[None], (0.012, 0.025))
+    )
+    assert len(alone.cells) > len(kept.cells)
+    share = small**3 / (small**3 + large**3)
+    assert kept.dropped == pytest.approx(share, abs=0.02)
 
 
 # --- hanging nodes --------------------------------------------------------------------------------

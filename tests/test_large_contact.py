@@ -76,24 +76,43 @@ def steady(depth, shape=SPHERE, **settings):
     return tool(shape, depth, (0.0, 1.0), **settings)
 
 
-@pytest.mark.parametrize("one", [steady(3e-3), steady(3e-3, PLATE), steady(1e-3, bonded=True)])
+@pytest.mark.parametrize(
+    "one",
+    [steady(3e-3), steady(3e-3, PLATE), steady(3e-3, PUNCH), steady(1e-3, bonded=True)],
+    ids=["sphere", "plate", "punch", "bonded"],
+)
 def test_derivatives_of_the_gaps(rng, one):
+    """Of vertices under the tool; beside a punch a gap is infinite."""
     contact = contact_body(block(), TISSUE, (one,), np.array([0.0, 1.0])).contact
     u, du = 1e-3 * rng.standard_normal((2, contact.size))
     force = rng.random(len(contact.bonded))
     steps = 0.5 ** np.arange(2, 7)
     begun = contact.at(u, 1.0)
-    G, bend = begun.derivative, begun.curvature(force)
+    G, bend, under = begun.derivative, begun.curvature(force), np.isfinite(begun.gaps)
+    assert under.sum() > 3
     of_gaps, of_slope = [], []
     for h in steps:
         moved = contact.at(u + h * du, 1.0)
-        off = moved.gaps - begun.gaps - h * (G @ du)
+        off = moved.gaps[under] - begun.gaps[under] - h * (G @ du)[under]
         of_gaps.append(np.linalg.norm(off))
         turned = moved.derivative.T @ force - G.T @ force
         of_slope.append(np.linalg.norm(turned - h * (bend @ du)))
     for off in (of_gaps, of_slope):
         if max(off) > 1e-12:  # of a bonded tool they are linear
             assert np.polyfit(np.log(steps), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("shape", "bonded"), [(PLATE, False), (PUNCH, False), (PLATE, True)])
+def test_gaps_of_flat_faces_are_the_ways_of_body_and_tool(shape, bonded):
+    """3 mm of the tool after 1 mm of the body as a whole, both from the middle of its top."""
+    one = steady(3e-3, shape, bonded=bonded)
+    contact = contact_body(block(), TISSUE, (one,), np.array([0.0, 1.0])).contact
+    gaps = contact.at(np.tile(1e-3 * DOWN, contact.size // 3), 1.0).gaps
+    if bonded:
+        assert gaps.reshape(-1, 3) == pytest.approx(np.tile(-2e-3 * DOWN, (len(gaps) // 3, 1)))
+    else:
+        assert gaps[np.isfinite(gaps)] == pytest.approx(-2e-3)
+        assert np.isfinite(gaps).sum() > 3
 
 
 def test_the_body_has_a_potential_whose_second_derivative_is_its_tangent(rng):
