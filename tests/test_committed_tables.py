@@ -152,7 +152,7 @@ def test_scores_over_the_spacing_are_those_of_a_run_there(monkeypatch):
 
 
 @pytest.mark.parametrize("name", [request.NEAREST, organ_request.NEAREST])
-def test_shares_are_of_the_ofand_leave_the_ties(name):
+def test_shares_are_of_the_draws_and_leave_the_ties(name):
     found = read_table(DATA / name, rows.Nearest)
     for row in found:
         of = int(row.draws)

@@ -22,7 +22,7 @@ from study.models.table import model
 from study.plan import elements as elements_plan
 from study.plan import moved as moved_plan
 from study.plan import plan as planning
-from study.plan.candidates import candidates
+from study.plan.candidates import Candidate, candidates
 from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
@@ -88,6 +88,39 @@ def test_steps_are_no_longer_than_the_time_between_the_states_of_a_rate():
     found = choose([exact], Require(rate=1000.0))
     assert found.step == pytest.approx(1e-3)
     assert found.wall_per_s == pytest.approx(1000.0 * exact.step_wall)
+
+
+def made(error=0.05, **costs):
+    """A candidate of a block with these costs."""
+    given = {"step": 1e-3, "step_wall": 5e-4, "setup": 1.0, "memory": 1e6} | costs
+    prediction = Prediction((Part("spacing", error),))
+    return Candidate(name="lattice", scene=read_scene("block"), prediction=prediction, **given)
+
+
+def test_a_frame_takes_whole_steps_and_may_take_all_of_its_time():
+    assert in_time(made(step_wall=0.97e-3), 60.0)  # 17 of 1/1000 s in 16.7 ms
+    late = made(step_wall=0.99e-3)
+    assert late.wall_per_s < 1.0
+    assert not in_time(late, 60.0)
+    assert in_time(made(step=0.25, step_wall=0.25), 4.0)
+
+
+def test_what_is_done_once_counts_in_a_run_and_not_at_a_rate():
+    slow, quick = made(setup=0.0), made(step_wall=1e-4, setup=1e3)
+    assert slow.wall == pytest.approx(0.5 * slow.scene.time.duration)
+    assert choose([quick, slow], Require(error=0.1)).setup == 0.0
+    assert choose([slow, quick], Require(error=0.1, rate=60.0)).setup == 1e3
+
+
+def test_a_requirement_that_is_just_met_is_met():
+    assert choose([made(error=0.1, memory=1e6)], Require(error=0.1, memory=1e6))
+    for beyond in ({"error": 0.1 + 1e-9}, {"memory": 1e6 + 1.0}):
+        with pytest.raises(ValueError, match="require"):
+            choose([made(**({"error": 0.1} | beyond))], Require(error=0.1, memory=1e6))
+
+
+def test_errors_by_several_causes_add_up():
+    assert Prediction((Part("mesh", 0.1), Part("steps", 0.02))).error == pytest.approx(0.12)
 
 
 def test_refusal_names_only_remedies_that_a_scene_can_take():

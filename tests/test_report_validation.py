@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import pytest
 
 from reports import benchmarks
-from reports.validation import of_cylinders, summed, validation
+from reports.validation import cylinder_rows, of_body, of_cylinders, summed, validation
 from reports.validation_figure import validation_figure
 from tests.report_samples import printed_beforehand
 
@@ -47,6 +48,34 @@ def test_medians_and_ranges_are_of_the_cases_with_an_answer():
     (group,) = validation()["cylinders"]
     assert group["rows"][0][:4] == ["linear FE", "force at 10 %", "+0.0 %", "−10.0 % to +10.0 %"]
     assert group["rows"][1][2] == "unstable"
+
+
+def line(**changes):
+    cells = next(csv.DictReader(TABLE.splitlines()))
+    return cells | changes
+
+
+def test_a_case_without_an_answer_is_counted_and_one_without_an_own_error_has_none():
+    answered = [line(), line(found="11", numerical="", verdict="differs")]
+    found = summed([*answered, line(found="", numerical="", verdict="")])
+    assert (found.agreeing, found.answered, found.cases) == (1, 2, 3)
+    assert found.own == pytest.approx(0.001)
+    assert summed(answered[1:]).own is None
+    lines = [*answered, line(found="", numerical="", verdict="")]
+    (row,) = cylinder_rows(lines)[0]["rows"]
+    assert row[4:] == ["5.0 %", "0.1 %", "1 of 2, 1 without a result"]
+    (row,) = cylinder_rows(answered)[0]["rows"]
+    assert row[-1] == "1 of 2"
+
+
+def test_of_a_body_are_its_own_lines_and_residuals_of_one_axis_are_left_out(folder):
+    along = line(problem="cube", quantity="rms residual along height", faces="sliding")
+    with (folder / "validation.csv").open("a", newline="") as file:
+        csv.DictWriter(file, along).writerow(along)
+    lines = benchmarks.read("validation")
+    assert len(of_body(lines, "cube", "rms residual of the beads")) == 2
+    assert len(of_body(lines, "cube", "rms residual along height")) == 1
+    assert [len(group["rows"]) for group in validation()["bodies"]] == [1, 1, 1]
 
 
 @pytest.mark.usefixtures("folder")

@@ -74,10 +74,10 @@ def test_a_flat_reference_is_refused(name, level):
         scores(motion(), flat)
 
 
-@pytest.mark.parametrize("level", [0.3, -0.3])
+@pytest.mark.parametrize("level", [0.3, -0.3, 1e6])
 def test_a_reference_that_only_rounding_moves_is_flat(level):
     values = np.full(50, level)
-    values[17:] = np.nextafter(level, 1.0)
+    values[17:] = np.nextafter(level, np.inf)
     with pytest.raises(ValueError, match="reference displacement is flat"):
         scores(motion(), replace(motion(), displacement=values))
 
@@ -114,6 +114,23 @@ def test_uneven_times_are_refused():
     uneven = spoiled("time", 17, 0.1701)
     with pytest.raises(ValueError, match="not uniform"):
         scores(uneven, uneven)
+
+
+@pytest.mark.parametrize("step", [1e-9, 1.0, 1e3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_times_are_held_to_a_millionth_of_their_step(step, sign):
+    exact = replace(motion(), time=step * np.arange(50))
+    for off, refused in ((3e-6, True), (3e-7, False)):
+        time = exact.time.copy()
+        time[17] += sign * off * step
+        moved = replace(exact, time=time)
+        if refused:
+            with pytest.raises(ValueError, match="not uniform"):
+                scores(exact, moved)
+            with pytest.raises(ValueError, match="times differ"):
+                scores(moved, exact)
+        else:
+            assert scores(exact, moved) == scores(moved, exact) == scores(exact, exact)
 
 
 def test_reversed_times_are_refused():

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -198,6 +199,9 @@ def test_the_own_error_covers_what_a_finer_mesh_changes():
     assert abs(values[2] - exact) <= stated < 3.0 * abs(values[2] - exact)
     assert math.isnan(own_error(values[:1], sizes[:1]))
     assert math.isnan(own_error([1.0, math.nan], sizes[:2]))
+    assert math.isnan(own_error([1.0, 0.0], sizes[:2]))
+    assert own_error([-value for value in values[:3]], sizes[:3]) == stated
+    assert own_error(values, sizes) == own_error(values[1:], sizes[1:])  # of the last three
 
 
 def test_tables_hold_every_comparison(tmp_path):
@@ -212,6 +216,28 @@ def test_tables_hold_every_comparison(tmp_path):
     assert "unstable" in text
     assert "differs" in text
     assert "1 of 2 predictions agree" in text
+    assert "cube, bonded (fitted: nothing)" in text
+
+
+def test_lines_say_what_was_fitted_and_round_no_error_but_rounding_to_nothing():
+    fitted = {"fitted": "modulus"}
+    found = [compared(**fitted), compared(numerical=1e-9, **fitted), compared(numerical=math.nan)]
+    head, _, *rows = list(table.lines(found))[:5]
+    assert head == "cube, bonded (fitted: modulus)"
+    cells = [re.split(r" {2,}", row.strip()) for row in rows]
+    assert cells[0][2:] == ["10", "+1.2", "0.5", "0.3", "agrees"]
+    assert cells[1][2:] == ["10", "+1.2", "0.5", "0", "differs"]
+    assert cells[2][2:] == ["10", "+1.2", "0.5", "differs"]
+
+
+def test_lines_of_many_cases_are_their_median_and_range_in_per_cent():
+    found = [
+        compared(case=str(k), measured=10.0, found=10.0 + k, uncertainty=0.5, numerical=0.1)
+        for k in range(-1, 4)
+    ]
+    row = list(table.lines(found))[2]
+    cells = re.split(r" {2,}", row.strip())
+    assert cells[2:] == ["10 to 10 N", "+10.0 % (-10 to +30)", "5.0 %", "1 %", "3 of 5 agree"]
 
 
 def test_names_that_are_none_are_refused():

@@ -24,8 +24,9 @@ from study.scene import Require, Scene
 from study.scene.problem import problem_of
 
 FIELD = "field"
-Alone = Callable[[], Mapping[str, Sequence[Candidate]]]
 """The required quantity that includes the whole organ."""
+Alone = Callable[[], Mapping[str, Sequence[Candidate]]]
+"""Makes candidates with their errors at single control points, by name."""
 
 ESTIMATED_BY = {
     "tissue": "a lattice of twice the spacing",
