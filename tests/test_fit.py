@@ -175,6 +175,15 @@ def write(path, header, rows):
         ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r":5: time_s does not grow"),
         ("time_s,displacement_m", ["0,0", ",", "1,1"], r":3: time_s: the cell is empty"),
         ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' appears twice"),
+        ("time_s displacement_m", ["0 0"] * 3, r":1: .* parted by commas, semicolons or tabs"),
+        ("Time_s,displacement_m", ["0,0"] * 3, r":1: .* among 'Time_s', .* name it time_s, in sec"),
+        ("# tool,displacement_mm", ["0,0"] * 3, r":1: the column time_s is missing among '# tool'"),
+        (
+            "# by hand",
+            ["time_s,force_N", "0,0"],
+            r":2: 2 cells .* '# by hand' in line 1 on; remove",
+        ),
+        ("time_s,force_mN", ["0,0"] * 3, r":1: .* did you mean force_N\? Convert its numbers"),
         ("time_s,displacement_m", ["0,0"], r":2: 1 lines of numbers; give 3 or more"),
         ("time_s,displacement_m,force_N", ["0,0,0"], r":1: give one of the columns"),
         ("depth_m,force_N", ["0,0", "1,1", "2,2"], r":1: .* time_s is missing.*force over depth"),
@@ -219,6 +228,7 @@ def test_every_csv_file_of_a_folder_counts_but_hidden_ones(tmp_path):
     write(tmp_path / "Markers.csv", "x_m,y_m,z_m,ux_m,uy_m,uz_m", ["0,0,0,0,0,1"] * 3)
     found = user_scene.read_folder(tmp_path)
     assert sorted(found.curves) == ["PRESS", "lift"]
+    assert found.unread == ("notes.txt",)
     assert len(found.markers.places) == 3
     write(tmp_path / "press.CSV", "time_s,force_N", rows)
     write(tmp_path / "PRESS.csv", "time_s,force_N", rows)

@@ -61,6 +61,8 @@ BAD = [
     ("block", "gravity.towards=left", "gravity.acceleration: give it"),
     ("block", "tool.direction=[0, 0, 1]", "tool.direction: points out"),
     ("block", "tool.direction=[0, 0, 0]", "tool.direction: a zero vector"),
+    ("block", "tool.direction=[0, 0, -1e-200]", "tool.direction: a zero vector"),
+    ("block", 'tissue.inclusion={radius="1 mm"}', "tissue.inclusion: write each as [[tissue.incl"),
     ("block", "tool.place={side='superior'}", "tool.place: give either side and at"),
     ("block", 'control_points.far={point=["65 mm", 0, 0], snap=false}', "control_points.far: lies"),
     ("block", "lattice.time_step=7 ms", "lattice.time_step: 0.007 s does not divide"),

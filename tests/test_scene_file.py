@@ -111,6 +111,12 @@ def test_a_reading_in_the_wrong_unit_is_refused():
         read_scene("paper", ["patient.hcv=9.5 Pa"])
 
 
+def test_a_key_that_is_set_twice_has_its_last_value_and_a_remark():
+    scene = read_scene("block", ["tool.force=1 N", "tool.radius=20 mm", "tool.Force=2 N"])
+    assert scene.tool.force == 2.0
+    assert scene.remarks == ("tool.force: set 2 times; the last counts",)
+
+
 def test_overrides_take_bare_text_quoted_text_and_numbers():
     for text in ("2 N", '"2 N"', "2"):
         assert read_scene("liver", [f"tool.force={text}"]).tool.force == 2.0

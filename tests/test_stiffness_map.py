@@ -166,6 +166,8 @@ def test_an_image_goes_to_the_faces_of_its_outer_voxels(tmp_path, shape):
         (lambda p: image(p / "m.nii", halves), "MPa", r"in MPa .* Pa in the mean over the organ"),
         (lambda p: image(p / "m.nii", lambda x: 1e6 * halves(x)), "MPa", "stiffness_map.unit"),
         (lambda p: image(p / "m.nii", halves, origin=(900.0, 0.0, 0.0)), "kPa", "no voxel"),
+        (lambda p: image(p / "m.nii", lambda x: halves(x) - 10), "kPa", r"\d+ voxels .* -5e\+03"),
+        (lambda p: edited(p / "m.nii", in_metres), "kPa", r"voxels 2 m long .* unit of length"),
         (lambda p: p / "none.nii", "kPa", "no such file"),
         (lambda p: p / "text.nii", "kPa", "is no NIfTI image"),
         (lambda p: image(p / "m.nii", lambda x: np.stack([halves(x)] * 2, -1)), "kPa", "4 axes"),
@@ -201,6 +203,11 @@ def with_another_qform(read):
     moved = np.array(read.affine)
     moved[0, 3] += 3.0
     read.set_qform(moved, 1)
+
+
+def in_metres(read):
+    """Millimetres said to be metres."""
+    read.header.set_xyzt_units("meter")
 
 
 def stored(kind):

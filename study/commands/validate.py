@@ -60,7 +60,8 @@ def validate(
         check_file(out)
     with on_stderr() as progress:
         if data is not None:
-            found = list(request.own_comparisons(name, data, overrides or (), probe, progress))
+            given = (name, data, overrides or (), probe, progress, _tell)
+            found = list(request.own_comparisons(*given))
         else:
             names = () if name is None else (name,)
             asked = request.ValidationRequest(names=names, kinds=tuple(models or ()), quick=quick)
@@ -70,3 +71,7 @@ def validate(
     print(table.as_json(found) if as_json else "\n".join(table.lines(found)))
     if not request.all_answered(found):
         sys.exit(EXIT_FAILED_CHECK)
+
+
+def _tell(note: str) -> None:
+    print(f"note: {note}", file=sys.stderr)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from study.models.model import ModelKind
 
 MODELS = Choice("study.models.table:MODELS")
+SHORTEST_DIRECTION = 1e-6
+"""Length below which a vector has no direction; the square of 1e-200 would be zero."""
 Table = dict[str, Any]
 """A parsed table of TOML, not yet checked."""
 # What a scene without a mesh cannot use.
@@ -278,7 +280,7 @@ def _damping_contradictions(scene: Scene, table: Table) -> Iterator[str]:
 def _tool_contradictions(scene: Scene, name: str, tool: Tool) -> Iterator[str]:
     if not _one_way(tool.place):
         yield f"{name}.place: give either side and at, or fraction, or point"
-    if tool.direction is not None and not any(tool.direction):
+    if tool.direction is not None and math.hypot(*tool.direction) < SHORTEST_DIRECTION:
         yield f"{name}.direction: a zero vector has no direction"
     yield from _drive_contradictions(name, tool)
     if tool.path and tool.is_moved:
@@ -288,7 +290,7 @@ def _tool_contradictions(scene: Scene, name: str, tool: Tool) -> Iterator[str]:
         yield f"{name}.history: ramp and hold are both zero; nothing is ever loaded"
     if history.kind == "sinusoid" and 8 * history.frequency * time.duration > time.samples:
         needed = math.ceil(8 * history.frequency * time.duration)
-        yield f"time.samples: a sinusoid needs 8 samples a period, here {needed}"
+        yield f"time.samples: a sinusoid needs 8 samples a period; give {needed} or more"
     yield from _unseen_load(scene, tool)
 
 
@@ -441,7 +443,7 @@ def _unseen_load(scene: Scene, tool: Tool) -> Iterator[str]:
     loaded = min(history.ramp + history.hold + history.release, time.duration)
     if 8 * time.duration > (time.samples - 1) * loaded > 0.0:
         needed = math.ceil(8 * time.duration / loaded) + 1
-        yield f"time.samples: a load of {loaded:g} s needs 8 samples in it, here {needed}"
+        yield f"time.samples: a load of {loaded:g} s needs 8 samples in it; give {needed} or more"
 
 
 def _kind(name: str) -> ModelKind:

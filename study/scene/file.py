@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import shlex
 import tomllib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
@@ -38,7 +39,7 @@ LISTED = {*SEVERAL, "weight", "tissue.inclusion"}
 
 
 def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
-    """Scene of a built-in name or a TOML path, with `table.key=value` overrides applied.
+    """Scene of a built-in name or a TOML path, with `table.key=value` overrides applied in order.
 
     Raises SceneError naming file, key, value and remedy.
     """
@@ -48,11 +49,12 @@ def read_scene(name: str, overrides: Sequence[str] = ()) -> Scene:
     _refuse_internal_names(table, name, lines)
     _resolve_files(table, base)
     _split_lists(table)
-    given = {_apply(table, override) for override in overrides}
+    applied = [_apply(table, override) for override in overrides]
+    given = set(applied)
     lines |= dict.fromkeys(given, 0)  # on no line
     _replace_organ(table, given)
     _resolve_files(table, Path.cwd())
-    scene = validate(table, name, lines)
+    scene = _with_remarks_on_repeated_keys(validate(table, name, lines), applied)
     names = set(map(_as_written, _names(table)))
     if name in BUILT_IN:  # its own keys are for whatever the overrides make of it
         names = {key for key in names if any(f"{key}.".startswith(f"{one}.") for one in given)}
@@ -113,6 +115,14 @@ def _suiting_the_rest(scene: Scene, given: Collection[str]) -> Scene:
     keys = (key for key in SUITED if key not in given and key.partition(".")[0] not in whole)
     suit = tuple(key for key in keys if has_effect(scene, key))
     return replace(scene, organ=replace(scene.organ, suit=cast(tuple[SuitedKey, ...], suit)))
+
+
+def _with_remarks_on_repeated_keys(scene: Scene, applied: Sequence[str]) -> Scene:
+    """The scene with a remark on each key that several overrides set; the last of them counts."""
+    said = [
+        f"{key}: set {n} times; the last counts" for key, n in Counter(applied).items() if n > 1
+    ]
+    return replace(scene, remarks=(*scene.remarks, *said))
 
 
 def _with_remarks_on_idle_keys(scene: Scene, given: Collection[str]) -> Scene:
@@ -351,7 +361,9 @@ def _line(problem: ErrorDetails) -> str:
         case "dataclass_type":
             message = "should be a table"
         case "tuple_type":
+            tables = isinstance(problem["input"], dict)
             message = "should be a list, in square brackets, with text in quotes"
+            message = f"write each as [[{key}]], in double brackets" if tables else message
     return f"{key}: {message} (got {_short(problem['input'])})"
 
 

@@ -170,19 +170,35 @@ def _mapped(given: StiffnessMap, tissue: Tissue, geometry: Geometry) -> Distance
     modulus = voxels * PASCALS[given.unit] * of_young
     known = np.isfinite(modulus) & (modulus > 0.0)
     low, high = RANGE
-    odd = np.argwhere(known & ((modulus < low) | (modulus > high)))
+    _refuse_coarse(affine, geometry)
+    numbers = ~np.isnan(modulus) & (modulus != 0.0)
+    odd = np.argwhere(numbers & ((modulus < low) | (modulus > high)))
     odd = odd[_are_near(odd, affine, geometry)]
     if len(odd):
         found = modulus[tuple(odd.T)]
         raise ValueError(
-            f"tissue.stiffness_map.unit: in {given.unit} {len(odd)} of {known.sum()} voxels with a "
-            f"value lie at the organ and have a Young's modulus of {found.min():.3g} to "
+            f"tissue.stiffness_map.unit: in {given.unit} {len(odd)} of {numbers.sum()} voxels with "
+            f"a value lie at the organ and have a Young's modulus of {found.min():.3g} to "
             f"{found.max():.3g} Pa, beyond {low:g} to {high:g}; give the unit of the image, or set "
             "voxels that were not measured to 0"
         )
     inverse = np.asarray(np.linalg.inv(affine), dtype=np.float64)
     offset = geometry.offset
     return _Sampled(np.where(known, modulus, 0.0), known.astype(np.float64), inverse, offset)
+
+
+def _refuse_coarse(affine: Floats, geometry: Geometry) -> None:
+    """ValueError for voxels larger than the organ, as with millimetres that are said to be metres.
+
+    One such voxel would give all of the organ its value.
+    """
+    longest = 1e-3 * float(np.linalg.norm(affine[:3, :3], axis=0).max())
+    extent = float(np.ptp(geometry.mesh.points, axis=0).max())
+    if longest > extent:
+        raise ValueError(
+            f"tissue.stiffness_map.file: voxels {longest:.3g} m long for an organ of {extent:.3g} "
+            "m; correct the unit of length in the header, or the affine"
+        )
 
 
 def _are_near(voxels: Ints, affine: Floats, geometry: Geometry) -> Booleans:

@@ -109,8 +109,12 @@ def _without_blanks(cells: list[str], width: int) -> list[str]:
 def _check_widths(table: Table) -> None:
     for cells, line in zip(table.rows, table.lines, strict=True):
         if len(cells) != len(table.header):
+            first = table.header[0].strip()[:40]
+            remedy = "remove the comment" if first.startswith("#") else "correct the row"
             raise table.fault(
-                line, f"{len(cells)} cells under {len(table.header)} columns; correct the row"
+                line,
+                f"{len(cells)} cells under {len(table.header)} columns, from {first!r} in line "
+                f"{table.header_line} on; {remedy}",
             )
 
 

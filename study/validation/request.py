@@ -51,12 +51,22 @@ class ValidationRequest:
 
 
 def own_comparisons(
-    scene: str | None, folder: Path, overrides: Sequence[str], probe: str | None, progress: Progress
+    scene: str | None,
+    folder: Path,
+    overrides: Sequence[str],
+    probe: str | None,
+    progress: Progress,
+    tell: Callable[[str], None],
 ) -> Iterator[Comparison]:
-    """A scene by name or file beside the measurements in a folder. ValueError if unsuitable."""
+    """A scene by name or file beside the measurements in a folder. ValueError if unsuitable.
+
+    `tell` takes a note on what is in the folder besides.
+    """
     if scene is None or scene in PROBLEMS:
         raise ValueError("--data: give the scene that was measured too, a name or a TOML file")
     data = user_scene.read_folder(folder)
+    if data.unread:
+        tell(f"--data {folder}: not read: {', '.join(data.unread)}; only CSV files are")
     return user_scene.comparisons(read_scene(scene, overrides), data, progress, probe)
 
 

@@ -66,10 +66,10 @@ def read_curve(path: Path) -> Curve:
     """A curve from a CSV file; ValueError naming file, line and column if it is malformed."""
     table = read_table(path)
     if TIME not in map(str.strip, table.header):
+        present = ", ".join(repr(name.strip()) for name in table.header)
         raise table.fault(
             table.header_line,
-            f"the column {TIME} is missing; for a force over depth give the times at which the "
-            "scene's tool has that depth",
+            f"the column {TIME} is missing among {present}; {_missing_time(table.header)}",
         )
     names = _names(table, (TIME, *CURVES, UNCERTAINTY))
     found = [name for name in CURVES if name in names]
@@ -83,6 +83,16 @@ def read_curve(path: Path) -> Curve:
         line = table.lines[int(late[0]) + 1]
         raise table.fault(line, f"{TIME} does not grow; sort the lines by it")
     return Curve(found[0], times, values, _uncertainty(table, names), tuple(table.lines))
+
+
+def _missing_time(header: Sequence[str]) -> str:
+    """What to do about a header without the column of the times."""
+    if len(header) == 1:
+        return "begin with the names of the columns, parted by commas, semicolons or tabs"
+    near = difflib.get_close_matches(TIME, [name.strip().lower() for name in header], 1)
+    if near:
+        return f"name it {TIME}, in seconds"
+    return "for a force over depth give the times at which the scene's tool has that depth"
 
 
 def read_markers(path: Path) -> UserMarkers:
@@ -100,7 +110,11 @@ def _names(table: Table, known: Sequence[str]) -> list[str]:
     for name in names:
         if name not in known:
             near = difflib.get_close_matches(name, [one for one in known if one not in names], 1)
-            what = f"did you mean {near[0]}? Rename it" if near else "rename or remove it"
+            what = (
+                f"did you mean {near[0]}? Convert its numbers to that unit and rename it"
+                if near
+                else "rename or remove it"
+            )
             raise table.fault(
                 table.header_line, f"column {name!r} is none of {', '.join(known)}; {what}"
             )

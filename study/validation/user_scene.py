@@ -37,6 +37,8 @@ class UserData:
 
     curves: dict[str, Curve]
     markers: UserMarkers | None
+    unread: tuple[str, ...] = ()
+    """Names of everything else in the folder."""
 
 
 def read_folder(folder: Path) -> UserData:
@@ -57,7 +59,8 @@ def read_folder(folder: Path) -> UserData:
         if twice:
             raise ValueError(f"--data {folder}: holds {min(twice)} twice; rename one of them")
     markers = read_markers(of_markers[0]) if of_markers else None
-    return UserData({one.stem: read_curve(one) for one in curves}, markers)
+    unread = tuple(one.name for one in shown if one not in files)
+    return UserData({one.stem: read_curve(one) for one in curves}, markers, unread)
 
 
 def comparisons(
