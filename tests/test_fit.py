@@ -175,7 +175,7 @@ def write(path, header, rows):
         ("time_s,displacement_m", ["0,0", "", "1,1", "1,2"], r":5: time_s does not grow"),
         ("time_s,displacement_m", ["0,0", ",", "1,1"], r":3: time_s: the cell is empty"),
         ("time_s,displacement_m,displacement_m", ["0,0,1"] * 3, r":1: .*_m' appears twice"),
-        ("time_s displacement_m", ["0 0"] * 3, r":1: .* parted by commas, semicolons or tabs"),
+        ("time_s displacement_m", ["0 0"] * 3, r":1: .* separated by commas, semicolons or tabs"),
         ("Time_s,displacement_m", ["0,0"] * 3, r":1: .* among 'Time_s', .* name it time_s, in sec"),
         ("# tool,displacement_mm", ["0,0"] * 3, r":1: the column time_s is missing among '# tool'"),
         (

@@ -5,7 +5,7 @@ push, or `force_N`, with which a tool that is moved is pushed; `uncertainty`, in
 curve and one standard uncertainty of each value, if it is known. `markers.csv` has `x_m`, `y_m`,
 `z_m`, where markers were before the load, and `ux_m`, `uy_m`, `uz_m`, how far they had moved when
 it was largest, and `uncertainty`. A column of another name is refused: it may be one of these that
-is misspelt. Columns are parted by commas, or by semicolons or tabs, where decimal commas are read
+is misspelt. Columns are separated by commas, or by semicolons or tabs, where decimal commas are read
 too.
 """
 
@@ -88,7 +88,7 @@ def read_curve(path: Path) -> Curve:
 def _missing_time(header: Sequence[str]) -> str:
     """What to do about a header without the column of the times."""
     if len(header) == 1:
-        return "begin with the names of the columns, parted by commas, semicolons or tabs"
+        return "begin with the names of the columns, separated by commas, semicolons or tabs"
     near = difflib.get_close_matches(TIME, [name.strip().lower() for name in header], 1)
     if near:
         return f"name it {TIME}, in seconds"
