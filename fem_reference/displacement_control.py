@@ -26,6 +26,7 @@ from study.numerics.continuation import (
     EquilibriumPath,
     Increments,
     follow,
+    slow_iterations,
 )
 from study.numerics.factors import has_inertia, symmetric_factors
 
@@ -35,6 +36,7 @@ Booleans = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Norm of the residual relative to that of the load and the reactions."""
 MOST_ITERATIONS = 16
+"""Limit on iterations that leave more than a tenth of the residual."""
 INCREMENTS = Increments(easy=5, smallest=1 / 64)
 SHORTEST_STEP = 1 / 64
 GROWTH = 2.0
@@ -172,7 +174,7 @@ def _newton(body: MixedSolid, loading: Loading, start: _Iterate, factor: float) 
     target, load = factor * loading.prescribed.ravel()[constrained], _load(body, loading, factor)
     residuals: list[float] = []
     failure = NO_EQUILIBRIUM
-    while len(residuals) <= MOST_ITERATIONS:
+    while slow_iterations(residuals) < MOST_ITERATIONS:
         residual, increment = load - body.gradient(w), np.zeros_like(w)
         increment[constrained] = target - w[constrained]
         scale = _scale(body, residual, factor, loading)

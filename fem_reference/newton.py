@@ -27,6 +27,7 @@ from study.numerics.continuation import (
     EquilibriumPath,
     Increments,
     follow,
+    slow_iterations,
 )
 from study.numerics.factors import has_inertia, symmetric_factors
 from study.problem.tissue import Tissue
@@ -37,6 +38,7 @@ TOLERANCE = 1e-8
 """Euclidean norm of the residual relative to that of the load."""
 
 MOST_ITERATIONS = 15
+"""Limit on iterations that leave more than a tenth of the residual."""
 INCREMENTS = Increments(easy=5, smallest=1 / 32, unit="the load")
 
 SHORTEST_STEP = 1 / 64
@@ -140,7 +142,7 @@ def _newton(problem: HyperelasticSolid, start: _Iterate, factor: float) -> _Iter
     load, u = factor * problem.load, start.displacement
     residuals: list[float] = []
     failure = NO_EQUILIBRIUM
-    while len(residuals) <= MOST_ITERATIONS:
+    while slow_iterations(residuals) < MOST_ITERATIONS:
         residual = load - problem.internal_force(u)
         residuals.append(float(np.linalg.norm(residual) / np.linalg.norm(load)))
         factors = symmetric_factors(problem.tangent(u))

@@ -28,6 +28,7 @@ from study.numerics.continuation import (
     EquilibriumPath,
     Increments,
     follow,
+    slow_iterations,
 )
 from study.numerics.factors import has_inertia, symmetric_factors
 
@@ -38,6 +39,7 @@ Booleans = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Norm of the residual relative to that of the load and the reactions."""
 MOST_ITERATIONS = 20
+"""Limit on iterations that leave more than a tenth of the residual."""
 INCREMENTS = Increments(easy=6, smallest=1 / 64)
 SHORTEST_STEP = 1 / 64
 GROWTH = 2.0
@@ -126,7 +128,7 @@ def _newton(lattice: _MixedLattice, start: _Iterate, factor: float) -> _Iterate:
     u, pressure, free = start.u.copy(), start.pressure.copy(), lattice.free
     constrained, residuals = np.flatnonzero(~free), list[float]()
     target, failure = factor * lattice.prescribed.ravel()[constrained], NO_EQUILIBRIUM
-    while len(residuals) <= MOST_ITERATIONS:
+    while slow_iterations(residuals) < MOST_ITERATIONS:
         tangent = lattice.linearised(u)
         residual = lattice.residual(tangent, u, pressure, factor)
         residuals.append(lattice.norm(residual) / lattice.scale(residual, factor))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import pytest
 
-from study.numerics.continuation import Increments, follow
+from study.numerics.continuation import Increments, follow, slow_iterations
 
 BY = Increments(easy=2, smallest=1 / 8, unit="the load")
 
@@ -65,3 +65,10 @@ def test_a_path_ends_at_the_last_equilibrium_and_says_where_it_failed(sign):
     assert [factor for factor, _ in found.states] == [0.5 * sign]
     assert found.reached == 0.5 * sign
     assert found.failure == f"unstable at {sign * 0.625:.4g} times the load"
+
+
+def test_only_iterations_that_leave_more_than_a_tenth_count_to_a_limit():
+    assert slow_iterations([]) == 0
+    assert slow_iterations([1.0]) == 0
+    assert slow_iterations([1.0, 0.05, 1e-3, 1e-7]) == 0
+    assert slow_iterations([1.0, 0.5, 2.0, 0.01, 0.0099]) == 3

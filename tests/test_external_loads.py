@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msm import dead_load
-from msm.assembly import Assembly, with_external_loads
+from msm import dead_load, unloading
+from msm.assembly import Assembly, arrays, with_external_loads
+from msm.displacement_control import _MixedLattice
 from msm.integrators import INTEGRATORS
 from msm.stepper import LatticeStepper
 from study.models.lattice import requested_step
@@ -106,6 +107,76 @@ def test_the_unloaded_shape_of_a_soft_block_is_found_in_increments():
 def test_a_load_without_an_unloaded_shape_is_refused_with_what_was_reached():
     with pytest.raises(UnfinishedError, match=r"gravity\.given.* but for \d+ % of the load"):
         stepper_of(prepared(*SOFT, "tissue.youngs_modulus=400 Pa"))
+
+
+SIDEWAYS = (
+    'organ.size=["60 mm", "60 mm", "40 mm"]',
+    "support={side='left', depth='1 mm', stiffness='20 MPa/m'}",
+    "tissue={youngs_modulus='1 kPa', poisson_ratio=0.45, density='1054 kg/m^3'}",
+    "lattice.spacing=20 mm",
+    "lattice.volume_term=true",
+    "gravity.given=loaded",
+)
+"""A soft block that sticks out of a wall; its unloaded shape is bent upwards."""
+
+
+def given_network(*overrides):
+    """Law, network and dead load of a scene, and its foundation."""
+    made = prepared(*overrides)
+    material = made.springs.material
+    net = arrays(made.assembly, material)
+    dead = made.assembly.external_loads.dead
+    return material.law, net, dead, dead_load._foundation(net)
+
+
+@pytest.mark.parametrize("volume_term", ["false", "true"])
+def test_newtons_method_for_the_unloaded_shape_has_the_exact_derivative(volume_term):
+    law, net, dead, foundation = given_network(*SIDEWAYS, f"lattice.volume_term={volume_term}")
+    problem = unloading._InverseProblem(law, net, dead, foundation, unloading._independent(net))
+    random = np.random.default_rng(3)
+    x, d = (random.normal(0.0, 1e-3, problem.spread.shape[1]) for _ in range(2))
+
+    def residual(step):
+        return problem.residual((problem.spread @ (x + step * d)).reshape(-1, 3), 1.0)
+
+    slope = (residual(1e-4) - residual(-1e-4)) / 2e-4
+    tangent = problem.tangent((problem.spread @ x).reshape(-1, 3))
+    assert tangent @ d == pytest.approx(slope, rel=1e-5, abs=1e-6 * np.abs(slope).max())
+
+
+def test_newtons_method_finds_the_unloaded_shape_that_mixing_finds():
+    law, net, dead, foundation = given_network(*SIDEWAYS)
+    mixed = dead_load._by_mixing(law, net, 0.1 * dead)
+    found = unloading.unload(law, net, 0.1 * dead, foundation)
+    assert (mixed.failure, found.failure) == ("", "")
+    assert np.abs(found.shape).max() > 5e-3
+    assert found.shape == pytest.approx(mixed.shape, abs=1e-5 * np.abs(found.shape).max())
+
+
+def test_the_unloaded_shape_ends_where_the_given_one_loses_its_stability():
+    """By the lowest eigenvalue of the given shape's stiffness, which changes sign there."""
+    law, net, dead, foundation = given_network(*SIDEWAYS)
+    found = unloading.unload(law, net, dead, foundation)
+    assert found.failure.startswith("the given shape would be an unstable equilibrium")
+    problem = unloading._InverseProblem(law, net, dead, foundation, unloading._independent(net))
+    beyond = unloading._newton(problem, found, found.factor + 1.0 / 32.0)
+    assert beyond.residuals[-1] < 1e-9  # in balance, but
+    assert lowest_stiffness(law, net, found.shape) > 0.0 > lowest_stiffness(law, net, beyond.shape)
+    mixed = dead_load._by_mixing(law, net, dead)
+    assert mixed.factor < found.factor < 1.0
+
+
+def lowest_stiffness(law, net, shape):
+    """Lowest eigenvalue [N/m] of the stiffness in the given shape, from an unloaded one."""
+    unloaded = unloading.from_shape(net, shape)
+    lattice = _MixedLattice(law, unloaded, np.full_like(shape, np.nan))
+    at = lattice.linearised(np.zeros_like(shape))
+    return np.linalg.eigvalsh(lattice.matrix(at, unloaded.bulk * at.swelling).toarray())[0]
+
+
+def test_a_refusal_of_a_loaded_shape_tells_why():
+    with pytest.raises(UnfinishedError, match=r"\d+ % of the load \(the given shape would be"):
+        stepper_of(prepared(*SIDEWAYS))
 
 
 def test_a_missing_part_of_the_foundation_is_seen(monkeypatch):

@@ -10,7 +10,6 @@ from msm import octree
 from msm.assembly import Material, arrays, assemble, assemble_graded
 from msm.calibration import reference_stiffness
 from msm.damping import UNDAMPED, NodalDamping
-from msm.dead_load import from_shape
 from msm.forces import internal_forces
 from msm.graded import build
 from msm.grid import grids_of
@@ -23,6 +22,7 @@ from msm.springs import Springs, connect
 from msm.stability import critical_time_step, largest_frequency
 from msm.statics import static_displacement, stiffness_at_rest
 from msm.ties import hanging_nodes
+from msm.unloading import from_shape
 from msm.volume import volume_term
 from study.organ.occupancy import ImplicitBody
 from study.scene.file import read_scene

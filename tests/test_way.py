@@ -43,7 +43,7 @@ def test_a_tool_moved_into_what_cannot_move_is_refused(overrides):
         ('support={kind="clamped", side="inferior", depth="1 mm"}',),
         (TOP % "foundation",),
         ("tool.displacement=-1 mm", TOP % "clamped"),
-        ("tool.clearance=4 mm", TOP % "clamped"),
+        ("tool.clearance=4 mm", "gravity.acceleration=9.81 m/s^2", TOP % "clamped"),
         # Beside a plane of symmetry the surface slides down with the tool.
         (
             "tool.shape=plate",
@@ -57,7 +57,15 @@ def test_one_that_meets_what_can_move_is_not(overrides):
 
 def test_a_tool_that_never_comes_to_the_organ_is_told():
     assert posed().of_tools == ()
-    (said,) = posed("tool.clearance=5 mm").notes[-1:]
+    off = "tool.clearance=5 mm", "gravity.acceleration=9.81 m/s^2"
+    (said,) = posed(*off).notes[-1:]
     assert said.startswith("tool: stays off the organ as it is given by 2 mm")
-    assert np.isclose(posed("tool.clearance=5 mm").rigid_tools[0].tip[2], 0.045)
+    assert np.isclose(posed(*off).rigid_tools[0].tip[2], 0.045)
     assert len(posed("tool.displacement=-1 mm").of_tools) == 1
+
+
+def test_a_scene_in_which_no_tool_comes_to_the_organ_is_refused():
+    """Its motion would be rounding, and scores of that."""
+    with pytest.raises(ValueError, match=r"tool\.clearance: 3 mm is no less than the 3 mm"):
+        posed("tool.clearance=3 mm")
+    assert posed("tool.clearance=2.9 mm").of_tools == ()

@@ -69,12 +69,23 @@ def planned_tools() -> Iterator[tuple[str, str]]:
     quantities = grouped(lines, lambda line: line["quantity"])
     yield "planned-tools-scenes", str(len({one["scene"] for one in lines}))
     for quantity, of in quantities.items():
-        by_two = ratios(of, "found", over="by_two")
         if quantity != "at all points":
             for name, factor in STATED:
-                covered = f"{sum(one <= factor for one in by_two)} of {len(by_two)}"
+                kept = [_is_covered(one, factor, of_force=quantity == "force") for one in of]
+                covered = f"{sum(kept)} of {len(kept)}"
                 yield f"spacing-{name}-{quantity.replace(' ', '-')}", covered
     yield "planned-tools", table(TOOLS_HEAD, [_tools(*one) for one in quantities.items()])
+
+
+def _is_covered(line: Line, factor: float, *, of_force: bool) -> bool:
+    """Whether the difference of two lattices, with a safety factor, covers the error found.
+
+    A force errs by a factor: both are relative to the lattice's own force, which is too large.
+    """
+    found, by_two = float(line["found"]), float(line["by_two"])
+    if of_force:
+        return found / (1.0 + found) <= 1.0 - (1.0 + by_two) ** -factor
+    return found <= factor * by_two
 
 
 def _tools(quantity: str, lines: list[Line]) -> list[str]:

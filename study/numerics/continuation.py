@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 NO_EQUILIBRIUM = "no equilibrium found"
@@ -28,6 +29,9 @@ class Iterate(Protocol):
     def failure(self) -> str:
         """Why it is no equilibrium; empty if it is one."""
 
+
+FAST = 0.1
+"""An iteration that leaves no more than this share of the residual does not count to a limit."""
 
 T = TypeVar("T", bound=Iterate)
 S = TypeVar("S")
@@ -61,6 +65,14 @@ class EquilibriumPath(Generic[S]):
     def converged(self) -> bool:
         """Whether there is a state at every requested load factor."""
         return not self.failure
+
+
+def slow_iterations(residuals: Sequence[float]) -> int:
+    """Number of iterations that left more than FAST of the residual.
+
+    A limit on them ends a search that makes no progress, but none that is converging.
+    """
+    return sum(after > FAST * before for before, after in pairwise(residuals))
 
 
 def follow(

@@ -182,9 +182,10 @@ class SpacingErrors:
     """Estimated discretisation errors of a lattice, from the same motion on a coarser one.
 
     A grid convergence index from a lattice of `coarser_m`, with an assumed `order` and a
-    `safety_factor`: relative L2 of the displacement by control point and of the force of each moved
-    tool over time, and that of the largest force, which is not taken smaller, since single numbers
-    of two lattices may coincide. The model error of springs at any spacing is not included.
+    `safety_factor`; of a force that falls with refinement, the index of its logarithm. Relative L2
+    of the displacement by control point and of the force of each moved tool over time, and that of
+    the largest force, which is not taken smaller, since single numbers of two lattices may
+    coincide. The model error of springs at any spacing is not included.
     """
 
     coarser_m: float

@@ -81,6 +81,7 @@ def contradictions(scene: Scene, table: Table) -> Iterator[str]:
     for number, tool in enumerate(scene.tools, 1):
         name = "tool" if number == 1 else f"tool.{number}"
         yield from _tool_contradictions(scene, name, tool)
+    yield from _idle_contradictions(scene)
     yield from _gravity_contradictions(table)
     yield from _support_contradictions(scene)
     yield from _inclusion_contradictions(scene)
@@ -328,6 +329,18 @@ def _path_contradictions(name: str, path: tuple[Waypoint, ...]) -> Iterator[str]
         yield f"{name}.path: give each point either travel or offset"
     elif path[0].travel or any(path[0].offset or ()):
         yield f"{name}.path: starts elsewhere than at its place; begin with 0 mm"
+
+
+def _idle_contradictions(scene: Scene) -> Iterator[str]:
+    """Nothing but rigid tools that all stay within their clearance: results would be rounding."""
+    if scene.weight or scene.gravity.acceleration:
+        return
+    if all(0.0 < abs(one.displacement or 0.0) <= one.clearance for one in scene.tools):
+        far, moved = (1e3 * x for x in (scene.tool.clearance, abs(scene.tool.displacement or 0.0)))
+        yield (
+            f"tool.clearance: {far:.4g} mm is no less than the {moved:.4g} mm that the tool moves, "
+            "and nothing else loads the organ; reduce it or enlarge tool.displacement"
+        )
 
 
 def _gravity_contradictions(table: Table) -> Iterator[str]:
