@@ -84,7 +84,7 @@ def _is_covered(line: Line, factor: float, *, of_force: bool) -> bool:
     """
     found, by_two = float(line["found"]), float(line["by_two"])
     if of_force:
-        return found / (1.0 + found) <= 1.0 - (1.0 + by_two) ** -factor
+        return found / (1.0 + found) <= 1.0 - 1.0 / float((1.0 + by_two) ** factor)
     return found <= factor * by_two
 
 

@@ -5,8 +5,8 @@ push, or `force_N`, with which a tool that is moved is pushed; `uncertainty`, in
 curve and one standard uncertainty of each value, if it is known. `markers.csv` has `x_m`, `y_m`,
 `z_m`, where markers were before the load, and `ux_m`, `uy_m`, `uz_m`, how far they had moved when
 it was largest, and `uncertainty`. A column of another name is refused: it may be one of these that
-is misspelt. Columns are separated by commas, or by semicolons or tabs, where decimal commas are read
-too.
+is misspelt. Columns are separated by commas, or by semicolons or tabs, where decimal commas are
+read too.
 """
 
 from __future__ import annotations
