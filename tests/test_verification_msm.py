@@ -50,7 +50,10 @@ def elastic_energy(volume, strain, nu=0.25):
 @pytest.mark.parametrize(("flexion", "body_diagonals"), MIXES)
 @pytest.mark.parametrize("make", [block_lattice, ball_lattice])
 def test_uniform_strain_stores_the_energy_of_e_and_a_quarter(make, flexion, body_diagonals, rng):
-    """E and nu are exact for every family mix, on a block with a free surface and on cut cells."""
+    """E and nu are exact for every family mix, on a block with a free surface and on cut cells.
+
+    So are they where each cell has a stiffness of its own.
+    """
     lattice = make()
     springs = connect(lattice, flexion, body_diagonals)
     volume = node_volumes(lattice).sum()
@@ -59,6 +62,10 @@ def test_uniform_strain_stores_the_energy_of_e_and_a_quarter(make, flexion, body
         strain = strain + strain.T
         expected = elastic_energy(volume, strain)
         assert strain_energy(lattice, springs, strain) == pytest.approx(expected, rel=1e-12)
+        relative = rng.uniform(0.2, 5.0, len(lattice.cells))
+        uneven = connect(lattice, flexion, body_diagonals, relative)
+        expected = elastic_energy(H**3 * lattice.fill @ relative, strain)
+        assert strain_energy(lattice, uneven, strain) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("flexion", "body_diagonals"), MIXES)
