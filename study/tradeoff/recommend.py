@@ -59,8 +59,8 @@ ELEMENTS = 0.5
 On the built-in liver 0.75 has a field error of 4 %, 0.6 of 2 %, this of 0.4 %, in 30, 61 and 71 s
 of processor time for all of `recommend`.
 """
-SPREAD = 2.8
-"""Standard deviations included in a prediction: Student's t at 95 % for a fit to six points."""
+LEVEL = 0.95
+"""Share of fits whose spread includes the error, by Student's t for their number of points."""
 FEWEST = 3
 SINGLE = "single"
 BESIDE = (2.0, 1.5, 1.0)
@@ -216,6 +216,8 @@ def _measured_promises(
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
     """Least squares in logarithms. ValueError if too few errors are resolved."""
+    from scipy.special import stdtrit
+
     if len(found) < FEWEST:
         raise ValueError(
             f"only {len(found)} of the spacings have an error above the reference's own "
@@ -223,11 +225,10 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
             "reference.element_size"
         )
     order, level = np.polyfit(np.log(spacings), np.log(found), 1)
-    left = np.log(found) - np.polyval([order, level], np.log(spacings))
-    deviation = float(np.sqrt((left**2).sum() / (len(found) - 2)))
-    return Fit(
-        float(np.exp(level)), float(order), float(np.expm1(SPREAD * deviation)), reference_error
-    )
+    left, free = np.log(found) - np.polyval([order, level], np.log(spacings)), len(found) - 2
+    deviation = np.sqrt((left**2).sum() / free)
+    spread = np.expm1(stdtrit(free, 0.5 * (1.0 + LEVEL)) * deviation)
+    return Fit(float(np.exp(level)), float(order), float(spread), reference_error)
 
 
 def _configuration(scene: Scene, spacing: float, precision: str = DOUBLE) -> Configuration:
