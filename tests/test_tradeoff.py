@@ -269,6 +269,9 @@ def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
     found = frame(25.0, 1e-3, np.full(20, 1e-4))
     assert (found.substeps, found.slow) == (40, None)
     assert found.wall == pytest.approx(4e-3)
+    assert found.in_time
+    assert not frame(25.0, 1e-3, np.full(20, 1.1e-3)).in_time
+    assert frame(25.0, 1e-3, np.full(40, 1e-4)).slow == pytest.approx(4e-3)
 
 
 def observed(**values):
