@@ -118,7 +118,7 @@ def test_the_unknowns_of_an_organ_are_those_that_are_drawn(tmp_path):
     assert (tmp_path / "now.csv").read_text(encoding="utf-8") == before
 
 
-def test_the_ofnearest_to_table_iii_are_those_of_the_design_and_as_near_as_stated():
+def test_the_draws_nearest_to_table_iii_are_those_of_the_design_and_as_near_as_stated():
     found = read_table(DATA / request.TABLE_III, rows.TableThree)
     found = [row._replace(draw=int(row.draw)) for row in found]
     asked = request.RobustnessRequest()

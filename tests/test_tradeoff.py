@@ -10,6 +10,7 @@ import pytest
 
 from fem_reference.observation import evaluation
 from fem_reference.subspace import transitions
+from reports import tradeoff as reports_tradeoff
 from study.commands import EXIT_BAD_INPUT, EXIT_FAILED_CHECK, app
 from study.models import lattice
 from study.models.model import Stepper
@@ -31,7 +32,7 @@ from study.tradeoff.large_displacements import with_large_displacements
 from study.tradeoff.observation import Observed
 from study.tradeoff.prediction import Prediction, added_by_single, fitted
 from study.tradeoff.problem import SAMPLING, plain, sampled
-from study.tradeoff.rates import Frame, frame
+from study.tradeoff.rates import RATES, Frame, frame
 from study.tradeoff.recommend import FITTED
 from study.tradeoff.recommendation import Recommended, recommended_scene, table_of
 from study.tradeoff.reference import ReferenceSolution
@@ -141,6 +142,22 @@ def test_the_table_is_read_back_with_all_columns(found, tmp_path):
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == table.COLUMNS
     assert [row["status"] for row in rows] == [one.errors.status for one in found.entries]
+
+
+def test_a_row_has_the_cost_of_its_steps_in_the_units_of_its_columns(tmp_path):
+    """Turns of 0.1, 0.2 and 0.3 ms a step, of which one of 1 ms is made."""
+    timing = Timing(np.repeat([[1e-4], [2e-4], [3e-4]], 40, axis=1), np.array([1e-4, 2e-4, 9e-4]))
+    one = Configuration("springs", {"spacing": 0.01})
+    entry = Entry(one, Errors("resolved", field=0.05), 0.01, Cost(12, 0.5, 1e-3, timing))
+    table.write([entry], tmp_path / "tradeoff.csv")
+    with (tmp_path / "tradeoff.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    numbers = {"unknowns": 12, "step_s": 1e-3, "setup_s": 0.5, "step_us": 200, "bare_step_us": 200}
+    numbers |= {"wall_per_s_q1": 0.15, "wall_per_s": 0.2, "wall_per_s_q3": 0.25}
+    numbers |= {"substeps_25hz": 40, "substeps_60hz": 17, "substeps_1khz": 1}
+    numbers |= {"frame_ms_1khz": 0.2, "slow_frame_ms_1khz": 0.3, "field_error_bar": 0.01}
+    assert {name: float(row[name]) for name in numbers} == pytest.approx(numbers)
+    assert reports_tradeoff.rates(row) == RATES
 
 
 def test_every_contender_enters_with_settings_of_its_own():
@@ -255,6 +272,9 @@ def test_a_frame_of_more_steps_than_were_timed_has_no_slow_one():
     found = frame(25.0, 1e-3, np.full(20, 1e-4))
     assert (found.substeps, found.slow) == (40, None)
     assert found.wall == pytest.approx(4e-3)
+    assert found.in_time
+    assert not frame(25.0, 1e-3, np.full(20, 1.1e-3)).in_time
+    assert frame(25.0, 1e-3, np.full(40, 1e-4)).slow == pytest.approx(4e-3)
 
 
 def observed(**values):
@@ -369,6 +389,16 @@ def test_a_fit_gives_back_the_order_and_its_spread_is_that_of_the_errors():
     assert not exact.prediction(0.01).contains(2 * 5e-3)
     with pytest.raises(ValueError, match=r"only 2.*lattice\.spacing"):
         fitted(h[:2], h[:2], 0.004)
+
+
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_a_fit_holds_the_curve_of_scattered_errors_however_few_they_are(count):
+    """At least in 95 % of fits, within the spacings; of 1000, less two standard deviations."""
+    rng = np.random.default_rng(count)
+    h = 0.01 * np.array(FITTED[:count])
+    middle = float(np.sqrt(h[0] * h[-1]))
+    fits = (fitted(h, h * np.exp(0.05 * rng.normal(size=count)), 0.0) for _ in range(1000))
+    assert np.mean([fit.prediction(middle).contains(middle) for fit in fits]) > 0.936
 
 
 def candidate(error, wall, *, in_time=True, single=False, spacing=0.01):

@@ -18,8 +18,8 @@ from study.tradeoff.errors import errors
 from study.tradeoff.observation import Observed
 from study.tradeoff.selection import SINGLE
 
-SPREAD = 2.8
-"""Standard deviations included in a prediction: Student's t at 95 % for a fit to six points."""
+LEVEL = 0.95
+"""Share of fits whose spread includes the error, by Student's t for their number of points."""
 FEWEST = 3
 
 
@@ -92,6 +92,8 @@ def _measured_predictions(
 
 def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: float) -> Fit:
     """Least squares in logarithms. ValueError if too few errors are resolved."""
+    from scipy.special import stdtrit
+
     if len(found) < FEWEST:
         raise ValueError(
             f"only {len(found)} of the spacings have an error above the reference's own "
@@ -99,11 +101,10 @@ def fitted(spacings: Sequence[float], found: Sequence[float], reference_error: f
             "reference.element_size"
         )
     order, level = np.polyfit(np.log(spacings), np.log(found), 1)
-    left = np.log(found) - np.polyval([order, level], np.log(spacings))
-    deviation = float(np.sqrt((left**2).sum() / (len(found) - 2)))
-    return Fit(
-        float(np.exp(level)), float(order), float(np.expm1(SPREAD * deviation)), reference_error
-    )
+    left, free = np.log(found) - np.polyval([order, level], np.log(spacings)), len(found) - 2
+    deviation = np.sqrt((left**2).sum() / free)
+    spread = np.expm1(stdtrit(free, 0.5 * (1.0 + LEVEL)) * deviation)
+    return Fit(float(np.exp(level)), float(order), float(spread), reference_error)
 
 
 def added_by_single(outcomes: Sequence[Outcome], given: SceneProblem) -> dict[str, float]:
