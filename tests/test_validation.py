@@ -214,6 +214,12 @@ def test_tables_hold_every_comparison(tmp_path):
     assert "1 of 2 predictions agree" in text
 
 
+def test_without_an_uncertainty_no_agreement_is_counted():
+    text = "\n".join(table.lines([compared(uncertainty=math.nan)]))
+    assert "predictions agree" not in text
+    assert "agreement is not judged: no measurement has a known uncertainty" in text
+
+
 def test_names_that_are_none_are_refused():
     with pytest.raises(ValueError, match="cylinders, cantilever, cube"):
         ValidationRequest(names=("sphere",))
