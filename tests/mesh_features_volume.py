@@ -478,7 +478,7 @@ _GMSH = [
     ),
     _gmsh(
         "format 4: digits grouped by underscores", "refused",
-        lambda: numbered_4(True).replace(b"\n1 1 ", b"\n1 0_1 "), "`0_1` is no number",
+        lambda: numbered_4(True).replace(b"\n1 1 ", b"\n1 0_1 "), "`0_1` is no whole number",
     ),
     _gmsh(
         "format 3 and others", "refused",

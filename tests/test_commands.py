@@ -153,6 +153,8 @@ def test_the_report_is_made_again_byte_for_byte(paper_folder):
         (["estimate", "--hcv", "9", "--samples", "3"], "samples = 3"),
         (["estimate", "--hcv", "9", "--samples", "2000000"], "from 11 to 1000000"),
         (["estimate", "--hcv", "9", "--samples", "101.4"], "'101.4' is no whole number"),
+        (["estimate", "--hcv", "1_0"], "--hcv: '1_0' is no plain number"),
+        (["estimate", "--hcv", "9,5"], "'9,5' is no plain number; write for example 9.5"),
         (["run", "paper", "--workers", "1.5"], "--workers: '1.5' is no whole number"),
         (["tradeoff", "block", "--workers", "1.5", "--dry-run"], "'1.5' is no whole number"),
         (["cohort", "--patients", "500.2"], "--patients: '500.2' is no whole number"),

@@ -361,7 +361,7 @@ def test_a_rule_in_words(rule, text):
 def test_the_audit_of_the_liver_in_words():
     liver = liver_system(LiverSettings(knowledge="severity"))
     lines = audit_lines(audit(liver), liver, examples=1)
-    assert lines[0].startswith("liver-R1: 247 rules on the sets 2 of hcv, 3 of hbv")
+    assert lines[0].startswith("liver-R1: 247 rules on sets: 2 of hcv, 3 of hbv")
     text = "\n".join(lines)
     assert "12 of 247 rules repeat an earlier rule" in text
     assert "and 11 more" in text

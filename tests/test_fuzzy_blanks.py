@@ -157,3 +157,9 @@ def test_a_row_of_blanks_between_others_is_not_lost(table):
     assert found[0] < found[2]
     with pytest.raises(ValueError, match=r"in\.csv:3: .*no aetiology"):
         asked(path, "mamdani", "silent")
+
+
+def test_a_column_that_is_missing_is_asked_for_with_blank_cells(tmp_path):
+    (tmp_path / "in.csv").write_text("hcv,nafld\n9.5,7\n")
+    with pytest.raises(ValueError, match=r"no column 'hbv' .* blank cells where there is no read"):
+        asked(tmp_path / "in.csv", "sugeno", "normal")

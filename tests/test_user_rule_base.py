@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fuzzy.systems.conversion import sugeno_of
 from fuzzy.systems.files import write_rule_base
 from fuzzy.systems.inference import infer
 from fuzzy.systems.options import InferenceOptions
@@ -111,6 +112,12 @@ def test_what_does_not_fit_is_refused(inputs, changes, told, tmp_path):
         changes = ("fuzzy.unit=Pa", "fuzzy.inputs={speed = 0.5, age = 0}")
     with pytest.raises(ValueError, match=told):
         run_study(scene_of(file, *changes, inputs=inputs))
+
+
+def test_a_sugeno_system_asks_for_that_system_alone(tmp_path):
+    write_rule_base(sugeno_of(SYSTEM), tmp_path / "own.fis")
+    with pytest.raises(ValueError, match=r"^fuzzy\.systems: .* evaluated as sugeno: name no other"):
+        run_study(scene_of(tmp_path / "own.fis"))
 
 
 def test_readings_without_a_system_are_refused():

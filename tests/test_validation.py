@@ -240,6 +240,12 @@ def test_lines_of_many_cases_are_their_median_and_range_in_per_cent():
     assert cells[2:] == ["10 to 10 N", "+10.0 % (-10 to +30)", "5.0 %", "1 %", "3 of 5 agree"]
 
 
+def test_without_an_uncertainty_no_agreement_is_counted():
+    text = "\n".join(table.lines([compared(uncertainty=math.nan)]))
+    assert "predictions agree" not in text
+    assert "agreement is not judged: no measurement has a known uncertainty" in text
+
+
 def test_names_that_are_none_are_refused():
     with pytest.raises(ValueError, match="cylinders, cantilever, cube"):
         ValidationRequest(names=("sphere",))

@@ -102,7 +102,7 @@ def audit_lines(found: Audit, system: FuzzySystem, examples: int = 3) -> tuple[s
 
 def _headline(system: FuzzySystem) -> str:
     counts = ", ".join(f"{len(variable.sets)} of {variable.name}" for variable in system.inputs)
-    return f"{system.name}: {len(system.rules)} rules on the sets {counts}"
+    return f"{system.name}: {len(system.rules)} rules on sets: {counts}"
 
 
 def _pairs(found: Sequence[Pair], system: FuzzySystem, examples: int, what: str) -> Iterator[str]:

@@ -37,8 +37,8 @@ def check_kind(system: FuzzySystem, kind: str) -> None:
         raise ValueError(f"system {kind!r}: use one of {', '.join(SYSTEMS)}")
     if system.is_sugeno and kind != "sugeno":
         raise ValueError(
-            f"{system.name}: its consequents are constants, so it can only be evaluated as sugeno; "
-            f"give its output membership functions for {kind}"
+            f"{system.name}: its consequents are constants, so it can only be evaluated as sugeno: "
+            f"name no other system, or give its output membership functions for {kind}"
         )
     if kind == "interval-type-2":
         mamdani.require_centroid_of_union(system, kind)

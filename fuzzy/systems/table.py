@@ -71,7 +71,8 @@ def evaluate_table(
     table = read_table(csv_in)
     added = (VALUE, *BOUNDS) if kind == "interval-type-2" else (VALUE,)
     _check_header(table, added)
-    X = _readings(table, system, blanks=blanks is not None)
+    columns = _input_columns(table, system, blanks=blanks is not None)
+    X = _readings(table, columns, blanks=blanks is not None)
     _check_plausible(X, table, system, plausible, unit)
     answers = np.empty((len(X), len(added)))
     notes = [] if blanks is None else _on_blanks(X, table, system, blanks)
@@ -83,7 +84,7 @@ def evaluate_table(
             raise TableError(f"{table.file}: {_with_lines(str(error), part, system)}") from error
         answers[group.rows] = _columns(inferred)
         notes += [_with_lines(note, part, system) for note in inferred.notes]
-    point = "," if decimal_commas(table, _input_columns(table, system)) else "."
+    point = "," if decimal_commas(table, columns) else "."
     texts = ([repr(x).replace(".", point) for x in row] for row in answers.tolist())
     rows = (cells + answer for cells, answer in zip(table.rows, texts, strict=True))
     write_table(csv_out, [*table.header, *added], rows, table.delimiter)
@@ -140,7 +141,8 @@ def read_readings(path: Path, system: FuzzySystem, *, blanks: bool = False) -> A
 
     With `blanks`, NaN where there is none.
     """
-    return _readings(read_table(path), system, blanks=blanks)
+    table = read_table(path)
+    return _readings(table, _input_columns(table, system, blanks=blanks), blanks=blanks)
 
 
 def _check_header(table: Table, added: Sequence[str]) -> None:
@@ -156,10 +158,9 @@ def _check_header(table: Table, added: Sequence[str]) -> None:
             )
 
 
-def _readings(table: Table, system: FuzzySystem, *, blanks: bool) -> Array:
-    """The columns of the inputs as numbers, shape (rows, inputs); NaN where blank, if allowed."""
+def _readings(table: Table, columns: list[int], *, blanks: bool) -> Array:
+    """The columns as numbers, shape (rows, inputs); NaN where blank, if allowed."""
     names = [name.strip() for name in table.header]
-    columns = _input_columns(table, system)
     commas = decimal_commas(table, columns)
     return np.array(
         [
@@ -174,20 +175,21 @@ def _readings(table: Table, system: FuzzySystem, *, blanks: bool) -> Array:
     )
 
 
-def _input_columns(table: Table, system: FuzzySystem) -> list[int]:
+def _input_columns(table: Table, system: FuzzySystem, *, blanks: bool) -> list[int]:
     names = [name.strip() for name in table.header]
     inputs = [variable.name for variable in system.inputs]
-    return [_column(name, names, inputs, table) for name in inputs]
+    add = "add it, with blank cells where there is no reading" if blanks else "add it"
+    return [_column(name, names, inputs, table, add) for name in inputs]
 
 
-def _column(name: str, names: list[str], inputs: list[str], table: Table) -> int:
+def _column(name: str, names: list[str], inputs: list[str], table: Table, add: str) -> int:
     if name.strip() in names:
         return names.index(name.strip())
     # Never another input's column: two diseases may have names alike.
     folded = {present.casefold(): present for present in names if present not in inputs}
     longer = [one for one in folded if re.match(rf"{re.escape(name.casefold())}[\W_]", one)]
     closest = longer or difflib.get_close_matches(name.casefold(), folded, 1)  # "hcv [kPa]"
-    hint = f"; did you mean {folded[closest[0]]!r}? Rename it" if closest else "; add it"
+    hint = f"; did you mean {folded[closest[0]]!r}? Rename it" if closest else f"; {add}"
     present = ", ".join(repr(one) for one in names)
     raise table.fault(table.header_line, f"no column {name!r} among {present}{hint}")
 

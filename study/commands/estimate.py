@@ -11,6 +11,7 @@ from study.commands.flags import (
     AsJson,
     Inference,
     LiverReading,
+    NumberOrNone,
     Switch,
     WholeOrNone,
 )
@@ -19,11 +20,11 @@ from study.commands.flags import given as given_flags
 
 def estimate(
     *,
-    hcv: float | None = None,
-    hbv: float | None = None,
-    ald: float | None = None,
-    cld: float | None = None,
-    nafld: float | None = None,
+    hcv: NumberOrNone = None,
+    hbv: NumberOrNone = None,
+    ald: NumberOrNone = None,
+    cld: NumberOrNone = None,
+    nafld: NumberOrNone = None,
     inputs: Path | None = None,
     rule_base: Path | None = None,
     out: Path | None = None,

@@ -27,6 +27,19 @@ def _whole(_: object, tokens: Sequence[Token]) -> int:
     return int(text)
 
 
+def _number(_: object, tokens: Sequence[Token]) -> float:
+    """The number of a flag, which cyclopts would take from 1_0 too."""
+    text = tokens[0].value
+    try:
+        value = float(text)
+    except ValueError:
+        value = None
+    if value is None or "_" in text:
+        raise ValueError(f"{text!r} is no plain number; write for example 9.5, without a unit")
+    return value
+
+
+NumberOrNone = Annotated[float | None, Parameter(converter=_number)]
 Whole = Annotated[int, Parameter(converter=_whole)]
 WholeOrNone = Annotated[int | None, Parameter(converter=_whole)]
 

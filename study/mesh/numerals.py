@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from study.mesh.kinds import MeshError
-from study.mesh.text import refuse_grouped
+from study.mesh.text import numbers_of
 
 
 def read_numbers(stream: BytesIO, dtype: DTypeLike, count: int, binary: bool) -> NDArray[Any]:
@@ -39,11 +39,7 @@ def _text(stream: BytesIO, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
         words += line.split()
     if len(words) != count:
         raise MeshError(_cut_off(count, len(words)))
-    refuse_grouped(words)
-    try:
-        return np.array(words, dtype=bytes).astype(dtype)
-    except (ValueError, OverflowError) as error:
-        raise MeshError(f"{count} numbers are announced, but {error}") from None
+    return numbers_of(words, dtype)
 
 
 def _cut_off(announced: int, found: int) -> str:

@@ -87,7 +87,7 @@ def _statements(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
 
 def _position(number: int, words: list[str]) -> list[str]:
     """Three coordinates, then a weight, a colour or both: five numbers are one too few or many."""
-    if len(words) == 5:
+    if len(words) == 5 or len(words) > 7:
         raise MeshError(
             f"line {number}: `{' '.join(words)[:60]}` is no position: it has 3 numbers, 4 with a "
             "weight, 6 with a colour: damaged, export it again"

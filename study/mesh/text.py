@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from study.mesh.kinds import FloatArray, MeshError
 
@@ -66,11 +69,38 @@ def refuse_surplus(lines: Sequence[NumberedLine], count: int, what: str) -> None
             )
 
 
-def refuse_grouped(words: Iterable[bytes]) -> None:
-    """MeshError for the first word with an underscore, which NumPy would skip within a number."""
-    for word in words:
-        if b"_" in word:
-            raise MeshError(f"`{word.decode('latin-1')[:40]}` is no number")
+def numbers_of(words: Sequence[bytes], dtype: DTypeLike) -> NDArray[Any]:
+    """Words as numbers of a type, shape (words,).
+
+    Raises
+    ------
+    MeshError
+        Naming the first word that is none; with an underscore it is none, though NumPy skips that.
+    """
+    kind = np.dtype(dtype)
+    if not any(b"_" in word for word in words):
+        with suppress(ValueError, OverflowError):
+            return np.array(words, dtype=bytes).astype(kind) if words else np.empty(0, kind)
+    word = next((one for one in words if not _fits(one, kind)), b"")
+    what = "number" if kind.kind == "f" else f"whole number ({kind.name})"
+    raise MeshError(f"`{word.decode('latin-1')[:40]}` is no {what}")
+
+
+def _fits(word: bytes, kind: np.dtype[Any]) -> bool:
+    try:
+        np.array([word], dtype=bytes).astype(kind)
+    except (ValueError, OverflowError):
+        return False
+    return b"_" not in word
+
+
+def whole_numbers(found: NDArray[Any], what: str) -> NDArray[np.int64]:
+    """Node numbers or offsets as integers; MeshError if a file has fractions of them."""
+    with np.errstate(invalid="ignore"):
+        taken = found.astype(np.int64)
+    if np.any(taken != found):
+        raise MeshError(f"{what} are not whole numbers: damaged, export it again")
+    return taken
 
 
 def _complaint(lines: Sequence[NumberedLine], count: int) -> str:

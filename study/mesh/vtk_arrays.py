@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.mesh.kinds import MeshError
-from study.mesh.text import refuse_grouped
+from study.mesh.text import numbers_of
 from study.mesh.vtk_tags import Tag
 
 _TYPES = {
@@ -72,9 +72,7 @@ def _array(tag: Tag, tags: list[Tag], data: bytes) -> NDArray[Any]:
         raise MeshError(f"type {kind[:40]!r} is not one of {', '.join(_TYPES)}")
     order = ">" if file.get("byte_order") == "BigEndian" else "<"
     if tag.given.get("format", "ascii") == "ascii":
-        words = _content(tag, data).split()
-        refuse_grouped(words)
-        return np.array(words, dtype=bytes).astype(_TYPES[kind]) if words else np.empty(0)
+        return numbers_of(_content(tag, data).split(), _TYPES[kind])
     word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
     stored = _stored(tag, tags, data)
     if "compressor" in file:

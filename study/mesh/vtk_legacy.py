@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from study.mesh.kinds import IndexArray, MeshError
 from study.mesh.numerals import read_numbers
 from study.mesh.raw import RawMesh, raw_mesh
+from study.mesh.text import whole_numbers
 from study.mesh.vtk_cells import EMPTY, LINES, POINTS, POLYGON, STRIP, vtk_blocks
 
 _MAX_COUNT = 200_000_000
@@ -155,7 +156,8 @@ def _connectivity(stream: BytesIO, words: list[str], binary: bool) -> tuple[Inde
     # From version 5: where each cell starts, and where the last one ends; then the nodes.
     offsets = _numbers(stream, _word([w.decode("latin-1") for w in following], 1), first, binary)
     nodes = _numbers(stream, _word(_line(stream), 1), second, binary)
-    return (offsets if first else np.zeros(1)).astype(np.int64), nodes.astype(np.int64)
+    starts = offsets if first else np.zeros(1)
+    return whole_numbers(starts, "offsets of cells"), whole_numbers(nodes, "nodes of cells")
 
 
 def _split_counted(numbers: IndexArray, count: int) -> tuple[IndexArray, IndexArray]:

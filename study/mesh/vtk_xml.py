@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from study.mesh.kinds import FloatArray, IndexArray, MeshError
 from study.mesh.raw import RawMesh, raw_mesh
+from study.mesh.text import whole_numbers
 from study.mesh.vtk_arrays import vtk_array
 from study.mesh.vtk_cells import EMPTY, LINES, POINTS, POLYGON, STRIP, vtk_blocks
 from study.mesh.vtk_tags import Tag, count, vtk_tags
@@ -75,6 +76,8 @@ def _arrays(first: int, tags: list[Tag], data: bytes) -> dict[tuple[str, str], N
         name = "" if tag.parent == "Points" else tag.given.get("Name", "")
         wanted = tag.parent in {"Points", "Cells", *_SURFACE} or name == _GHOST
         if tag.name == "DataArray" and wanted and tag.parent != "PointData":
+            if (tag.parent, name) in found:
+                raise MeshError(f"array {tag.parent} {name}".rstrip() + " is given twice")
             found[tag.parent, name] = vtk_array(tag, tags, data)
     return found
 
@@ -94,8 +97,9 @@ def _cells(
     section: str, number: int, arrays: dict[tuple[str, str], NDArray[Any]]
 ) -> tuple[IndexArray, IndexArray, IndexArray]:
     """Types, numbers of nodes, and nodes of the cells of a section."""
-    ends = _sized(arrays, section, "offsets", number).astype(np.int64)
-    nodes = arrays.get((section, "connectivity"), np.empty(0)).astype(np.int64)
+    ends = whole_numbers(_sized(arrays, section, "offsets", number), f"offsets of {section}")
+    given = arrays.get((section, "connectivity"), np.empty(0))
+    nodes = whole_numbers(given, f"nodes of {section}")
     if np.any(np.diff(ends, prepend=0) < 0) or (ends[-1] if number else 0) != len(nodes):
         raise MeshError(
             f"offsets of {section} do not fit the {len(nodes)} nodes of the cells: damaged, "

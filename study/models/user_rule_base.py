@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fuzzy.liver.stiffness import StiffnessEstimate
 from fuzzy.systems.files import read_rule_base
 from fuzzy.systems.inference import Inferred, infer
+from fuzzy.systems.kinds import check_kind
 from fuzzy.systems.options import InferenceOptions
 from fuzzy.systems.system import FuzzySystem
 from study.scene import Scene
@@ -44,6 +45,11 @@ def user_estimates(scene: Scene) -> dict[str, StiffnessEstimate]:
     """
     system = system_of(scene)
     row = _row(system, scene.fuzzy.inputs)
+    for kind in scene.fuzzy.systems:
+        try:
+            check_kind(system, kind)
+        except ValueError as error:
+            raise ValueError(f"fuzzy.systems: {error}") from error
     return {name: _estimate(scene, system, row, name) for name in scene.fuzzy.systems}
 
 

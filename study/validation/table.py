@@ -66,10 +66,13 @@ def lines(found: Sequence[Comparison]) -> Iterator[str]:
         yield ""
     count = Counter(one.verdict for one in found)
     predictions = count["agrees"] + count["differs"] + count["not resolved"]
-    yield (
-        f"{count['agrees']} of {predictions} predictions agree with the measurement within its "
-        "expanded uncertainty plus the numerical error"
-    )
+    if predictions:
+        yield (
+            f"{count['agrees']} of {predictions} predictions agree with the measurement within its "
+            "expanded uncertainty plus the numerical error"
+        )
+    elif any(one.answered and not one.calibrated for one in found):
+        yield "agreement is not judged: no measurement has a known uncertainty"
     if count["not resolved"]:
         yield (
             f"{count['not resolved']} are not resolved: their numerical error exceeds the "
