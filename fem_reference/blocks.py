@@ -20,7 +20,16 @@ from study.stages.threads import side_by_side
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-kernel = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+# No kernel is passed as a value, and none allocates an array: without a C wrapper and reference
+# counting they compile in less time.
+kernel = numba.njit(
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract"},
+    no_cfunc_wrapper=True,
+    _nrt=False,
+)
 
 WORTHWHILE = 50_000
 """Number of blocks above which a second thread saves time."""
@@ -126,8 +135,8 @@ class Sweep:
 
     def __call__(self, right: Floats, x: Floats) -> None:
         """Update x in place for the right-hand side."""
-        one = self.entries
-        _sweep(self.rows, one.first, one.last, one.indices, one.data, self.inverses, right, x)
+        one, room = self.entries, np.empty(self.inverses.shape[1])
+        _sweep(self.rows, one.first, one.last, one.indices, one.data, self.inverses, right, x, room)
 
 
 def sweep(matrix: Blocks, inverses: Floats, *, backward: bool = False) -> Sweep:
@@ -272,10 +281,13 @@ def _sweep(
     inverses: Floats,
     right: Floats,
     x: Floats,
+    left: Floats,
 ) -> None:
-    """Solve rows in their `order`, that of `first` and `last`, for their own unknowns."""
+    """Solve rows in their `order`, that of `first` and `last`, for their own unknowns.
+
+    `left` (r,): space for the residual of a row.
+    """
     size = inverses.shape[1]
-    left = np.empty(size)
     for number in range(len(order)):
         own = size * order[number]
         for n in range(0, size, 3):

@@ -256,7 +256,7 @@ def superposition(
     return y[..., 0] @ modes.T, y[..., 1] @ modes.T
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator] # numba has no types
+@numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, _nrt=False)  # type: ignore[untyped-decorator] # numba has no types
 def _take_steps(moved: Floats, forced: Floats, states: Floats) -> None:
     """Displacement and velocity (steps + 1, m, 2) by transitions (m, 4, 4) under loads."""
     for n in range(len(forced)):

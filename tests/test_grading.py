@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from study.mesh.bisection import bisected, cut_into
 from study.mesh.kinds import TetrahedralMesh
 from study.mesh.locate import locate
 from study.mesh.tetrahedra import FACES, refined, smallest_dihedral_angle, volumes
+from study.models import finite_elements
 from study.models.finite_elements import reference_of
-from study.models.grading import next_graded, probe_errors
+from study.models.grading import GROWTHS, growth_for, next_graded, probe_errors
 from study.models.model import SILENT
 from study.organ.block import block_mesh
 from study.organ.geometry import Level
@@ -217,9 +219,45 @@ def test_graded_levels_come_out_the_same_again(pressed):
     assert prepared.model.reference.refinement == "auto"
     reference = dataclasses.replace(prepared.model.reference, refinement="graded")
     again = dataclasses.replace(prepared.model, reference=reference).prepare(problem)
-    found = again.level_of(len(one.mesh.tetrahedra), Silent())
+    first, last = len(level.mesh.tetrahedra), len(one.mesh.tetrahedra)
+    found = again.level_of((first, last), Silent())
     assert found.mesh.tetrahedra.tobytes() == one.mesh.tetrahedra.tobytes()
-    assert again.level_of(len(one.mesh.tetrahedra) + 1, Silent()) is None
+    assert again.level_of((first, last + 1), Silent()) is None
+    assert again.level_of((first + 1, last), Silent()) is None
+    small = next_graded(problem, level, prepared.body(level), GROWTHS[0])
+    assert len(small.mesh.tetrahedra) < last
+    found = again.level_of((first, len(small.mesh.tetrahedra)), Silent())
+    assert found.mesh.tetrahedra.tobytes() == small.mesh.tetrahedra.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("excess", "growth"),
+    [(0.5, GROWTHS[0]), (1.59, GROWTHS[0]), (1.61, GROWTHS[1]), (2.3, GROWTHS[2]), (9.0, 4.0)],
+)
+def test_a_mesh_grows_as_its_error_requires(excess, growth):
+    assert growth_for(excess) == growth
+    assert growth_for(np.inf) == GROWTHS[-1]
+
+
+def test_a_mesh_is_no_larger_than_the_accuracy_requires(pressed, monkeypatch):
+    """Four times the elements while the error is large or unknown, fewer when it is close."""
+    prepared = pressed[2]
+    reference = dataclasses.replace(prepared.model.reference, refinement="graded", accuracy=0.01)
+    prepared = dataclasses.replace(prepared.model, reference=reference).prepare(pressed[1])
+    solution = SimpleNamespace(level=None, found=SimpleNamespace(elements=10**6))
+    worst, growths = iter([0.2, 0.021, 0.012, 0.009]), []
+    monkeypatch.setattr(prepared, "_body_of", lambda _: None)
+    monkeypatch.setattr(prepared, "refined", lambda *given: growths.append(given[2]) or given)
+    monkeypatch.setattr(prepared, "_refine", lambda solved, *_: solved.append(solution))
+    monkeypatch.setattr(finite_elements, "locks", lambda *_: False)
+    monkeypatch.setattr(
+        finite_elements,
+        "mesh_error",
+        lambda *_, **__: SimpleNamespace(worst=SimpleNamespace(displacement=next(worst))),
+    )
+    solved, error = prepared._solve_graded(solution, Silent())
+    assert growths == [GROWTHS[2], GROWTHS[2], GROWTHS[1], GROWTHS[0]]
+    assert (len(solved), error.worst.displacement) == (5, 0.009)
 
 
 def test_a_control_point_at_rest_has_no_share(pressed):

@@ -40,6 +40,7 @@ from study.problem.features import FEATURES
 from study.problem.problem import Problem
 from study.results import Results
 from study.results import folder as results
+from study.results.records import ElementsRecord
 from study.run.suiting import read_suited
 from study.scene import Scene
 from study.scene.problem import problem_of
@@ -86,11 +87,14 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class _Target:
-    """The scene, the default folder, and the elements and curves of existing results."""
+    """The scene, the default folder, and the meshes and curves of existing results.
+
+    `counts`: numbers of elements of the meshes, coarse to fine; empty without results.
+    """
 
     scene: Scene
     folder: Path
-    elements: int | None = None
+    counts: tuple[int, ...] = ()
     curves: Results | None = None
 
 
@@ -135,8 +139,13 @@ def _target(request: ExportRequest) -> _Target:
         )
     found = results.read(path)
     elements = next((one.elements for one in found.record.models if one.elements), None)
-    count = None if elements is None else elements.elements
-    return _Target(found.scene, path / "export", count, found)
+    return _Target(found.scene, path / "export", _counts(elements), found)
+
+
+def _counts(elements: ElementsRecord | None) -> tuple[int, ...]:
+    if elements is None:
+        return ()
+    return tuple(one.elements for one in elements.levels) or (elements.elements,)
 
 
 # --- what is written ---------------------------------------------------------------------------
@@ -146,7 +155,7 @@ def _write_mesh(to: str, target: _Target, folder: Path, progress: Progress) -> N
     """The tetrahedra of the reference as a mesh file, corners only, in metres."""
     with progress.stage("organ"):
         prepared = reference_of(target.scene).prepare(problem_of(target.scene))
-    mesh = _level(prepared, target.elements, progress).mesh
+    mesh = _level(prepared, target.counts, progress).mesh
     file, format_ = MESHES[to]
     save(mesh, folder / file, format_)
     _write(folder, {MARK: about_mesh(target.scene, file, mesh)})
@@ -228,21 +237,21 @@ def _discretised(
         problem = problem_of(target.scene)
         prepared = reference_of(target.scene).prepare(problem)
         prepared.refuse()
-    level = _level(prepared, target.elements, progress)
+    level = _level(prepared, target.counts, progress)
     if steps:
         _check_memory(level, target.scene)
     with progress.stage("assembly"):
         return prepared.body(level), problem
 
 
-def _level(prepared: PreparedElements, elements: int | None, progress: Progress) -> Level:
+def _level(prepared: PreparedElements, counts: Sequence[int], progress: Progress) -> Level:
     """The mesh of the scene, or the finer one that its results took for their accuracy."""
-    if elements is None:
+    if not counts:
         return prepared.own_level()
-    found = prepared.level_of(elements, progress)
+    found = prepared.level_of(counts, progress)
     if found is None:
         raise ValueError(
-            f"the results have {elements} finite elements, which this version does not make of "
+            f"the results have {counts[-1]} finite elements, which this version does not make of "
             "their scene; run it again"
         )
     return found

@@ -29,7 +29,7 @@ from study.models.errors import (
     step_checks,
     time_step_errors,
 )
-from study.models.grading import is_graded, next_graded
+from study.models.grading import GROWTHS, growth_for, is_graded, next_graded, next_graded_by
 from study.models.in_contact import contact_record, force_step_errors, resolving, rest_in_contact
 from study.models.large_strain import compare
 from study.models.linear_limits import is_large, is_meaningless
@@ -102,6 +102,10 @@ class FiniteElements:
         """The method of the motion, with `times` as many steps as usual."""
         chosen = self.reference
         return fem.Method(chosen.method, chosen.steps_per_sample, chosen.modes, times)
+
+
+def _has(level: Level, elements: int) -> bool:
+    return len(level.mesh.tetrahedra) == elements
 
 
 @dataclass(eq=False)
@@ -289,44 +293,67 @@ class PreparedElements:
         """Solve on meshes refined where the error originates, up to the scene's size or beyond."""
         asked, solved = self.model.reference.accuracy, [coarsest]
         error: DiscretisationError | None = None
-        fewest = len(self.problem.geometry.mesh.tetrahedra)
         while (
             len(solved) < GRADED
-            or solved[-1].found.elements < fewest
+            or solved[-1].found.elements < self._fewest
             or (is_too_coarse(asked, error) and not locks(self.problem, solved[-1]))
         ):
+            growth = growth_for(self._excess(asked, error, solved[-1].found.elements))
             with progress.stage(f"{self.model.name}: where the error is"):
-                finer = self.refined(solved[-1].level, self._body_of(solved[-1]))
+                finer = self.refined(solved[-1].level, self._body_of(solved[-1]), growth)
             if finer is None:
                 break
             self._refine(solved, finer, progress)
             error = mesh_error(self.problem, solved, graded=True)
         return solved, error
 
-    def refined(self, level: Level, body: Body) -> Level | None:
+    def _excess(
+        self, asked: float | None, error: DiscretisationError | None, elements: int
+    ) -> float:
+        """Elements expected to be needed over those of the last mesh; infinite if unknown."""
+        if error is None or asked is None or elements < self._fewest:
+            return np.inf
+        return error.worst.displacement / asked
+
+    @property
+    def _fewest(self) -> int:
+        """Elements of the scene's mesh, the least number on the last graded mesh."""
+        return len(self.problem.geometry.mesh.tetrahedra)
+
+    def refined(self, level: Level, body: Body, growth: float = GROWTHS[-1]) -> Level | None:
         """The next graded mesh, from the body on a level; None if it is too large."""
-        found = next_graded(self.problem, level, body)
-        if found is None:
-            return None
+        found = next_graded(self.problem, level, body, growth)
+        return None if found is None or self._exceeds_memory(found, body) else found
+
+    def _exceeds_memory(self, level: Level, body: Body) -> bool:
         try:
             method = self.model.reference.method
             refuse_too_large(
-                found.mesh, self.problem.tissue, body.element, stepping=method in fem.STEPPING
+                level.mesh, self.problem.tissue, body.element, stepping=method in fem.STEPPING
             )
-        except ValueError:  # exceeds the memory
-            return None
-        return found
+        except ValueError:
+            return True
+        return False
 
-    def level_of(self, elements: int, progress: Progress) -> Level | None:
-        """The graded mesh with this number of elements, without a motion; None if there is none."""
+    def level_of(self, counts: Sequence[int], progress: Progress) -> Level | None:
+        """The last of the meshes with these numbers of elements; None if there is none.
+
+        `counts`: of all meshes of a run, coarse to fine. No motion is solved.
+        """
         if not self._graded:
             levels = filter(None, map(self.problem.geometry.level, range(FINER + 1)))
-            return next((one for one in levels if len(one.mesh.tetrahedra) == elements), None)
-        level: Level | None = self.coarsest
-        while level is not None and len(level.mesh.tetrahedra) < elements:
+            return next((one for one in levels if _has(one, counts[-1])), None)
+        level = self.coarsest
+        if not _has(level, counts[0]):
+            return None
+        for count in counts[1:]:
             with progress.stage(f"{self.model.name}: where the error is"):
-                level = self.refined(level, self.body(level))
-        return level if level is not None and len(level.mesh.tetrahedra) == elements else None
+                finer = next_graded_by(self.problem, level, self.body(level), GROWTHS[::-1])
+                found = next((one for one in finer if one and _has(one, count)), None)
+            if found is None:
+                return None
+            level = found
+        return level
 
     @property
     def coarsest(self) -> Level:

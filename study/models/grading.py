@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,13 +20,15 @@ from study.scene import Reference
 
 Floats = NDArray[np.float64]
 
-GROWTH = 4.0
-"""Number of elements of a mesh over that of the previous one."""
+GROWTHS = (2.0, 2.8, 4.0)
+"""Possible numbers of elements of a mesh over that of the previous one."""
 GROWTH_IN_CONTACT = 2.0
 """Number of elements of a mesh over that of the previous one under moved tools.
 
 Smaller, since the first mesh is already fine there.
 """
+RESERVE = 1.25
+"""Factor on the elements expected to suffice; one more mesh costs more than these."""
 LEAST_GROWTH = 1.4
 """Smallest growth for which the difference of two meshes shows the error."""
 STEERING = 1e-7
@@ -44,16 +48,35 @@ def is_graded(reference: Reference, problem: Problem) -> bool:
     return reference.refinement == "graded"
 
 
-def next_graded(problem: Problem, level: Level, body: Body) -> Level | None:
+def growth_for(excess: float) -> float:
+    """Least growth expected to reduce the stated error by the factor `excess`, or the largest.
+
+    The error of the estimate falls with the order of the elements, 3, in the cube root of their
+    number: as their number.
+    """
+    return next((one for one in GROWTHS if one >= RESERVE * excess), GROWTHS[-1])
+
+
+def next_graded(
+    problem: Problem, level: Level, body: Body, growth: float = GROWTHS[-1]
+) -> Level | None:
     """A mesh with more elements, where the control points at rest need them; None if too large."""
+    return next(next_graded_by(problem, level, body, (growth,)))
+
+
+def next_graded_by(
+    problem: Problem, level: Level, body: Body, growths: Sequence[float]
+) -> Iterator[Level | None]:
+    """The meshes of `next_graded` for several growths, whose errors are located once."""
     count = len(level.mesh.tetrahedra)
-    usual = GROWTH_IN_CONTACT if problem.rigid_tools else GROWTH
-    growth = min(usual, 0.9 * MAX_TETRAHEDRA / count)
-    if growth < LEAST_GROWTH:
-        return None
+    largest = 0.9 * MAX_TETRAHEDRA / count
+    if largest < LEAST_GROWTH:
+        yield None
+        return
     errors = (contact_errors if problem.rigid_tools else probe_errors)(problem, body)
     order = 2.0 * (ELEMENTS[body.element].formal_order - 1.0)
-    return graded(problem.geometry, level, errors, order, growth)
+    for growth in (GROWTH_IN_CONTACT,) if problem.rigid_tools else growths:
+        yield graded(problem.geometry, level, errors, order, min(growth, largest))
 
 
 def probe_errors(problem: Problem, body: Body) -> Floats:

@@ -109,50 +109,47 @@ def _rasterise(
     high = np.floor((corners.max(axis=1) - origin) / step)
     first = np.maximum(low, 0).astype(np.int64)
     end = np.minimum(high, np.array(inside.shape) - 1).astype(np.int64) + 1
-    _mark(corners, first, end, origin, step, inside)
+    _mark(corners[:, 0].copy(), _barycentric_rows(corners), first, end, origin, step, inside)
 
 
-@numba.njit(cache=True)
+def _barycentric_rows(corners: Floats) -> Floats:
+    """Inverses (t, 3, 3) of the edge matrices of tetrahedra with corners (t, 4, 3), by cofactors.
+
+    Row r, times the offset of a point from the first corner, is its barycentric coordinate r + 1.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    p, q = edges[:, [1, 2, 0]], edges[:, [2, 0, 1]]
+    e, f = [1, 2, 0], [2, 0, 1]
+    cofactors = p[:, :, e] * q[:, :, f] - p[:, :, f] * q[:, :, e]
+    first = cofactors[:, 0] * edges[:, 0]
+    six_volumes = first[:, 0] + first[:, 1] + first[:, 2]
+    return np.asarray(cofactors / six_volumes[:, None, None])
+
+
+@numba.njit(cache=True, no_cfunc_wrapper=True, _nrt=False)  # it allocates no array
 def _mark(
-    corners: Floats,
+    corner: Floats,
+    rows: Floats,
     first: NDArray[np.int64],
     end: NDArray[np.int64],
     origin: Floats,
     step: Floats,
     inside: Booleans,
 ) -> None:
-    """Mark those from the first to before the end (t, 3) that are in tetrahedra (t, 4, 3)."""
+    """Mark those from the first to before the end (t, 3) that are in tetrahedra.
+
+    `corner` (t, 3): first corner; `rows` (t, 3, 3): of `_barycentric_rows`.
+    """
     tolerance = -1e-12
-    rows = np.empty((3, 3))
-    for t in range(corners.shape[0]):
-        corner = corners[t]
-        _barycentric_rows(corner, rows)
+    for t in range(corner.shape[0]):
         for i in range(first[t, 0], end[t, 0]):
+            dx = origin[0] + i * step[0] - corner[t, 0]
             for j in range(first[t, 1], end[t, 1]):
+                dy = origin[1] + j * step[1] - corner[t, 1]
                 for k in range(first[t, 2], end[t, 2]):
-                    dx = origin[0] + i * step[0] - corner[0, 0]
-                    dy = origin[1] + j * step[1] - corner[0, 1]
-                    dz = origin[2] + k * step[2] - corner[0, 2]
-                    a = rows[0, 0] * dx + rows[0, 1] * dy + rows[0, 2] * dz
-                    b = rows[1, 0] * dx + rows[1, 1] * dy + rows[1, 2] * dz
-                    c = rows[2, 0] * dx + rows[2, 1] * dy + rows[2, 2] * dz
+                    dz = origin[2] + k * step[2] - corner[t, 2]
+                    a = rows[t, 0, 0] * dx + rows[t, 0, 1] * dy + rows[t, 0, 2] * dz
+                    b = rows[t, 1, 0] * dx + rows[t, 1, 1] * dy + rows[t, 1, 2] * dz
+                    c = rows[t, 2, 0] * dx + rows[t, 2, 1] * dy + rows[t, 2, 2] * dz
                     if min(a, b, c, 1.0 - a - b - c) >= tolerance:
                         inside[i, j, k] = True
-
-
-@numba.njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _barycentric_rows(corner: Floats, rows: Floats) -> None:
-    """Rows of the inverse of the edge matrix, written out: LAPACK would take seconds to compile."""
-    for r in range(3):
-        p, q = corner[1 + (r + 1) % 3], corner[1 + (r + 2) % 3]
-        for d in range(3):
-            e, f = (d + 1) % 3, (d + 2) % 3
-            rows[r, d] = (p[e] - corner[0, e]) * (q[f] - corner[0, f]) - (p[f] - corner[0, f]) * (
-                q[e] - corner[0, e]
-            )
-    six_volumes = 0.0
-    for d in range(3):
-        six_volumes += rows[0, d] * (corner[1, d] - corner[0, d])
-    for r in range(3):
-        for d in range(3):
-            rows[r, d] /= six_volumes
