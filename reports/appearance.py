@@ -59,7 +59,7 @@ LOOKS = {
     **{f"msm-{system}": look for system, look in SYSTEM_LOOKS.items()},
 }
 OTHER_COLOURS = ("#CC79A7", "#332288", "#661100", "#777777", "#0072B2")
-OTHER_DASHES: tuple[Dashes, ...] = ((0, (1, 1)), (0, (9, 2, 1, 2)), "-", (0, (4, 1, 4, 3)))
+OTHER_DASHES: tuple[Dashes, ...] = ((0, (9, 2, 1, 2)), (0, (4, 1, 4, 3)), "-", (0, (1, 1)))
 
 
 def other_look(k: int) -> Look:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from reports.appearance import labels, reference_name
 from reports.differences import resolved
-from reports.digits import DASH, Table, fixed, percent
+from reports.digits import DASH, Table, percent, percent_known
 from study.results import Results
 from study.results.records import BudgetPart, ErrorBudget
 
@@ -45,7 +45,9 @@ def _table(results: Results, reference: str, found: list[ErrorBudget]) -> dict[s
 
 def _total(budget: ErrorBudget) -> tuple[str, str, str]:
     error = DASH if budget.total_error is None else f"± {percent(budget.total_error)}"
-    return resolved(budget.total, budget.total_error), error, ""
+    is_hidden = budget.total < (budget.total_error or 0.0)
+    total = resolved(budget.total, budget.total_error) if is_hidden else percent(budget.total)
+    return total, error, ""
 
 
 def cause_name(cause: str, reference: str) -> str:
@@ -55,14 +57,19 @@ def cause_name(cause: str, reference: str) -> str:
 
 def _cells(part: BudgetPart) -> tuple[str, str, str]:
     error = "" if not part.error else f"± {percent(part.error)}"
-    return signed(part.contribution), error, "0" if part.left < SMALL else percent(part.left)
+    return signed(part.contribution), error, remaining(part.left)
 
 
-def signed(share: float) -> str:
-    """A contribution in per cent with its sign."""
-    if abs(share) < SMALL:
-        return "0"
-    return f"{'+' if share > 0 else '−'}{fixed(100.0 * abs(share), 1)} %"
+def signed(share: float, error: float | None = None) -> str:
+    """A contribution in per cent with its sign, to the digits of an error."""
+    printed = remaining(abs(share), error)
+    return "0" if printed == "0" else f"{'+' if share > 0 else '−'}{printed}"
+
+
+def remaining(share: float, error: float | None = None) -> str:
+    """A difference in per cent to a tenth or the digits of an error, "0" if none is left."""
+    printed = percent_known(round(share, 3), error)
+    return "0" if share < SMALL or printed == "0 %" else printed
 
 
 def sentences(results: Results) -> Iterator[str]:
@@ -73,16 +80,16 @@ def sentences(results: Results) -> Iterator[str]:
     named = labels(results)
     nearest = min(found, key=lambda one: one.total)
     parts = [part for part in nearest.parts if part.cause != "remainder" and part.size >= SMALL]
+    error = nearest.total_error
     steps = ", ".join(
-        f"{cause_name(part.cause, 'fem')} {fixed(100.0 * part.left, 1)} %" for part in parts
+        f"{cause_name(one.cause, 'fem')} {remaining(one.left, error)}" for one in parts
     )
-    if steps:
-        yield (
-            f"Error budget: the field of {named[nearest.model]} differs from the finite elements "
-            f"by {percent(nearest.total)}. Remaining difference as the causes are corrected one "
-            f"after another: {steps}."
-        )
-    largest = max(parts, key=lambda part: part.contribution, default=None)
-    if largest is not None:
-        name = cause_name(largest.cause, "fem")
-        yield f"The largest cause is the {name}, {signed(largest.contribution)}."
+    if not parts:
+        return
+    largest = max(parts, key=lambda part: part.contribution)
+    yield (
+        f"Error budget: the field of {named[nearest.model]} differs from the finite elements by "
+        f"{percent_known(nearest.total, error)}. Remaining difference as the causes are corrected "
+        f"one after another: {steps}. The largest cause is the {cause_name(largest.cause, 'fem')}, "
+        f"{signed(largest.contribution, error)}."
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from reports import canvas
 from reports.appearance import looks
 from reports.budget import SMALL, by_reference, cause_name, signed
-from reports.digits import percent
+from reports.digits import percent_known
 from study.results import Results
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def waterfall(axes: Axes, budget: ErrorBudget) -> None:
     """Draw each contribution where those before it ended; a black mark is what remains."""
     names = ["total", *(cause_name(part.cause, budget.reference) for part in budget.parts)]
     axes.barh(0, 100 * budget.total, height=0.7, color=WHOLE)
-    _label(axes, 0, 100 * budget.total, percent(budget.total))
+    _label(axes, 0, 100 * budget.total, percent_known(budget.total, budget.total_error))
     at = budget.total
     for y, part in enumerate(budget.parts, 1):
         after = at - part.contribution
@@ -54,7 +54,9 @@ def waterfall(axes: Axes, budget: ErrorBudget) -> None:
         axes.barh(y, 100 * (after - at), left=100 * at, height=0.7, color=colour)
         axes.plot([100 * at] * 2, [y - 1.35, y + 0.35], color=WHOLE, linewidth=0.5)
         axes.plot([100 * part.left] * 2, [y - 0.35, y + 0.35], color="black", linewidth=1.4)
-        _label(axes, y, 100 * max(at, after, part.left), signed(part.contribution))
+        _label(
+            axes, y, 100 * max(at, after, part.left), signed(part.contribution, budget.total_error)
+        )
         at = after
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)

@@ -7,7 +7,7 @@ from reports.alternatives import alternatives
 from reports.certified import certified_rows
 from reports.cut_figure import section
 from reports.differences import finite_elements, own_error, resolved
-from reports.digits import Group, fixed, short, symbols, words
+from reports.digits import Group, control_point, fixed, short, symbols, words
 from reports.motion_figures import shown_probes
 from reports.page.answer import answer, question
 from reports.paper import TABLE_I, TABLE_III_SPREAD, sources
@@ -19,6 +19,8 @@ from reports.tool_force import force_rows, overlap
 from study.results import Results
 
 SCENE_COLUMNS = 4
+WIDE = "msm-mamdani"
+"""The model that is drawn as a wide line."""
 
 
 def document(results: Results) -> dict[str, object]:
@@ -51,11 +53,14 @@ def document(results: Results) -> dict[str, object]:
         "rule_count": str(record.fuzzy.rule_count or ""),
         "probes_left_out": len(record.probes) - len(shown_probes(results)),
         "has_band": bool(results.bands),
+        "has_wide_line": any(one.name == WIDE for one in record.models) and len(record.models) > 1,
+        "has_diverged": any(one.status == "diverged" for one in record.models),
         "tool_forces": force_rows(results),
         "tool_overlap": overlap(results),
         "similarity": tables.similarity_tables(results),
         "measure_count": len(columns(results)),
         "tool_probe": words(tool_probe(results)),
+        "at_tool": control_point(tool_probe(results)),
         "leads": tables.lead_rows(results),
         "ranks": score_tables.rank_rows(results),
         "ratings": score_tables.rating_rows(results),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports.digits import percent
+from reports.digits import percent, percent_known
 from study.results import Results
 from study.results.records import ModelRecord
 
@@ -41,7 +41,7 @@ def own_error(results: Results, reference: str | None = None) -> float | None:
 
 
 def resolved(share: float, error: float | None) -> str:
-    """A difference as a percentage, or that the error of the reference hides it."""
+    """A difference in per cent to the digits of the reference's error, or that this hides it."""
     if error is not None and abs(share) < error:
         return f"not resolved (< {percent(error)})"
-    return percent(share)
+    return percent_known(share, error)

@@ -22,10 +22,12 @@ DASH = "–"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 LONGEST_WORD = 20
+ONLY_POINT = "control-point"
+"""Name of the control point of a scene without an organ."""
 QUANTITY = re.compile(r"(-?\d[\d.]*(?:e[+-]?\d+)?)(?: (.+))?")
 RANGE = re.compile(r"(-?[\d.e+-]+) to (-?[\d.e+-]+) (\S+)")
 BEFORE_UNIT = re.compile(
-    r"(?<=[\d)]) (?=±|(?:%|mm/s|mm|kPa|MPa|Pa|ms|s|Hz|kHz|mN|N|mJ|L)(?!\w))|(?<=±) (?=\d)"
+    r"(?<=[\d)]) (?=±|(?:%|mm/s|mm|kPa|MPa|Pa|ms|s|Hz|kHz|mN|N|mJ|L)(?!\w))|(?<=[±<]) (?=\d)"
 )
 """A space within a number with its error and unit."""
 LARGER_UNITS = {"Pa": (1e3, 1e-3, "kPa"), "Pa/m": (1e6, 1e-6, "MPa/m")}
@@ -58,12 +60,24 @@ def percent(share: float, digits: int = 3) -> str:
     return f"{fixed(value, 1) if abs(value) >= 0.1 ** (digits - 2) else significant(value, 2)} %"
 
 
+def percent_known(share: float, error: float | None) -> str:
+    """A share of one as a percentage to the first digit of its error, to a tenth at the finest."""
+    if not error or _decimals(100.0 * error) > 0:
+        return percent(share)
+    return f"{fixed(100.0 * share, 0)} %"
+
+
 def with_error(value: float, error: float) -> str:
     """A number and its estimated error, to the first digit of the error: "12.3 ± 0.1"."""
     if error == 0.0:
         return significant(value)
-    decimals = max(0, -int(f"{_finite(error):.0e}".split("e")[1]))
+    decimals = _decimals(error)
     return f"{fixed(value, decimals)} ± {fixed(error, decimals)}"
+
+
+def _decimals(error: float) -> int:
+    """Decimals down to the first digit of an error, none where that is a ten or more."""
+    return max(0, -int(f"{_finite(error):.0e}".split("e")[1]))
 
 
 def count(value: int) -> str:
@@ -113,6 +127,11 @@ def symbols(text: str) -> str:
     text = text.replace("gamma_", "γ_").replace("sqrt(2)", "√2")
     text = re.sub(r"\b(\w)_(\d)", lambda m: m[1] + m[2].translate(SUBSCRIPTS), text)
     return re.sub(r"\^(\d)", lambda m: m[1].translate(SUPERSCRIPTS), text)
+
+
+def control_point(probe: str) -> str:
+    """A control point in a sentence; that of a single point needs no name."""
+    return "the control point" if probe == ONLY_POINT else f"the control point {words(probe)}"
 
 
 def words(text: str) -> str:

@@ -429,10 +429,11 @@ def _normals(points: Floats, triangles: NDArray[np.int64]) -> Floats:
 def explain(views: Views) -> dict[str, str]:
     """Exaggeration and direction of the push, as the caption of the pictures says them.
 
-    `travels`: how many tools do so, empty for none.
+    `travels`, `inclusions`: how many tools and inclusions are drawn, empty for none.
     """
     return {
         "travels": str(len(views.ways) or ""),
+        "inclusions": str(len(views.inclusions) or ""),
         "factor": fixed(views.factor, 0),
         "push": _direction(views.push),
         "of": views.shown,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reports import canvas
 from reports.appearance import looks
 from reports.budget_figure import waterfall
-from reports.digits import short
+from reports.digits import control_point, short
 from reports.motion_figures import draw_motion, motions
 from reports.page.answer import nearest
 from reports.ranking import tool_probe
@@ -63,13 +63,13 @@ def caption(results: Results) -> str:
     """The caption of the figure."""
     band = "; the band is the type-2 stiffness interval" if results.bands else ""
     text = (
-        f"Curves: displacement at the control point {tool_probe(results)} along the push, over "
+        f"Curves: displacement at {control_point(tool_probe(results))} along the push, over "
         f"time{band}. "
     )
     if budget_of_nearest(results) is not None:
         text += (
             "Bars: error budget of the nearest model, whose field differs from the reference at "
-            "the peak load. Blue: correcting the cause reduces the difference; orange: it "
-            "increases it."
+            "the peak load. The causes are corrected one after another; blue: this reduces the "
+            "difference, orange: it increases it; black line: the difference that remains."
         )
     return text

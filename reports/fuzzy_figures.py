@@ -132,7 +132,7 @@ def still_moving(curves: Floats) -> NDArray[np.bool_]:
 def _mark_estimates(axes: Axes, estimates: Mapping[str, float]) -> None:
     """Estimates as lines across the output's panel."""
     for system, modulus in estimates.items():
-        line: Style = {"color": system_colour(system), "linewidth": 1.0, "zorder": 1.5}
+        line: Style = {"color": system_colour(system), "linewidth": 1.2, "zorder": 3.0}
         axes.axvline(KILO * modulus, label=system_name(system), **line)
 
 

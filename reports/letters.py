@@ -45,7 +45,8 @@ def without_shape(texts: str, refused: Callable[[str], str | None]) -> str:
 
     `refused` is given letters and returns some of them that have none, or None where all have one.
     """
-    left = "".join(sorted({c for c in texts if ord(c) > 127 and c.isprintable()}))
+    found = sorted({c for c in texts if ord(c) > 127 and c.isprintable()})
+    left = "".join(c for c in found if not _is_mark(c))
     lost = ""
     while left and len(lost) < MOST:
         bad = refused(left)
@@ -53,7 +54,13 @@ def without_shape(texts: str, refused: Callable[[str], str | None]) -> str:
             break
         lost += "".join(c for c in bad if c in left)
         left = "".join(c for c in left if c not in bad)
-    return lost
+    marks = [c for c in found if _is_mark(c)][: MOST - len(lost)]
+    return lost + "".join(mark for mark in marks if refused(mark))
+
+
+def _is_mark(letter: str) -> bool:
+    """Whether a letter is combined with the one before it, which is then named as without shape."""
+    return unicodedata.category(letter)[0] == "M"
 
 
 def boxes(letters: Iterable[str]) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PREFIX = "view."
 ROW_HEIGHT = 0.28
 OUTPUT_HEIGHT = 0.74
-FRAME_HEIGHT = 0.78
+FRAME_HEIGHT = 0.92
 FRAME = {"left": 0.075, "right": 0.985, "wspace": 0.12}
 OUTPUT_COLUMN = 1.3
 LEAST_SHARE = 0.01
@@ -77,7 +77,7 @@ def _draw_table(figure: Figure, view: Arrays, inputs: list[int], height: float) 
         len(inputs) + 1,
         width_ratios=[1.0] * len(inputs) + [OUTPUT_COLUMN],
         top=1.0 - 0.2 / height,
-        bottom=(OUTPUT_HEIGHT + 0.64) / height,
+        bottom=(OUTPUT_HEIGHT + 0.78) / height,
         hspace=0.14,
         **FRAME,
     )
@@ -91,7 +91,9 @@ def _draw_table(figure: Figure, view: Arrays, inputs: list[int], height: float) 
     for column, i in enumerate(inputs):
         name, reading = str(view["inputs"][i]).upper(), fixed(view["readings"][i], 1)
         cells[0, column].set_title(f"{name} {reading} {unit}", fontweight="bold", pad=3)
+        cells[-1, column].set_xlabel(f"reading [{unit}]", labelpad=1)
     cells[0, -1].set_title("consequent", fontweight="bold", pad=3)
+    cells[-1, -1].set_xlabel(f"stiffness [{unit}]", labelpad=1)
     for axes in cells[:-1].ravel():
         axes.tick_params(labelbottom=False)
 
@@ -158,7 +160,7 @@ def _label(axes: Axes, text: str) -> None:
 
 
 def _span(low: float, high: float) -> str:
-    return _degree(high) if low == high else f"{_degree(low)}–{_degree(high)}"
+    return "–".join(dict.fromkeys((_degree(low), _degree(high))))
 
 
 def _degree(value: float) -> str:
@@ -249,7 +251,5 @@ def _draw_shares(axes: Axes, view: Arrays) -> None:
         _draw_stem(axes, constant, share)
         if share < LEAST_SHARE:
             continue
-        place: Style = {"textcoords": "offset points", "va": "bottom"}
-        axes.annotate(str(name), (constant, share), (4, 0), **place)  # clear of the axis
         text = f"{name}: {fixed(constant, 2)} {unit}, weight {_percent(share)}"
         axes.plot([], [], color=CONSEQUENT, marker="o", markersize=2.6, linewidth=1.6, label=text)

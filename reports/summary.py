@@ -12,16 +12,17 @@ from reports.digits import (
     DASH,
     PA_PER_KPA,
     Table,
+    control_point,
     fixed,
     percent,
     quantity,
     significant,
     spread,
     with_error,
-    words,
 )
 from reports.fuzzy_tables import sensitivity_sentences
 from reports.motion_figures import peak
+from reports.page.cost import frame_share
 from reports.ranking import (
     Lead,
     columns,
@@ -103,10 +104,12 @@ def printed_peak(results: Results, model: ModelRecord, probe: str) -> str:
 
 
 def real_time_factor(model: ModelRecord) -> str:
-    """Simulated over wall time as printed, a dash where a model was not timed or ended early."""
-    if not model.wall_s or model.status != "finished":
-        return DASH
-    return significant(model.simulated_s / model.wall_s, 2)
+    """Simulated over wall time as printed; a dash where a model was not timed or ended early.
+
+    A dash too where its time includes what is computed before the motion.
+    """
+    share = frame_share(model)
+    return DASH if share is None or model.status != "finished" else significant(1.0 / share, 2)
 
 
 def _own(error: float | None) -> str:
@@ -214,7 +217,7 @@ def _rankings(results: Results) -> Iterator[str]:
         if found:
             yield (
                 f"Similarity of the fuzzy-tuned models to {reference_name(results, reference)} at "
-                f"the control point {words(probe)}: {_winners(found, named)}"
+                f"{control_point(probe)}: {_winners(found, named)}"
                 f"{_elsewhere(results, reference, probe)}"
             )
             yield from _first_ranks(results, reference, probe)
@@ -229,9 +232,9 @@ def _first_ranks(results: Results, reference: str, probe: str) -> Iterator[str]:
         if alone or shared:
             parts.append(f"{named[model]} alone in {alone}, shared in {shared}")
     yield (
-        f"First rank against {reference_name(results, reference)} at the control point "
-        f"{words(probe)}, in {len(columns(results))} measures (models whose difference is within "
-        f"its error share a rank): {'; '.join(parts)}."
+        f"First rank against {reference_name(results, reference)} at {control_point(probe)}, in "
+        f"{len(columns(results))} measures (models whose difference is within its error share a "
+        f"rank): {'; '.join(parts)}."
     )
 
 
@@ -245,12 +248,21 @@ def _baseline(results: Results, reference: str, probe: str) -> Iterator[str]:
     shared = [column for column in own if all(column in row for row in tuned)]
     ahead = sum(own[column] > max(row[column] for row in tuned) for column in shared)
     verb = "scores" if ahead else "never scores"
-    of = f" in {ahead} of {len(shared)} measures" if ahead else ""
+    of = f" in {ahead} of {len(shared)} measures{_alone(results, reference, probe)}"
     yield (
         f"{labels(results)['reading']}, which uses no fuzzy system, {verb} higher than every "
-        f"fuzzy-tuned model against {reference_name(results, reference)} at the control point "
-        f"{words(probe)}{of}."
+        f"fuzzy-tuned model against {reference_name(results, reference)} at "
+        f"{control_point(probe)}{of if ahead else ''}."
     )
+
+
+def _alone(results: Results, reference: str, probe: str) -> str:
+    """In how many measures the reading is ahead of every model by more than the errors."""
+    ranks = rank_table(results, reference, probe).get("reading")
+    if ranks is None:
+        return ""
+    alone, _ = times_first(ranks)
+    return f"; in {alone or 'none'} of them it is resolved from every other model"
 
 
 def _winners(found: list[Lead], named: dict[str, str]) -> str:
@@ -281,7 +293,7 @@ def _elsewhere(results: Results, reference: str, probe: str) -> str:
     others = [name for name in results.record.probes if name != probe]
     found = [lead for other in others for lead in leads(results, reference, other)]
     named = labels(results)
-    parts = [f"{named[model]} {times}" for model, times in _times_highest(found)]
+    parts = [f"{named[model]}: {times}" for model, times in _times_highest(found)]
     if not parts:
         return ""
     return (
@@ -324,18 +336,18 @@ def _reference(results: Results) -> Iterator[str]:
             f"{min(len(model.elements.levels), 3)} meshes, is {percent(error.field_peak)} of the "
             f"field at the peak load and at most {percent(worst.displacement)} of a displacement "
             f"and {percent(worst.velocity)} of a velocity curve ({percent(there.displacement)} and "
-            f"{percent(there.velocity)} at the control point {words(probe)})."
+            f"{percent(there.velocity)} at {control_point(probe)})."
         )
     strain, limit = model.largest_strain, results.record.strain_limit
     if strain is not None and model.elements.law is not None:
         law = LAWS.get(model.elements.law, model.elements.law)
-        yield f"Its largest logarithmic strain is {percent(strain)}, by the {law} law."
+        yield f"Reference: its largest logarithmic strain is {percent(strain)} ({law} law)."
     elif strain is not None:
         beyond = _large_strain(model.elements.large_strain) if strain > limit else ""
         side = "below" if strain < limit else "not below"
         yield (
-            f"Its largest strain is {percent(strain)}, {side} the limit of {percent(limit)} "
-            f"assumed for linear strain.{beyond}"
+            f"Reference: its largest strain is {percent(strain)}, {side} the limit of "
+            f"{percent(limit)} assumed for linear strain.{beyond}"
         )
 
 

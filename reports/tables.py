@@ -14,6 +14,7 @@ from reports.digits import (
     PA_PER_KPA,
     Group,
     Table,
+    control_point,
     count,
     fixed,
     percent,
@@ -190,7 +191,9 @@ def similarity_tables(results: Results) -> list[dict[str, object]]:
     ]
 
 
-def _score_groups(results: Results, reference: str, heads: list[Column]) -> Iterator[Group]:
+def _score_groups(
+    results: Results, reference: str, heads: list[Column]
+) -> Iterator[dict[str, object]]:
     """Scores by control point; a highest one bears a mark where its lead is resolved."""
     named, places = labels(results), score_decimals(results)
     for probe in results.record.probes:
@@ -211,7 +214,7 @@ def _score_groups(results: Results, reference: str, heads: list[Column]) -> Iter
             for model, row in scores.items()
         ]
         if rows:
-            yield {"name": words(probe), "rows": rows}
+            yield {"name": words(probe), "title": control_point(probe), "rows": rows}
 
 
 def lead_rows(results: Results) -> Table:
@@ -377,9 +380,10 @@ def _corrections(
 
 def check_rows(results: Results) -> Table:
     """Checks of the study on itself: name, value, limit, meaning and outcome."""
+    named = labels(results)
     return [
         [
-            check.name,
+            _check_name(check.name, named),
             significant(check.value, 2),
             significant(check.limit, 2),
             check.meaning,
@@ -387,6 +391,12 @@ def check_rows(results: Results) -> Table:
         ]
         for check in results.record.checks
     ]
+
+
+def _check_name(name: str, named: Mapping[str, str]) -> str:
+    """Name of a check with the label of its model, which is its first part."""
+    model, colon, what = name.partition(": ")
+    return f"{named.get(model, model)}{colon}{what}"
 
 
 def provenance_rows(results: Results) -> Table:

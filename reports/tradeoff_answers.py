@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from reports.digits import DASH, Table, percent, significant
+from reports.digits import DASH, Table, significant
 from reports.tradeoff import (
     MeasuredConfiguration,
     best,
@@ -46,7 +46,7 @@ def _told(one: MeasuredConfiguration, rate: str) -> str:
     taken = share(one, rate)
     part = f"{significant(taken, 2)} periods"
     if taken < 1.0:
-        part = f"{percent(taken, 2)} of the period"
+        part = f"{significant(100.0 * taken, 2)} % of the period"
     return f"{one.name} (error {one.stated_error}, {part})"
 
 
@@ -89,6 +89,6 @@ def _answer(group: list[MeasuredConfiguration], rate: str) -> list[str]:
     return [
         chosen.name,
         chosen.stated_error,
-        percent(share(chosen, rate), 2),
+        f"{significant(100.0 * share(chosen, rate), 2)} %",
         significant(chosen.timing.setup, 2),
     ]

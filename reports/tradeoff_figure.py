@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import log10
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from reports import canvas
 from reports.appearance import Style, series
 from reports.configuration_names import contender_name
 from reports.digits import Table
+from reports.free_labels import name_places
 from reports.tradeoff import (
     MeasuredConfiguration,
     configurations,
@@ -38,8 +40,6 @@ UNRESOLVED_COLOUR = "#e9e9e9"
 LATE_COLOUR = "#f4f4f4"
 COLUMN = 34
 """Letters in a line of the list beside."""
-BESIDE = (0.4, 0.15)
-"""Decades of cost and error within which two names would overprint each other."""
 PER_CENT = 100.0
 HOLLOW = {"markerfacecolor": "white"}
 FRONT: Style = {"color": "#555555", "linewidth": 0.9}
@@ -77,6 +77,7 @@ def _figure(found: Sequence[MeasuredConfiguration]) -> Figure | None:
         axes.tick_params(labelleft=k == 0)
         axes.set_ylabel("" if k else "error [%]")
     figure.legend(handles=_legend(shown, looks), loc="outside upper center", ncols=3)
+    _name_front(whole, shown)
     return figure
 
 
@@ -86,7 +87,7 @@ def _draw_whole(axes: Axes, shown: Sequence[MeasuredConfiguration], looks: Style
         look = looks[one.contender] | ({} if one.any_load else HOLLOW)
         axes.errorbar(**_bars(one), **look, linestyle="", markersize=4.5, elinewidth=0.6, zorder=3)
     _draw_front(axes, [one for one in shown if one.on_front], ":")
-    _draw_front(axes, [one for one in shown if one.on_any_load_front], "-")
+    _draw_front(axes, _any_load_front(shown), "-")
     axes.axvline(1.0, color="black", linewidth=0.8)
     _note(axes, "real time", (1.0, 1.0), ("data", "axes fraction"))
     axes.set(xscale="log", yscale="log", xlabel="wall time per simulated second [s/s]")
@@ -104,22 +105,32 @@ def _bars(one: MeasuredConfiguration) -> Style:
 
 
 def _draw_front(axes: Axes, chosen: Sequence[MeasuredConfiguration], dashes: str) -> None:
-    """A step line; each new setting on the one drawn whole has its name, if there is room."""
-    by_cost = sorted(chosen, key=lambda one: one.timing.quartiles[1])
-    walls = [one.timing.quartiles[1] for one in by_cost]
+    """A step line through configurations."""
+    by_cost = sorted(chosen, key=_wall)
+    walls = [_wall(one) for one in by_cost]
     heights = [_height(one) for one in by_cost]
     axes.plot(walls, heights, drawstyle="steps-post", linestyle=dashes, **FRONT)
-    labels = [one.mark for one in by_cost]
-    named: tuple[float, float] | None = None
-    for x, y, label, last in zip(walls, heights, labels, ["", *labels], strict=False):
-        if dashes == "-" and label != last and not (named and _is_beside(named, (x, y))):
-            axes.annotate(label, (x, y), (-4, -4), **_small(ha="right", va="top"))
-            named = x, y
 
 
-def _is_beside(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether names below both places would overprint each other."""
-    return all(abs(log10(a / b)) < d for a, b, d in zip(one, other, BESIDE, strict=True))
+def _any_load_front(shown: Iterable[MeasuredConfiguration]) -> list[MeasuredConfiguration]:
+    """The Pareto front of those that follow any load, the cheapest first."""
+    return sorted((one for one in shown if one.on_any_load_front), key=_wall)
+
+
+def _wall(one: MeasuredConfiguration) -> float:
+    return one.timing.quartiles[1]
+
+
+def _name_front(axes: Axes, shown: Sequence[MeasuredConfiguration]) -> None:
+    """Each new setting on the front for any load by its name, where there is room."""
+    front = _any_load_front(shown)
+    named = [
+        (_wall(one), _height(one), one.mark)
+        for one, last in zip(front, ["", *(one.mark for one in front)], strict=False)
+        if one.mark != last
+    ]
+    marks = np.array([(_wall(one), _height(one)) for one in shown])
+    name_places(axes, named, marks, {"color": "#444444"})
 
 
 def _draw_rate(

@@ -20,6 +20,13 @@ ROUNDING = 1e-9
 ONE_AXIS = "rms residual along"
 """How quantities begin that the table has of each axis beside the whole."""
 AGREES = "agrees"
+SHORT = {
+    "frequency of free vibration": "free vibration",
+    "tip deflection, mean of markers": "tip",
+    "rms error of the markers": "markers",
+    "rms residual of the beads": "beads",
+}
+"""Names of quantities in the table of bodies, whose caption says what they mean."""
 
 
 class Median(NamedTuple):
@@ -142,7 +149,7 @@ def _body_row(line: Line) -> list[str]:
     return [
         line["model"],
         line["case"],
-        words(f"{line['quantity']} [{line['unit']}]"),
+        words(f"{SHORT.get(line['quantity'], line['quantity'])} [{line['unit']}]"),
         significant(measured, 3) if measured else "0",
         significant(float(found), 3) if found else DASH,
         off,

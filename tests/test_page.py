@@ -204,7 +204,7 @@ def test_the_largest_cause_of_the_budget_limits_it_and_has_a_remedy():
         for m in MODELS[1:]
     )
     found = said(with_record(results_of(), budgets=budgets))
-    assert "the Poisson ratio, which contributes +20.0 % to a total of 40.0 %." in found
+    assert "the Poisson ratio, which contributes +20 % to a total of 40 %." in found
     assert "lattice.volume_term = true" in found
 
 
@@ -234,7 +234,7 @@ def test_the_nearest_real_time_model_is_named_where_the_nearest_is_not_real_time
     assert "nearest real-time model" not in said(results_of())
     slow = with_model(results_of(), "basafa", wall_s=2.0)
     assert "takes 33 ms, more than the available 16.7 ms" in said(slow)
-    assert "The nearest real-time model is MSM Mamdani: its difference is 40.0 %" in said(slow)
+    assert "The nearest real-time model is MSM Mamdani: its difference is 40 %" in said(slow)
     hidden = with_model(with_mesh_error(field_peak=0.9), "basafa", wall_s=2.0)
     assert "its difference is not resolved (< 90.0 %), and a frame" in said(hidden)
     for name in MODELS:

@@ -18,8 +18,26 @@ from reports.differences import (
     own_error,
     resolved,
 )
-from reports.digits import DASH, fixed, percent, significant, spread, with_error, words
+from reports.digits import (
+    DASH,
+    control_point,
+    percent,
+    percent_known,
+    significant,
+    spread,
+    with_error,
+    words,
+)
 from reports.motion_figures import peak
+from reports.page.cost import (
+    cost_sentences,
+    frame,
+    frame_number,
+    frame_share,
+    is_undecided,
+    two_digits,
+)
+from reports.page.required import error_checks, required_sentences
 from reports.ranking import references, tool_probe
 from reports.reference import is_built_in_liver
 from reports.summary import printed_peak, status
@@ -32,8 +50,6 @@ MILLI = 1e3
 NEGLIGIBLE = 5e-5
 """Relative error below which it shows in none of four digits."""
 PEAK = "field-relative-l2-peak"
-FRAME_RATE = 60.0
-"""Of a display [Hz]; a cost is stated as a share of its frame."""
 MEASURED_RATE = "60hz"
 """The same among the rates of the trade-off measured beforehand."""
 BENCHMARK = ", the nonlinear mass-spring benchmark of the paper"
@@ -98,9 +114,10 @@ class Nearest:
 def answer(results: Results) -> Answer:
     """The answer of any run, also where a model diverged or nothing is resolved."""
     found = nearest(results)
-    lines = [*_lost(results), *(_answers(results, found) if found else _nothing(results))]
-    numbers = tuple(_numbers(results, found)) if found else ()
-    return Answer(tuple(lines), numbers)
+    lines = [*_lost(results), *required_sentences(results)]
+    lines += _answers(results, found) if found else _nothing(results)
+    numbers = _numbers(results, found) if found else _numbers_alone(results)
+    return Answer(tuple(lines), tuple(numbers))
 
 
 def nearest(results: Results) -> Nearest | None:
@@ -174,8 +191,13 @@ def _lost(results: Results) -> Iterator[str]:
 
 
 def _nothing(results: Results) -> Iterator[str]:
-    if not any(model.status == "finished" for model in results.record.models):
+    finished = [one for one in results.record.models if one.status == "finished"]
+    if not finished:
         yield "No model finished: this run states neither an error nor a cost."
+        return
+    if results.scene.require is not None:
+        for model in finished:
+            yield " ".join([*_alone_at_the_tool(results, model), *cost_sentences(results, model)])
         return
     can_add = finite_elements(results) is None and not results.scene.is_point
     remedy = " Add fem to models." if can_add else ""
@@ -185,7 +207,7 @@ def _nothing(results: Results) -> Iterator[str]:
 def _answers(results: Results, found: Nearest) -> Iterator[str]:
     yield _nearest_sentence(results, found)
     yield from _at_the_tool(results, found)
-    yield _cost(results, found.model)
+    yield " ".join(cost_sentences(results, found.model))
     yield from _in_time(results, found)
     yield from _limit(results, found)
     if found.is_field:
@@ -197,7 +219,7 @@ def _nearest_sentence(results: Results, found: Nearest) -> str:
     what = (
         "over the whole organ at the peak load"
         if found.is_field
-        else f"over time at the control point {words(tool_probe(results))}"
+        else f"over time at {control_point(tool_probe(results))}"
     )
     by = "this reference" if found.is_field else "the numerical error of the curves"
     alike = (
@@ -261,7 +283,7 @@ def _at_the_tool(results: Results, found: Nearest) -> Iterator[str]:
     if DASH not in {own, theirs}:
         gap = _gap(results, found)
         yield (
-            f"Its largest displacement at the control point {words(tool_probe(results))} is {own} "
+            f"Its largest displacement at {control_point(tool_probe(results))} is {own} "
             f"mm; that of {reference_name(results, found.reference)} is {theirs} mm. {gap.sentence}"
         )
     yield from _forces(results, found)
@@ -318,7 +340,7 @@ def _gap(results: Results, found: Nearest) -> _Gap:
         value = significant(sum(known), 2)
     else:
         value = _stated(gap, sum(known)) if is_known else significant(gap, 2)
-    return _Gap(f"{value} mm", _two_digits(share), own > theirs, is_resolved, is_known)
+    return _Gap(f"{value} mm", two_digits(share), own > theirs, is_resolved, is_known)
 
 
 def _peak(results: Results, name: str) -> str:
@@ -340,42 +362,11 @@ def curve_error(
     return whole_error(numerical_errors(model, [], probe, curve))
 
 
-def _cost(results: Results, model: ModelRecord) -> str:
-    share = frame_share(model)
-    if share is None:
-        return f"{model.label} was not timed."
-    workers = results.record.workers
-    beside = f", while {workers} stages ran at a time on the machine" if workers > 1 else ""
-    wall, simulated = significant(model.wall_s or 0.0, 2), significant(model.simulated_s)
-    return (
-        f"{model.label} took {wall} s for {simulated} s of motion, a real-time factor of "
-        f"{significant(1.0 / share, 2)}: on average a frame at 60 Hz takes {_frame(share)}. The "
-        f"time was measured once{beside}."
-    )
-
-
-def frame_share(model: ModelRecord) -> float | None:
-    """Share of the time of a frame, at any rate, that the motion within it took in the mean."""
-    return model.wall_s / model.simulated_s if model.wall_s else None
-
-
-def _two_digits(share: float) -> str:
-    """A share as a percentage that is known to no more."""
-    return f"{significant(100.0 * share, 2)} %"
-
-
-def _frame(share: float) -> str:
-    """The time of a frame at 60 Hz and whether it is within the period."""
-    period = MILLI / FRAME_RATE
-    taken = f"{significant(share * period, 2)} ms"
-    if share > 1.0:
-        return f"{taken}, more than the available {fixed(period, 1)} ms"
-    return f"{taken} of the available {fixed(period, 1)} ms ({_two_digits(share)})"
-
-
 def _in_time(results: Results, found: Nearest) -> Iterator[str]:
     """The nearest of the real-time models, where the nearest of all is not one."""
-    if (frame_share(found.model) or 0.0) <= 1.0 or not found.is_field:
+    share = frame_share(found.model)
+    is_known = share is not None and not is_undecided(results, found.model)
+    if not found.is_field or (share or 0.0) <= 1.0 or not is_known:
         return
     shares = {
         name: share
@@ -389,7 +380,7 @@ def _in_time(results: Results, found: Nearest) -> Iterator[str]:
     taken = frame_share(results.model(best)) or 0.0
     yield (
         f"The nearest real-time model is {labels(results)[best]}: its difference is "
-        f"{resolved(shares[best], found.error)}, and a frame takes {_frame(taken)}."
+        f"{resolved(shares[best], found.error)}, and a frame takes {frame(taken)}."
     )
 
 
@@ -413,7 +404,8 @@ def _limit(results: Results, found: Nearest) -> Iterator[str]:
             yield " ".join(
                 [
                     f"The largest cause of the difference is the {cause}, which contributes "
-                    f"{budget.signed(largest.contribution)} to a total of {percent(one.total)}.",
+                    f"{budget.signed(largest.contribution, one.total_error)} to a total of "
+                    f"{percent_known(one.total, one.total_error)}.",
                     *found_remedy,
                     *_left(results, largest),
                 ]
@@ -429,7 +421,7 @@ def _measured_beforehand(results: Results) -> Iterator[str]:
     yield (
         "Of the configurations measured beforehand on the built-in liver, the most accurate in "
         f"real time at 60 Hz under any load is {chosen.name}: its error is {chosen.stated_error}, "
-        f"and a frame takes {percent(tradeoff.share(chosen, MEASURED_RATE), 2)} of the period."
+        f"and a frame takes {two_digits(tradeoff.share(chosen, MEASURED_RATE))} of the period."
     )
 
 
@@ -443,6 +435,16 @@ def _left(results: Results, part: BudgetPart) -> Iterator[str]:
         yield (
             "At rest and with the exact modulus, the difference with this term is "
             f"{resolved(left, own_error(results))}."
+        )
+
+
+def _alone_at_the_tool(results: Results, model: ModelRecord) -> Iterator[str]:
+    """The largest displacement of a model that is compared with none."""
+    printed = _peak(results, model.name)
+    if printed != DASH:
+        yield (
+            f"The largest displacement of {model.label} at {control_point(tool_probe(results))} is "
+            f"{printed} mm."
         )
 
 
@@ -466,6 +468,23 @@ def _numbers(results: Results, found: Nearest) -> Iterator[Number]:
     yield from _third(results, found.model)
 
 
+def _numbers_alone(results: Results) -> Iterator[Number]:
+    """Of the first finished model, where none is compared: its error, displacement and cost."""
+    model = next((one for one in results.record.models if one.status == "finished"), None)
+    if model is None:
+        return
+    for check in error_checks(results)[:1]:
+        yield Number("estimated error", percent(check.value), f"{percent(check.limit)} allowed")
+    printed, probe = _peak(results, model.name), tool_probe(results)
+    if printed != DASH:
+        name = f"largest displacement at {words(probe)}, {model.label}"
+        kind = "± is its numerical error" if "±" in printed else "error not known"
+        yield Number(name, f"{printed} mm", kind)
+    timed = frame_number(results, model)
+    if timed is not None:
+        yield Number("time of a frame at 60 Hz", *timed)
+
+
 def _number_at_the_tool(results: Results, found: Nearest) -> Number:
     """Difference of the largest displacement from that of the reference."""
     gap, probe = _gap(results, found), tool_probe(results)
@@ -479,13 +498,9 @@ def _number_at_the_tool(results: Results, found: Nearest) -> Number:
 
 def _third(results: Results, model: ModelRecord) -> Iterator[Number]:
     """The cost of a frame, or the stiffness of a point, which is not timed."""
-    share = frame_share(model)
-    if share is not None:
-        period = MILLI / FRAME_RATE
-        value = f"{significant(share * period, 2)} of {fixed(period, 1)} ms"
-        kept = "real time" if share <= 1.0 else "not real time"
-        kind = f"{kept} on average; measured once, spread not known"
-        yield Number("time of a frame at 60 Hz", value, kind)
+    timed = frame_number(results, model)
+    if timed is not None:
+        yield Number("time of a frame at 60 Hz", *timed)
         return
     estimates = results.record.fuzzy.systems
     if model.system in estimates:

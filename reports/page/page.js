@@ -4,8 +4,8 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const $ = (id) => document.getElementById(id);
   const dark = () => document.documentElement.dataset.theme === "dark";
-  const CONFIG = { displaylogo: false, responsive: true, showSendToCloud: false,
-    plotlyServerURL: "", modeBarButtonsToRemove: ["toImage"] };
+  // No mode bar: it would overprint legends, and cannot be reached by keyboard.
+  const CONFIG = { displayModeBar: false, responsive: true, showSendToCloud: false, plotlyServerURL: "" };
   const SEQUENTIAL = data.scale.map((colour, k) => [k / (data.scale.length - 1), colour]), SET_LOOKS = ["solid", "dash", "dot", "dashdot", "longdash"];
 
   // --- arrays ------------------------------------------------------------------------------
@@ -161,6 +161,12 @@
       [own, ...(bounds || [])].map((one) => one[i].reduce((a, b) => (least ? Math.min(a, b) : Math.max(a, b)))));
     const low = Math.min(...all(true)), high = Math.max(...all(false)), room = 0.06 * (high - low || 1);
     return { range: [low - room, high + room] };
+  }
+
+  /** Decimals [mm] that the errors of some models' curves at the tool leave. */
+  function decimals(names) {
+    const found = (motion.get(data.tool_probe) || []).filter((one) => names.includes(one.model));
+    return Math.min(6, ...found.map((one) => one.decimals[0]));
   }
 
   /** A number with so many decimals, and no sign where they are all nought. */
@@ -352,8 +358,8 @@
     const of = data.organ.reference, against = of && displacement(of);
     const body = [...organ.films.keys()].filter((name) => displacement(name)).map((name) => {
       const u = displacement(name);
-      const off = against && name !== of ? largest(lengths(u, against)).toPrecision(3) : "–";
-      return [label(name), largest(lengths(u)).toPrecision(3), off];
+      const off = against && name !== of ? largest(lengths(u, against)).toFixed(decimals([name, of])) : "–";
+      return [label(name), largest(lengths(u)).toFixed(decimals([name])), off];
     });
     fill($("organ-table"), `At the vertices of the surface, which need not include the control points, at ${(longest[state.sample] || 0).toFixed(3)} s`, ["model", "largest displacement [mm]",
       of ? `largest difference from ${label(of)} [mm]` : "difference"], body);
@@ -548,7 +554,15 @@
 
   // --- trade-off ---------------------------------------------------------------------------
 
+  /** Ticks of a logarithmic axis at 1, 2 and 5 times powers of ten. */
+  function ticks(values) {
+    const powers = Array.from({ length: 13 }, (_, k) => k - 6), least = Math.min(...values), most = Math.max(...values);
+    const at = powers.flatMap((k) => [1, 2, 5].map((x) => Number(`${x}e${k}`))).filter((x) => x >= least / 2 && x <= most * 2);
+    return { tickvals: at, ticktext: at.map(String) };
+  }
+
   function drawTradeoff() {
+    const all = data.tradeoff.configurations, errors = all.map((one) => one.error ?? one.bar);
     // Fronts last, and so above the others.
     const groups = [["any load", (one) => one.any_load && !one.on_any_load_front, "circle", "#0072B2"],
       ["load known beforehand", (one) => !one.any_load && !one.on_front, "square", "#009E73"],
@@ -561,8 +575,8 @@
         hoverinfo: "text", marker: { size: 11, color: seen(colour), symbol: found.map((one) => symbol + (one.error === null ? "-open" : "")), line: { width: 1.5, color: seen(colour) } } };
     });
     Plotly.react("tradeoff-plot", traces, layout({
-      xaxis: { type: "log", title: { text: "wall time per simulated second [s/s]" } },
-      yaxis: { type: "log", title: { text: "error of the field at the peak [%]" } },
+      xaxis: { type: "log", title: { text: "wall time per simulated second [s/s]" }, ...ticks(all.map((one) => one.wall)) },
+      yaxis: { type: "log", title: { text: "error of the field at the peak [%]" }, ...ticks(errors) },
       shapes: [{ type: "line", x0: 1, x1: 1, yref: "paper", y0: 0, y1: 1, line: { color: variable("--quiet"), dash: "dot", width: 1 } }] }), CONFIG);
   }
 

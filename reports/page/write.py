@@ -106,7 +106,7 @@ def _written(results: Results) -> Mapping[str, str]:
         "summary": _items(summary.sentences(results)),
         "tradeoff": _items(tradeoff_answers.sentences(tradeoff.configurations())),
         "scene": markup.escape(write_scene(results.scene)),
-        "provenance": table(("item", "value"), provenance_rows(results), "Provenance"),
+        "provenance": _provenance(results),
         "notes": _items(words(text) for text in results.record.notes),
         "assumptions": _items(words(symbols(text)) for text in results.record.assumptions),
     }
@@ -114,7 +114,14 @@ def _written(results: Results) -> Mapping[str, str]:
 
 def _glance(results: Results) -> str:
     header, rows = summary.glance_table(results)
-    return table(header, rows, "Overview of the models")
+    return table(
+        header, rows, "Overview of the models (MSM: mass-spring model; FE: finite elements)"
+    )
+
+
+def _provenance(results: Results) -> str:
+    made = table(("item", "value"), provenance_rows(results), "Provenance")
+    return made.replace("<table>", '<table class="text">')
 
 
 def _paragraphs(lines: Iterable[str]) -> str:
@@ -143,7 +150,8 @@ def _numbers(found: Answer) -> str:
 def _warnings(results: Results) -> str:
     lines = [words(text) for text in results.record.warnings]
     if not lines:
-        return "<p>No warning, and every check of the run passed.</p>"
+        checks = "and every check of the run passed"
+        return f"<p>No warning, {checks if results.record.checks else 'but no check either'}.</p>"
     return f'<div class="warnings" role="note">{_items(lines)}</div>'
 
 
