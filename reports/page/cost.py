@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from reports.digits import fixed, significant, spread
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import ModelRecord
 
 MILLI = 1e3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from reports.digits import percent, words
-from study.results.folder import Results
+from study.results import Results
 from study.results.records import Check
 
 PLANNED = "Planned: model: "
