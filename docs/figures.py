@@ -632,11 +632,9 @@ def planned_tools() -> Iterator[tuple[str, str]]:
     every = measured("planned_tools")
     lines = [one for one in every if float(one["found"]) > 1e-3]  # else a bonded tool holds it
     groups = dict.fromkeys(one["group"] for one in lines)
-    for group in groups:
-        scenes = {one["scene"] for one in lines if one["group"] == group}
-        yield f"planned-tools-{group.replace(' ', '-')}", str(len(scenes))
-    held = {one["scene"] for one in lines if one["group"] != "random"}
-    yield "planned-tools-scenes", str(len(held))
+    drawn = {one["scene"] for one in lines if one["group"] == "random"}
+    yield "planned-tools-scenes", str(len({one["scene"] for one in lines} - drawn))
+    yield "planned-tools-random", str(len(drawn))
     quantities = dict.fromkeys(one["quantity"] for one in lines)
     rows = [_under_tools(lines, name, group) for name in quantities for group in groups]
     yield "planned-tools", table(TOOLS_HEAD, rows)
