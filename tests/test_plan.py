@@ -16,13 +16,15 @@ from msm.stepper import LatticeStepper
 from study.commands.plan import plan as plan_command
 from study.commands.run import RunFlags, run
 from study.models.finite_elements import PreparedElements, reference_of
+from study.models.lattice import PreparedLattice
 from study.models.model import SILENT, ModelRun
-from study.models.spacing_error import spacing_errors
+from study.models.spacing_error import ESTIMATE, spacing_errors
 from study.models.table import model
 from study.plan import elements as elements_plan
+from study.plan import motions as motions_plan
 from study.plan import moved as moved_plan
 from study.plan import plan as planning
-from study.plan.candidates import Candidate, candidates
+from study.plan.candidates import Omitted, candidates
 from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
@@ -35,7 +37,7 @@ from study.scene import Require
 from study.scene.file import SceneError, read_scene
 from study.scene.problem import problem_of
 from study.system.progress import Silent
-from tests.benchmarks import planned_places, planned_tools, tables
+from tests.benchmarks import graded_rest, planned_places, planned_tools, tables
 from tests.conftest import SMALL
 
 AT_TOOL = ('require.at=["tool"]',)
@@ -463,52 +465,67 @@ SPHERE = (
 )
 
 
+def moved_scene(*quantities):
+    wanted = f"require.quantities={list(quantities)}".replace("'", '"')
+    return read_scene("block", (*SPHERE, "require.error=90 %", wanted))
+
+
 @cache
 def moved_look(*quantities):
-    wanted = f"require.quantities={list(quantities)}".replace("'", '"')
-    scene = read_scene("block", (*SPHERE, "require.error=90 %", wanted))
+    scene = moved_scene(*quantities)
     problem = problem_of(scene)
     return scene, moved_plan.look(scene, problem, measure(scene.require, problem))
 
 
-def test_the_error_is_an_index_of_the_largest_difference_of_any_two_lattices():
-    def told(*motions):
+def test_the_error_is_by_the_largest_difference_of_any_two_lattices():
+    def told(*motions, ratio=2.0):
         def apart(one, finer):
             return abs(one - finer) / finer
 
-        return moved_plan.error_of_finest(motions, apart)
+        return moved_plan.error_of_finest(motions, apart, ratio)
 
-    assert told(6.0, 4.5, 4.0) == pytest.approx(3.0 * 2.0 / 4.0)
-    assert told(4.0, 5.0, 4.0) == pytest.approx(3.0 * 1.0 / 4.0)  # the first and last agree
-    assert told(6.0, 4.0, 5.0) == pytest.approx(3.0 * 2.0 / 4.0)
+    assert told(6.0, 4.5, 4.0) == pytest.approx(ESTIMATE * 2.0 / 4.0)
+    assert told(4.0, 5.0, 4.0) == pytest.approx(ESTIMATE * 1.0 / 4.0)  # first and last agree
+    assert told(6.0, 4.0, 5.0) == pytest.approx(ESTIMATE * 2.0 / 4.0)
+    assert told(1.0 + 0.05, 1.0 + 0.04, ratio=1.25) == pytest.approx(ESTIMATE * 0.04 / 1.04)
 
 
-def test_a_plan_foretells_no_less_than_the_estimate_of_the_run_that_follows():
+def test_a_plan_foretells_no_less_than_the_run_that_follows_is_checked_by():
     """Or a run would miss a requirement that its plan kept."""
     scene, seen = moved_look("history", "peak-force")
     problem = problem_of(scene)
     coarse, fine = (
-        planned_tools.moved_by(scene, problem, times * seen.spacing) for times in (2.0, 1.0)
+        planned_tools.moved_by(scene, problem, times * seen.finest.spacing) for times in (2.0, 1.0)
     )
-    own = spacing_errors(problem, seen.spacing, coarse, fine)
+    own = spacing_errors(problem, seen.finest.spacing, coarse, fine)
     found = (*own.displacement.values(), *own.peak_force.values())
-    assert seen.error >= max(found) > 0.0
+    assert seen.error >= ESTIMATE / own.safety_factor * max(found) > 0.0
 
 
 @pytest.mark.parametrize("quantity", ["force", "at the tool", "at all points"])
-def test_foretold_errors_of_lattices_held_under_moved_tools(quantity):
+@pytest.mark.parametrize("group", planned_tools.GROUPS)
+def test_foretold_errors_of_lattices_held_under_moved_tools(quantity, group):
+    """In the scenes that the factor was chosen by, in the others, and in random ones."""
     known = tables.read(planned_tools.TABLE, planned_tools.Row)
     rows = [one for one in known if one.quantity == quantity and one.found > 1e-3]
-    ratios = np.array([one.found / one.foretold for one in rows])
-    assert len(ratios) > 100
-    assert (ratios <= 1.0).mean() >= 0.95
-    assert np.median(ratios) > 0.1  # or it foretells nothing
+    ratios = np.array([one.found / one.foretold for one in rows if one.group == group])
+    assert len(ratios) >= 25
+    assert (ratios <= 2.0).mean() >= 0.95
+    assert 0.3 < np.median(ratios) < 1.0  # neither too large, nor short of most
+
+
+def test_without_its_factor_an_estimate_would_hold_too_rarely():
+    """Negative control, in the scenes that the factor was chosen by."""
+    known = tables.read(planned_tools.TABLE, planned_tools.Row)
+    chosen = [one for one in known if one.group == planned_tools.GROUPS[0] and one.found > 1e-3]
+    bare = np.array([one.found / one.by_three for one in chosen])
+    assert (bare <= 2.0).mean() < 0.9
 
 
 def test_a_moved_tool_is_planned_by_three_lattices_at_order_one():
     scene, seen = moved_look("peak-force")
     found = list(moved_plan.lattices(scene, seen))
-    assert seen.spacing == pytest.approx(0.02)
+    assert seen.finest.spacing == pytest.approx(0.02)
     assert [one.scene.models for one in found] == [("tissue",)] * len(found)
     by_spacing = {one.scene.lattice.spacing: one for one in found}
     assert by_spacing[0.01].prediction.error == pytest.approx(seen.error * 10 / 20)
@@ -525,6 +542,108 @@ def test_only_what_is_wanted_of_a_moved_tool_counts():
     assert moved_look("peak-force", "history")[1].error == max(force, history)
 
 
+# --- lattices whose motion is lost ----------------------------------------------------------------
+
+
+FOUND = motions_plan.motion
+
+
+@cache
+def finished(spacing):
+    scene = moved_scene("peak-force")
+    return FOUND(scene, problem_of(scene), spacing)
+
+
+def planned_without(monkeypatch, *lost, rate=1.0):
+    """The plan for a force where the motions of lattices of these spacings [m] are lost.
+
+    The most accurate; with a `rate` [Hz], of lattices alone.
+    """
+
+    def given(_scene, _problem, spacing):
+        name = f"lattice of {1e3 * spacing:.3g} mm"
+        return Omitted(name, "it is planted") if spacing in lost else finished(spacing)
+
+    monkeypatch.setattr(motions_plan, "motion", given)
+    scene = moved_scene("peak-force")
+    return plan(replace(scene, require=Require(rate=rate, quantities=("peak-force",))))
+
+
+def omitted(found):
+    return {one.choice: one.reason for one in found.decisions if one.about == "not offered"}
+
+
+@pytest.mark.parametrize(
+    ("lost", "names"),
+    [
+        (0.04, {"lattice of 40 mm": "planted", "lattice of 30 mm": None}),
+        (
+            0.025,
+            {"lattice of 25 mm": "planted", "lattice of 30 mm": "not tried, as a lattice of 25"},
+        ),
+        (
+            0.02,
+            {"lattice of 20 mm": "planted", "lattice of 10 mm": "not tried, as a lattice of 20"},
+        ),
+    ],
+)
+def test_a_lattice_whose_motion_is_lost_is_left_out_with_its_reason(monkeypatch, lost, names):
+    found = planned_without(monkeypatch, lost)
+    assert found.scene.models == ("tissue",)
+    told = omitted(found)
+    for name, why in names.items():
+        assert (why in told[name]) if why else name not in told
+    assert f"lattice of {1e3 * found.scene.lattice.spacing:.3g} mm" not in told
+    assert any(f"not offered: {next(iter(names))} (" in line for line in lines(found))
+
+
+def test_the_error_is_that_of_the_lattices_that_are_left(monkeypatch):
+    """And none is left out where all finish."""
+    scene, seen = moved_look("peak-force")
+    assert omitted(planned_without(monkeypatch)) == {}
+    planned_without(monkeypatch, 0.025)
+    kept = moved_plan.look(scene, problem_of(scene), measure(scene.require, problem_of(scene)))
+    assert 0.0 < kept.error <= seen.error
+    assert kept.finest.spacing == seen.finest.spacing
+
+
+def test_where_no_error_of_a_lattice_is_known_elements_are_planned(monkeypatch):
+    offered = elements_of()[1]
+    monkeypatch.setattr(planning, "elements", lambda *_: offered)
+    found = planned_without(monkeypatch, 0.04, 0.025, rate=None)
+    assert found.scene.models == ("hyperelastic",)
+    assert "its error is unknown" in omitted(found)["lattice of 20 mm"]
+    found = planned_without(monkeypatch, 0.04, 0.025, 0.02, rate=None)
+    assert any("more than a lattice bears" in line for line in lines(found))
+
+
+def test_where_nothing_is_left_every_reason_is_named(monkeypatch):
+    with pytest.raises(ValueError, match=r"require: no model follows the scene.*reduce") as error:
+        planned_without(monkeypatch, 0.04, 0.025, 0.02)
+    assert str(error.value).count("it is planted") == 3
+    monkeypatch.setattr(planning, "elements", lambda *_: Omitted("elements", "planted too"))
+    with pytest.raises(ValueError, match="elements: planted too"):
+        planned_without(monkeypatch, 0.04, 0.025, 0.02, rate=None)
+
+
+def test_a_motion_is_lost_by_divergence_by_inversion_and_by_what_it_misses(monkeypatch):
+    scene = moved_scene("peak-force")
+    problem, whole = problem_of(scene), finished(0.04).run
+    ended = replace(whole.trajectory, status="diverged", ended_at=0.125)
+    for lost, said in (
+        (replace(whole, trajectory=ended), "diverges at 0.125 s"),
+        (replace(whole, inverted_cells=3), "inverts 3 cells"),
+    ):
+        monkeypatch.setattr(PreparedLattice, "moved", lambda *_, lost=lost: lost)
+        found = motions_plan.motion(scene, problem, 0.04)
+        assert (found.name, said in found.reason) == ("lattice of 40 mm", True)
+    monkeypatch.undo()
+    assert (
+        "no lattice cell of 1 m lies in the organ"
+        in motions_plan.motion(scene, problem, 1.0).reason
+    )
+
+
 IN_CONTACT = (*SPHERE, "time.samples=17", "reference.steps_per_sample=1")
 
 
@@ -535,7 +654,7 @@ def elements_of(*overrides):
     scene = read_scene("block", (*IN_CONTACT, *wanted, *overrides))
     problem = problem_of(scene)
     points = measure(scene.require, problem)
-    apart = partial(moved_plan.difference, problem, scene.require, points)
+    apart = partial(motions_plan.difference, problem, scene.require, points)
     return scene, elements_plan.elements(scene, problem, apart)
 
 
@@ -585,7 +704,9 @@ def test_a_run_of_elements_in_contact_keeps_what_is_foretold():
 
 
 def test_elements_are_not_offered_where_they_cannot_follow():
-    assert elements_of("damping.kind=rayleigh", "damping.stiffness=1 ms")[1] is None
+    found = elements_of("damping.kind=rayleigh", "damping.stiffness=1 ms")[1]
+    assert isinstance(found, Omitted)
+    assert "damping" in found.reason
 
 
 def test_gravity_and_further_loads_are_planned_likewise():
@@ -618,10 +739,11 @@ def test_the_largest_force_is_checked_by_spacing_and_steps(small_scene, small_re
     runs = {"tissue": moved(springs, 1.0)}
     both = ("history", "peak-force")
     at_tool, force = checked(
-        small_scene, small_results, runs, error=0.25, quantities=both, at=("tool",)
+        small_scene, small_results, runs, error=0.15, quantities=both, at=("tool",)
     )
-    assert (at_tool.value, at_tool.passed) == (pytest.approx(0.22), True)
-    assert (force.value, force.passed) == (pytest.approx(0.31), False)
+    share = ESTIMATE / errors.safety_factor
+    assert (at_tool.value, at_tool.passed) == (pytest.approx(share * 0.2 + 0.02), True)
+    assert (force.value, force.passed) == (pytest.approx(share * 0.3 + 0.01), False)
     (alone,) = checked(small_scene, small_results, runs, error=0.5, quantities=("peak-force",))
     assert alone.passed
     lost = {"tissue": moved(springs, 1.0, "diverged")}
@@ -656,6 +778,17 @@ def test_foretold_errors_held_at_places_on_the_liver(told, found):
     assert len(ratios) >= 15
     assert (ratios <= 2.0).mean() >= 0.95
     assert np.median(ratios) > 0.1  # or it foretells nothing
+
+
+def test_foretold_errors_of_graded_lattices_held_against_finer_cells():
+    """Those of cells of 5 mm are not in the differences from a lattice of 5 mm."""
+    rows = graded_rest.kept()
+    ratios = np.array([one.of_2_5_mm / one.foretold for one in rows])
+    assert len(rows) >= 12
+    assert (ratios <= 2.0).mean() >= 0.95
+    assert np.median(ratios) > 0.3
+    same = np.array([one.of_5_mm / one.foretold for one in rows])
+    assert np.median(same) < 0.6 * np.median(ratios)
 
 
 def test_foretold_errors_of_meshes_held_at_places_on_the_liver():

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 
 from docs.figures.corrected import corrected, under_gravity
 from docs.figures.fuzzy import liver_run, virtual_patients
-from docs.figures.graded import graded
+from docs.figures.graded import graded, graded_rest
 from docs.figures.lattice import field_error, kernels, large_strain, peers, real_time
 from docs.figures.planned import planned, planned_tools
 from docs.figures.reference import certified, error_bar, error_bar_livers, verification
@@ -27,7 +27,7 @@ GROUPS: tuple[Callable[[], Iterator[tuple[str, str]]], ...] = (
     *(liver_run, virtual_patients),
     *(field_error, real_time, kernels, peers, large_strain),
     *(verification, error_bar, error_bar_livers, certified),
-    *(tradeoff, corrected, under_gravity, travelling, graded),
+    *(tradeoff, corrected, under_gravity, travelling, graded, graded_rest),
     *(planned, planned_tools),
     *(validation, stability, ranking, organ, run_stages),
 )

@@ -6,7 +6,7 @@ from statistics import median
 from docs.figures.formats import millimetres, percent, span, table
 from docs.figures.gains import TOLERANCE, Prices, gains, prices
 from docs.figures.places import SMALL_OR_LARGE, STRAINS, by_strain, place
-from docs.figures.tables import Line, column, measured
+from docs.figures.tables import Line, column, measured, ratios
 
 PLACES_HEAD = (
     *("largest strain", "places", "region for 2 %", "lattice of 10 mm", "8 mm"),
@@ -18,7 +18,7 @@ PLACES_COLUMNS = (
 )
 CELLS_HEAD = (
     *("largest strain", "radius of the tool", "finest cells", "as far as", "nodes", "error"),
-    *("predicted", "gain"),
+    *("predicted", "gain", "load"),
 )
 RATES_HEAD = (
     *("finest cells to", "steps of 5, 10 and 20 mm cells", "longest step", "gain"),
@@ -63,7 +63,22 @@ def _cells(line: Line) -> list[str]:
     """A grading at a place: lengths in mm."""
     lengths = [f"{1e3 * float(line[key]):.3g} mm" for key in ("radius_m", "finest_m", "reach_m")]
     errors = [percent(line[key]) for key in ("error", "foretold")]
-    return [percent(line["strain"]), *lengths, line["nodes"], *errors, f"{float(line['gain']):.0f}"]
+    load = "-" if line["load"] == "nan" else f"{float(line['load']):.0f}"
+    gain = f"{float(line['gain']):.0f}"
+    return [percent(line["strain"]), *lengths, line["nodes"], *errors, gain, load]
+
+
+def graded_rest() -> Iterator[tuple[str, str]]:
+    """Predictions of graded corrected lattices, held against cells of 5 and of 2.5 mm."""
+    lines = measured("graded_rest")
+    yield "graded-rest-count", str(len(set(map(place, lines))))
+    yield "graded-rest-rows", str(len(lines))
+    for name in ("of_5_mm", "of_2_5_mm"):
+        found = ratios(lines, name, over="foretold")
+        yield f"graded-rest-{name.replace('_', '-')}", f"{median(found):.2g}"
+        yield f"graded-rest-{name.replace('_', '-')}-largest", f"{max(found):.2g}"
+    within = sum(one <= 2.0 for one in ratios(lines, "of_2_5_mm", over="foretold"))
+    yield "graded-rest-within", str(within)
 
 
 def _rates(line: Line) -> list[str]:

@@ -77,6 +77,17 @@ class Candidate:
         return self.setup + self.wall_per_s * self.scene.time.duration
 
 
+@dataclass(frozen=True)
+class Omitted:
+    """What cannot model a scene and is no candidate, by its `name`, and the `reason`."""
+
+    name: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.reason}"
+
+
 Kind = Callable[[Scene, Look, Foresight], Iterator[Candidate]]
 
 
@@ -164,7 +175,7 @@ def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:
         step_fraction=FRACTION,
     )
     return Candidate(
-        name=f"lattice of {1e3 * spacing:.3g} mm",
+        name=lattice_name(spacing),
         scene=replace(scene, models=("fem", "tissue"), lattice=chosen),
         prediction=Prediction(()),
         step=FRACTION * seen.critical / finer,
@@ -172,6 +183,11 @@ def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:
         setup=REFERENCES * on_elements(scene, look, 1.0).setup,
         memory=seen.nbytes * finer**3,
     )
+
+
+def lattice_name(spacing: float) -> str:
+    """Of a uniform lattice of a spacing [m]."""
+    return f"lattice of {1e3 * spacing:.3g} mm"
 
 
 def _nearest(look: Look, spacing: float) -> LatticeLook:

@@ -17,14 +17,13 @@ from fem_reference.memory import needed, unknowns
 from study.models.hyperelastic import ELEMENT, FEWEST, HyperelasticElements, PreparedHyperelastic
 from study.models.table import kind, model
 from study.organ.geometry import Level
-from study.plan.candidates import GROWTH, Candidate
+from study.plan.candidates import GROWTH, Candidate, Omitted
 from study.plan.prediction import MESH, STEPS, Part, Prediction
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.problem.unfinished import UnfinishedError
 from study.scene import Scene
 
-NAME = "hyperelastic"
+NAME, ELEMENTS = "hyperelastic", "neo-Hookean finite elements"
 LEVELS = (-4, -2)
 """Meshes that are solved. A run solves the latter and one of level 0."""
 LONGER = 2
@@ -44,16 +43,18 @@ class _Motion:
     wall: float
 
 
-def elements(scene: Scene, problem: Problem, difference: Difference) -> Candidate | None:
+def elements(scene: Scene, problem: Problem, difference: Difference) -> Candidate | Omitted:
     """Hyperelastic elements with predicted error and cost.
 
-    None where they are not applicable, or a motion on a coarse mesh does not finish. `difference`:
-    relative difference of a motion from a finer one.
+    Omitted where they are not applicable, or a motion on a coarse mesh does not finish.
+    `difference`: relative difference of a motion from a finer one.
     """
     brief = _thinned(problem)
-    able = kind(NAME).supported_features.issuperset(scene.features)
-    if not able or len(brief.observation.times) < FEWEST:
-        return None
+    beyond = set(scene.features) - kind(NAME).supported_features
+    if beyond:
+        return Omitted(ELEMENTS, f"they do not support {', '.join(sorted(beyond))}")
+    if len(brief.observation.times) < FEWEST:
+        return Omitted(ELEMENTS, f"time.samples: their steps need {LONGER * FEWEST - 1} or more")
     elements = model(scene, NAME)
     assert isinstance(elements, HyperelasticElements)  # noqa: S101 - they are by their kind
     whole = elements.prepare(problem)
@@ -63,10 +64,10 @@ def elements(scene: Scene, problem: Problem, difference: Difference) -> Candidat
             _moved(elements.varied(level=level).prepare(brief), times * whole.time_step)
             for level, times in ((LEVELS[0], 1), (LEVELS[0], LONGER), (LEVELS[1], LONGER))
         ]
-    except (ValueError, UnfinishedError):  # of damping, a mesh or gravity that they cannot follow
-        return None
+    except ValueError as error:  # of damping, a mesh or gravity that they cannot follow
+        return Omitted(ELEMENTS, str(error))
     if any(one.trajectory.status != "finished" for one in motions):
-        return None
+        return Omitted(ELEMENTS, "a motion on a coarse mesh does not finish")
     own, coarse, fine = motions
     parts = (
         Part(MESH, _by_mesh(coarse, fine, whole.level(), difference)),

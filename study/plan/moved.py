@@ -1,11 +1,12 @@
 """The plan of a scene with moved tools, gravity, weights or several loads: by three quick motions.
 
 The discretisation error of a lattice is estimated from motions on three coarse ones, at the order
-and with the safety factor of a run's own estimate. Errors of contact vary irregularly with the
-position of the cells, so that two lattices may agree by chance, and the largest difference of any
-two is taken. The error that springs have at any spacing is not estimated. Where corrected lattices
-support the scene, as under tools that travel, their error is estimated from the nonlinear parts of
-two of these motions, and from finite elements on two meshes at rest.
+of a run's own estimate. Errors of contact vary irregularly with the position of the cells, so that
+two lattices may agree by chance, and the largest difference of any two is taken. That by itself is
+the error in the median; its factor covers the scatter. The error that springs have at any spacing
+is not estimated. Where corrected lattices support the scene, as under tools that travel, their
+error is estimated from the nonlinear parts of two of these motions, and from finite elements on two
+meshes at rest.
 """
 
 from __future__ import annotations
@@ -23,16 +24,13 @@ from numpy.typing import NDArray
 from fem_reference.error_estimate import ASSUMED_ORDER
 from fem_reference.observation import at_points, evaluation
 from fem_reference.solvers import solver
-from msm.assembly import arrays
-from msm.model import Counts, Run
 from study.models.finite_elements import PreparedElements
-from study.models.lattice import LatticeModel
 from study.models.remainder import plus
-from study.models.spacing_error import COARSER, INDEX, ORDER, force_differences
-from study.models.table import kind, model
-from study.models.tissue import lacks_poisson_ratio
-from study.plan.candidates import SIZES, SPACINGS, Candidate, on_elements
+from study.models.spacing_error import COARSER, ESTIMATE, ORDER
+from study.models.table import kind
+from study.plan.candidates import SIZES, SPACINGS, Candidate, Omitted, lattice_name, on_elements
 from study.plan.look import ElementsLook, Look, Rest, meshes
+from study.plan.motions import Motion, Motions, beyond_linear, difference, motions, settings
 from study.plan.prediction import (
     CAUTION,
     MESH,
@@ -47,8 +45,8 @@ from study.plan.prediction import (
 )
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
-from study.scene import Lattice, Require, Scene
-from study.similarity.fields import norm, relative_l2, relative_l2_of_curves
+from study.scene import Scene
+from study.similarity.fields import norm, relative_l2_of_curves
 
 Floats = NDArray[np.float64]
 
@@ -64,32 +62,29 @@ BETWEEN = 1.25
 
 Two lattices may agree by chance, and the prediction would fall short more often.
 """
-PEAK_FORCE, HISTORY = "peak-force", "history"
 
 
 @dataclass(frozen=True)
 class MovedLook:
-    """Motions of lattices of `spacing` [m], and of COARSER and BETWEEN times it.
+    """Motions of lattices of once, BETWEEN and COARSER times LOOK of the scene's spacing.
 
-    `error`: estimated relative error of the required quantities on the finest. Of the finest too:
-    number of `springs`, `critical` step [s], wall time [s] of a step and of its set-up, bytes of
-    its arrays, largest strain of a spring. `beyond`: largest difference of the nonlinear parts on
+    `error`: estimated relative error of the required quantities on the finest of those that
+    finished; infinite for fewer than two. `beyond`: largest difference of the nonlinear parts on
     the coarsest and the finest, relative to the whole motion of the latter. `elements`: coarse
     finite elements at rest, and `mesh` their estimated discretisation error. `beyond` and
     `elements` are None where a corrected lattice does not support the scene.
     """
 
-    spacing: float
-    error: float
-    springs: int
-    critical: float
-    step_wall: float
-    setup: float
-    nbytes: int
-    strain: float
+    motions: Motions
+    error: float = math.inf
     beyond: float | None = None
     elements: Look | None = None
     mesh: float = math.inf
+
+    @property
+    def finest(self) -> Motion:
+        """Of those that finished. IndexError for none."""
+        return self.motions.finished[-1]
 
 
 @dataclass(frozen=True)
@@ -105,37 +100,43 @@ class AtRest:
 
 
 def look(scene: Scene, problem: Problem, measure: Measure) -> MovedLook:
-    """Motions of three lattices. ValueError where one of them does not finish."""
+    """Motions of three lattices, and errors as far as two of them finish."""
     spacings = [times * LOOK * scene.lattice.spacing for times in (COARSER, BETWEEN, 1.0)]
-    moved = [_run(scene, problem, one) for one in spacings]
-    runs = [run for run, _ in moved]
+    found = motions(scene, problem, spacings)
+    if len(found.finished) < 2:
+        return MovedLook(found)
     assert scene.require is not None  # noqa: S101 - as something is planned for
     apart = partial(difference, problem, scene.require, measure)
-    motions = [run.trajectory for run in runs]
-    seen = replace(moved[-1][1], error=error_of_finest(motions, apart))
+    curves = [one.run.trajectory for one in found.finished]
+    ratio = found.finished[0].spacing / found.finished[-1].spacing
+    seen = MovedLook(found, error_of_finest(curves, apart, ratio))
     if not _is_correctable(scene):
         return seen
-    before, last = (_beyond_linear(scene, problem, spacings[n], runs[n]) for n in (0, -1))
+    before, last = (beyond_linear(scene, problem, found.finished[n]) for n in (0, -1))
     elements = [_at_rest(*one) for one in meshes(scene, problem)]
+    strain = seen.finest.run.largest_strain
     return replace(
         seen,
-        beyond=_by_motion(measure, plus(before, last, -1.0), runs[-1].trajectory),
-        elements=Look(problem, (), tuple(one.look for one in elements), seen.strain, 0.0),
+        beyond=_by_motion(measure, plus(before, last, -1.0), curves[-1]),
+        elements=Look(problem, (), tuple(one.look for one in elements), strain, 0.0),
         mesh=_by_mesh(measure, elements),
     )
 
 
 def error_of_finest(
-    motions: Sequence[Trajectory], apart: Callable[[Trajectory, Trajectory], float]
+    motions: Sequence[Trajectory],
+    apart: Callable[[Trajectory, Trajectory], float],
+    ratio: float = COARSER,
 ) -> float:
     """Relative error of the last of several lattices of falling spacing.
 
-    A grid convergence index of the largest difference, at order one as if the lattices were COARSER
-    apart, and so never less than a run's own estimate. The order that three lattices show is not
+    By Richardson extrapolation at order one of the largest difference, as if it were that of the
+    first and the last, whose spacings have this `ratio`. The order that three lattices show is not
     used: under tools of the size of a few cells they are not in the asymptotic range. `apart`:
     relative difference of a motion from one on a finer lattice.
     """
-    return float(INDEX * max(apart(one, finer) for one, finer in combinations(motions, 2)))
+    largest = max(apart(one, finer) for one, finer in combinations(motions, 2))
+    return float(ESTIMATE * largest / (ratio**ORDER - 1.0))
 
 
 def _is_correctable(scene: Scene) -> bool:
@@ -143,66 +144,6 @@ def _is_correctable(scene: Scene) -> bool:
     able = kind("corrected").supported_features
     nonlinear = scene.lattice.geometry == "nonlinear" and scene.lattice.integrator != "xpbd"
     return nonlinear and able.issuperset(scene.features)
-
-
-def _run(scene: Scene, problem: Problem, spacing: float) -> tuple[Run, MovedLook]:
-    """A motion, and its size and cost."""
-    started = time.perf_counter()
-    prepared = _lattice(scene, _settings(scene, spacing)).prepare(problem)
-    run, springs = prepared.moved(), len(prepared.assembly.springs.weight)
-    setup = time.perf_counter() - started - run.wall
-    if run.trajectory.status != "finished" or run.inverted_cells:
-        raise ValueError(
-            f"require: the motion of a lattice of {1e3 * spacing:.3g} mm, by which errors are "
-            "predicted, is lost; reduce tool.displacement or lattice.step_fraction"
-        )
-    net = arrays(prepared.assembly, prepared.springs.material)
-    nbytes = sum(part.nbytes for part in net if isinstance(part, np.ndarray))
-    step_wall = run.wall / run.steps
-    found = (springs, run.smallest_step, step_wall, setup, nbytes, run.largest_strain)
-    return run, MovedLook(spacing, 0.0, *found)
-
-
-def _lattice(scene: Scene, settings: Lattice) -> LatticeModel:
-    """The lattice of the tissue's modulus, with these settings."""
-    tissue = model(scene, "tissue")
-    assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
-    return replace(tissue, scene=replace(tissue.scene, lattice=settings))
-
-
-def _beyond_linear(scene: Scene, problem: Problem, spacing: float, run: Run) -> Trajectory:
-    """The nonlinear part of a lattice's motion, by the same steps."""
-    settings = replace(_settings(scene, spacing), geometry="linear")
-    linear = _lattice(scene, settings).prepare(problem).moved(Counts(run.substeps))
-    return plus(run.trajectory, linear.trajectory, -1.0)
-
-
-def _settings(scene: Scene, spacing: float) -> Lattice:
-    """The scene's table of a lattice of a spacing [m], with steps that follow the limit."""
-    return replace(
-        scene.lattice,
-        spacing=spacing,
-        springs="lattice",
-        volume_term=lacks_poisson_ratio(scene),
-        time_step=None,
-        step_rate=None,
-    )
-
-
-def difference(
-    problem: Problem, required: Require, measure: Measure, coarse: Trajectory, fine: Trajectory
-) -> float:
-    """Largest relative difference of two motions in any of the required quantities."""
-    found = list[float]()
-    if HISTORY in required.quantities:
-        curves = relative_l2_of_curves(coarse.displacement - fine.displacement, fine.displacement)
-        found += curves[list(measure.probes)].tolist()
-    if measure.volumes is not None:
-        found.append(relative_l2(coarse.volume_field[0], fine.volume_field[0], measure.volumes))
-    if PEAK_FORCE in required.quantities:
-        # Over time too, for two lattices may meet in a single number by chance.
-        found += force_differences(problem, coarse.tool_force, fine.tool_force).ravel().tolist()
-    return max(found)
 
 
 def _by_motion(measure: Measure, apart: Trajectory, whole: Trajectory) -> float:
@@ -254,11 +195,14 @@ def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
         return
     last, base = seen.elements.elements[-1].size, seen.elements.problem.geometry.level(0)
     assert base is not None  # noqa: S101 - the organ was built of it
-    gain = COARSER**NONLINEAR_ORDER - 1.0
+    first, finest = seen.motions.finished[0].spacing, seen.finest.spacing
+    gain = (first / finest) ** NONLINEAR_ORDER - 1.0
     loads = 1 + len(seen.elements.problem.loads)
     for coarse in lattices(scene, seen):
+        if isinstance(coarse, Omitted):
+            continue
         spacing = coarse.scene.lattice.spacing
-        left = CAUTION * seen.beyond / gain * (spacing / seen.spacing) ** NONLINEAR_ORDER
+        left = CAUTION * seen.beyond / gain * (spacing / finest) ** NONLINEAR_ORDER
         for times in SIZES:
             fine = on_elements(scene, seen.elements, times)
             mesh = seen.mesh * (times * base.size / last) ** ASSUMED_ORDER
@@ -277,20 +221,41 @@ def corrected(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
             )
 
 
-def lattices(scene: Scene, seen: MovedLook) -> Iterator[Candidate]:
-    """Lattices of the tissue's modulus by their spacing, with predicted errors and costs."""
+def lattices(scene: Scene, seen: MovedLook) -> Iterator[Candidate | Omitted]:
+    """Lattices of the tissue's modulus by their spacing, with predicted errors and costs.
+
+    Where the motion of the nearest spacing is lost, that of a lattice is expected to be.
+    """
     for times in SPACINGS:
         spacing = times * scene.lattice.spacing
-        finer = seen.spacing / spacing
-        error = seen.error / finer**ORDER
-        chosen = _settings(scene, spacing)
-        yield Candidate(
-            name=f"lattice of {1e3 * spacing:.3g} mm",
-            scene=replace(scene, models=("tissue",), lattice=chosen),
-            prediction=Prediction((Part(SPACING, error),)),
-            step=seen.critical / finer,
-            step_wall=seen.step_wall * finer**3,
-            setup=seen.setup * finer**3,
-            memory=seen.nbytes * finer**3,
-            leaves_out=("the error of springs that does not decrease with the spacing",),
-        )
+        nearest = seen.motions.stands_for(spacing)
+        if nearest in seen.motions.lost:
+            yield _lost(spacing, nearest, seen.motions.lost[nearest])
+        elif math.isinf(seen.error):
+            why = "its error is unknown, since no lattice of another spacing finishes its motion"
+            yield Omitted(lattice_name(spacing), why)
+        else:
+            yield _lattice(scene, seen, spacing)
+
+
+def _lost(spacing: float, nearest: float, lost: Omitted) -> Omitted:
+    """A lattice of a spacing [m] whose motion is lost, or is expected to be as the `nearest`."""
+    if math.isclose(spacing, nearest):
+        return lost
+    return Omitted(lattice_name(spacing), f"not tried, as a {lost.name} is lost")
+
+
+def _lattice(scene: Scene, seen: MovedLook, spacing: float) -> Candidate:
+    """A lattice of a spacing [m], by the finest whose motion is known."""
+    known = seen.finest
+    finer = known.spacing / spacing
+    return Candidate(
+        name=lattice_name(spacing),
+        scene=replace(scene, models=("tissue",), lattice=settings(scene, spacing)),
+        prediction=Prediction((Part(SPACING, seen.error / finer**ORDER),)),
+        step=known.run.smallest_step / finer,
+        step_wall=known.step_wall * finer**3,
+        setup=known.setup * finer**3,
+        memory=known.nbytes * finer**3,
+        leaves_out=("the error of springs that does not decrease with the spacing",),
+    )

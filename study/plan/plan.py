@@ -14,10 +14,11 @@ from functools import partial
 from msm.timestep import whole_steps
 from study.models.table import named
 from study.plan import moved
-from study.plan.candidates import Candidate, candidates, resting
+from study.plan.candidates import Candidate, Omitted, candidates, lattice_name, resting
 from study.plan.elements import elements
 from study.plan.look import Look, look
-from study.plan.moved import HISTORY, PEAK_FORCE, MovedLook
+from study.plan.motions import HISTORY, PEAK_FORCE, difference
+from study.plan.moved import MovedLook
 from study.plan.prediction import Foresight, Measure
 from study.problem.problem import Problem
 from study.scene import Require, Scene
@@ -38,6 +39,10 @@ NOTHING_REQUIRED = (
     'the scene requires nothing; give it a table require, or for example --set require.error="5 %"'
 )
 """Why a scene is run as it stands, and how it would be planned."""
+NOTHING_OFFERED = (
+    "no model follows the scene to its end; reduce its loads, displacements or "
+    "lattice.step_fraction, or remove what stops one of them"
+)
 
 
 @dataclass(frozen=True)
@@ -108,13 +113,18 @@ def _by_motions(scene: Scene, problem: Problem, required: Require) -> Plan:
     """For moved tools or more than one load: lattices, corrected or else finite elements."""
     points = measure(required, problem)
     seen = moved.look(scene, problem, points)
-    offered = [*moved.lattices(scene, seen), *moved.corrected(scene, seen)]
-    if problem.rigid_tools and _needs_elements(offered, required):
-        difference = partial(moved.difference, problem, required, points)
-        found = elements(scene, problem, difference)
-        offered += [] if found is None else [found]
-    chosen = choose(offered, required)
-    return Plan(chosen.scene, tuple(_moved_decisions(scene, seen, chosen, required)), chosen)
+    found: list[Candidate | Omitted] = [*moved.lattices(scene, seen)]
+    found += moved.corrected(scene, seen)
+    if problem.rigid_tools and _needs_elements(_offered(found), required):
+        found.append(elements(scene, problem, partial(difference, problem, required, points)))
+    omitted = [one for one in found if isinstance(one, Omitted)]
+    chosen = choose(_offered(found), required, omitted=omitted)
+    decisions = [*_moved_decisions(scene, seen, chosen, required), *_omitted(omitted)]
+    return Plan(chosen.scene, tuple(decisions), chosen)
+
+
+def _offered(found: Iterable[Candidate | Omitted]) -> list[Candidate]:
+    return [one for one in found if isinstance(one, Candidate)]
 
 
 def _needs_elements(offered: Sequence[Candidate], required: Require) -> bool:
@@ -136,15 +146,24 @@ def measure(required: Require, problem: Problem) -> Measure:
     return Measure(tuple(problem.probes.index(name) for name in names), volumes)
 
 
-def choose(offered: Sequence[Candidate], required: Require, alone: Alone = dict) -> Candidate:
+def choose(
+    offered: Sequence[Candidate],
+    required: Require,
+    alone: Alone = dict,
+    omitted: Sequence[Omitted] = (),
+) -> Candidate:
     """The cheapest that meets all requirements. ValueError, with the nearest, where none does.
 
     `alone`: makes the same candidates with their errors at single control points, by name.
+    `omitted`: what is not among them, which the error names.
     """
     offered = [_at_rate(one, required.rate) for one in offered]
     able = [one for one in offered if _keeps(one, required)]
     if not able:
-        raise ValueError(_refusal(offered, required, alone))
+        left = "".join(f"; {one}" for one in omitted)
+        if not offered:
+            raise ValueError(f"require: {NOTHING_OFFERED}{left}")
+        raise ValueError(_refusal(offered, required, alone) + left)
     if required.error is None:
         return min(able, key=lambda one: one.prediction.error)
     if required.rate is None:
@@ -241,19 +260,27 @@ def _decisions(
 def _moved_decisions(
     scene: Scene, seen: MovedLook, chosen: Candidate, required: Require
 ) -> Iterator[Decision]:
-    finer = f"{1e3 * seen.spacing:.3g}"
     yield Decision(*_time(scene, required))
-    yield Decision(
-        "displacements",
-        _geometry(chosen),
-        f"springs strained by up to {_percent(seen.strain)} on a lattice of {finer} mm",
-    )
+    yield Decision("displacements", _geometry(chosen), _springs_strain(seen))
     yield Decision("model", chosen.name, _why(chosen, required))
     yield Decision("step", f"{1e3 * chosen.step:.3g} ms", cost=_step(chosen, required))
     by = ESTIMATED_BY[chosen.scene.models[0]]
     yield Decision("reference", "none", f"a run estimates its own error by {by}")
     yield Decision("output", *_output(required))
     yield Decision("left out", *_left_out(scene, chosen))
+
+
+def _springs_strain(seen: MovedLook) -> str:
+    if not seen.motions.finished:
+        return "more than a lattice bears"
+    strain, at = seen.finest.run.largest_strain, lattice_name(seen.finest.spacing)
+    return f"springs strained by up to {_percent(strain)} on a {at}"
+
+
+def _omitted(found: Iterable[Omitted]) -> Iterator[Decision]:
+    """What was not offered, each with its reason."""
+    for one in found:
+        yield Decision("not offered", one.name, one.reason)
 
 
 def _time(scene: Scene, required: Require) -> tuple[str, str, str]:

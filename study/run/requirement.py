@@ -2,9 +2,10 @@
 
 These are estimates with their factors of safety, not bounds. A lattice under a single load of given
 force has no error estimate of its own; it is checked by its difference from finite elements that
-have one. Under moved tools or several loads it has an estimate of its discretisation error; the
-error of the spring model itself is then not included. Hyperelastic elements are checked by the
-errors of their mesh and steps, linear ones not at all.
+have one. Under moved tools or several loads it has an estimate of its discretisation error, taken
+with the factor of a plan and not with that of the stated error bar, which is to cover nearly all
+errors; the error of the spring model itself is then not included. Hyperelastic elements are checked
+by the errors of their mesh and steps, linear ones not at all.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from study.models.model import ModelRun
-from study.results.records import Check, CurveErrors, ModelRecord
+from study.models.spacing_error import ESTIMATE
+from study.results.records import Check, CurveErrors, ModelRecord, SpacingErrors
 from study.scene import Require, Scene
 from study.similarity.fields import relative_l2_of_curves
 
@@ -63,14 +65,19 @@ def _force_check(name: str, run: ModelRun, required: Require) -> Iterator[Check]
 def _force_errors(record: ModelRecord) -> list[float]:
     """Sum of the estimated errors of each tool's force; none where one of them is unknown."""
     if record.spacing_errors is not None and record.tool_force_errors:
-        by_steps = record.tool_force_errors
-        return [e + by_steps[tool] for tool, e in record.spacing_errors.peak_force.items()]
+        by_steps, share = record.tool_force_errors, _share_of_bar(record.spacing_errors)
+        return [share * e + by_steps[tool] for tool, e in record.spacing_errors.peak_force.items()]
     elements = record.elements
     if elements is None or elements.law is None or elements.contact is None:
         return []
     parts = [(one.by_mesh, one.by_steps) for one in elements.contact.forces.values()]
     known = [a + b for a, b in parts if a is not None and b is not None]
     return known if len(known) == len(parts) else []
+
+
+def _share_of_bar(stated: SpacingErrors) -> float:
+    """The estimated error over a stated error bar, which has a larger factor."""
+    return ESTIMATE / stated.safety_factor
 
 
 def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) -> dict[str, float]:
@@ -84,7 +91,10 @@ def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) 
         return _stated(record, record.correction.remainder_errors, probes)
     if record.spacing_errors is not None:
         by_spacing, by_steps = record.spacing_errors.displacement, record.time_step_errors
-        return {p: by_spacing[p] + by_steps[p].displacement for p in probes if p in by_steps}
+        share = _share_of_bar(record.spacing_errors)
+        return {
+            p: share * by_spacing[p] + by_steps[p].displacement for p in probes if p in by_steps
+        }
     if record.lattice is not None and reference is not None and reference is not run:
         own = _stated(reference.record, None, probes)
         curves, truth = run.trajectory.displacement, reference.trajectory.displacement

@@ -5,10 +5,15 @@
 writes reports/data/graded_cells.csv, a row for each grading that a plan offers at each place of
 `graded_places.csv` with a strain above 5 %, the largest first. Places that are in the table are
 kept. Errors are those of the nonlinear part, as there.
+
+
+Costs are processor times of all lattices in turns, each step taken as the least of TURNS repeats,
+since other processes disturb some of them. The table has the load of the machine.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -54,7 +59,9 @@ class Row(NamedTuple):
 
     `finest_m`: edge of the finest cells, which reach `reach_m` from the tool; `levels`: number of
     sizes; `nodes`: those that do not hang. `error` of the displacement at the tool, `foretold` by a
-    plan; `gain`: processor time of the uniform lattice of FINEST over that of the corrected one.
+    plan; `gain`: processor time of the uniform lattice of FINEST over that of the corrected one,
+    at a `load` of so many processes that ran or waited, averaged over the last minute;
+    nan where it was not recorded, which was on a machine without other work.
     """
 
     at_x: float
@@ -68,6 +75,7 @@ class Row(NamedTuple):
     error: float
     foretold: float
     gain: float
+    load: float
 
 
 def rows(one: dict[str, float]) -> Iterator[Row]:
@@ -78,7 +86,8 @@ def rows(one: dict[str, float]) -> Iterator[Row]:
     foresight = Foresight(seen, measure(WANTED, problem))
     truth, added = (at_tool(problem, motion) for motion in uniform(given, problem))
     offered = seen.graded[:-1]
-    for grading, gain in zip(offered, gains(given, problem, offered), strict=True):
+    costs, load = gains(given, problem, offered), os.getloadavg()[0]
+    for grading, gain in zip(offered, costs, strict=True):
         region = lattice(given, "region", **settings(grading)).prepare(problem)
         run = PreparedRemainder(region, VECTORS).run(requested_step(region.model.lattice))
         error = size(at_tool(problem, run.trajectory.displacement) - added, truth)
@@ -91,6 +100,7 @@ def rows(one: dict[str, float]) -> Iterator[Row]:
             error,
             foresight.graded_remainder(grading),
             gain,
+            load,
         )
 
 

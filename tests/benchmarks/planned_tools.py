@@ -5,10 +5,10 @@
 writes reports/data/planned_tools.csv, a row for each scene, quantity and spacing. Scenes that are
 in the table are kept: started again, it goes on where it was stopped.
 
-Foretold are relative errors by the spacing, as `study.plan.moved` tells them from three lattices
-of 2, 1.25 and 1 times the spacing of a scene, and as two of 2.5 and 1.25 times would at the same
-order and without a factor. Found is the difference from a lattice of the finest spacing here, taken
-for that share of the error which it does not have itself at order one.
+Foretold are relative errors by the spacing, as `study.plan.moved` tells them from three lattices of
+2, 1.25 and 1 times the spacing of a scene, and as two of 2.5 and 1.25 times would at the same
+order. The table has both without a factor. Found is the difference from a lattice of the finest
+spacing here, taken for that share of the error which it does not have itself at order one.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
 
-from study.models.spacing_error import COARSER, ORDER
-from study.plan import moved
-from study.plan.moved import BETWEEN, HISTORY, PEAK_FORCE, error_of_finest
+import numpy as np
+
+from study.models.spacing_error import COARSER, ESTIMATE, ORDER
+from study.plan.motions import HISTORY, PEAK_FORCE, Motion, difference, motion
+from study.plan.moved import BETWEEN, error_of_finest
 from study.plan.prediction import Measure
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
@@ -88,10 +90,32 @@ SCENES: dict[str, tuple[str, ...]] = {
     ),
     "liver, punch of 12 mm": ("liver", tool(12, 8, FRONT, "punch")),
 }
+SEED, DRAWN = 15, 7
+"""Of random scenes, by which nothing was chosen: they only check."""
+
+
+def drawn() -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Random spheres on the block and the liver in turn, half of them with friction."""
+    rng = np.random.default_rng(SEED)
+    for k in range(DRAWN):
+        base, side = (("block", "superior"), ("liver", "anterior"))[k % 2]
+        radius = int(rng.integers(8, 16))
+        depth = round(radius * rng.uniform(0.4, 0.8))
+        at = [round(float(x), 2) for x in rng.uniform((0.3, 0.4), (0.7, 0.6))]
+        place = f'{{side="{side}", at={at}}}'
+        given = tool(radius, depth, place, more=ROUGH if k % 4 > 1 else "")
+        yield f"{base}, drawn {k + 1}", (base, given)
+
+
+CHECKS = dict(drawn())
 SPACINGS = (0.025, 0.02, 0.015, 0.0125, 0.01, 0.008, 0.00625, 0.005)
 FINEST = {"block": 0.004, "liver": 0.005}
+GROUPS = ("chosen by", "checked by", "random")
+"""Of scenes: those that the factor was chosen by, the others, and random ones."""
+FINEST_OF_CHECKS = 0.005
 OF_SCENES = (0.01, 0.005)
-"""Spacings of scenes, by which their plans look and of which their candidates are."""
+"""Spacings of scenes, by which their plans look and of which their candidates are; of the random
+ones the first alone."""
 TIMES = (0.5, 2.0)
 """Of candidates: least and largest, times the spacing of the scene."""
 TOLD_FROM = 1.5
@@ -103,25 +127,44 @@ TWO = 1.25
 class Row(NamedTuple):
     """Relative errors of a lattice of a `spacing_m`, in a scene whose own is `of_scene_m`.
 
-    `quantity`: the force, or the history of the control point under the tool or of all of them.
-    `foretold`: by three lattices, `by_two`: by two.
+    `group`: one of GROUPS; `quantity`: the force, or the history of the control point under the
+    tool or of all of them.
+    By Richardson extrapolation from three lattices and from two, both without a factor.
     """
 
     scene: str
+    group: str
     of_scene_m: float
     spacing_m: float
     quantity: str
-    foretold: float
+    by_three: float
     by_two: float
     found: float
+
+    @property
+    def foretold(self) -> float:
+        """What a plan predicts."""
+        return ESTIMATE * self.by_three
+
+
+def group_of(name: str) -> str:
+    """Which of GROUPS a scene is in: of SCENES, a random half is what the factor was chosen by."""
+    if name in CHECKS:
+        return GROUPS[2]
+    order = np.random.default_rng(0).permutation(len(SCENES))
+    return GROUPS[int(list(SCENES).index(name) not in order[: len(SCENES) // 2])]
 
 
 def rows(name: str) -> Iterator[Row]:
     """All of a scene."""
-    base, *overrides = SCENES[name]
+    base, *overrides = (SCENES | CHECKS)[name]
     scene = read_scene(base, (*overrides, *BRIEF))
     problem = problem_of(scene)
-    runs = {h: moved_by(scene, problem, h) for h in (*SPACINGS, FINEST[base])}
+    finest, of_scenes = FINEST[base], OF_SCENES
+    if name in CHECKS:
+        finest, of_scenes = FINEST_OF_CHECKS, OF_SCENES[:1]
+    spacings = [h for h in SPACINGS if h > finest and h >= TIMES[0] * min(of_scenes)]
+    runs = {h: moved_by(scene, problem, h) for h in (*spacings, finest)}
     wanted = {
         "force": (PEAK_FORCE, ()),
         "at the tool": (HISTORY, (problem.tool_probe,)),
@@ -129,23 +172,26 @@ def rows(name: str) -> Iterator[Row]:
     }
     for quantity, (kind, probes) in wanted.items():
         required = Require(quantities=(kind,))
-        apart = partial(moved.difference, problem, required, Measure(probes, None))
-        for of_scene in OF_SCENES:
+        apart = partial(difference, problem, required, Measure(probes, None))
+        for of_scene in of_scenes:
             three = [_near(runs, times * of_scene) for times in (COARSER, BETWEEN, 1.0)]
-            by_three = error_of_finest(three, apart)
+            by_three = error_of_finest(three, apart) / ESTIMATE
             by_two = apart(*(_near(runs, times * TWO * of_scene) for times in (COARSER, 1.0)))
-            for h in SPACINGS:
-                own = FINEST[base] / h
+            for h in spacings:
+                own = finest / h
                 if not TIMES[0] <= h / of_scene <= TIMES[1] or own > 1.0 / TOLD_FROM:
                     continue
-                found = apart(runs[h], runs[FINEST[base]]) / (1.0 - own**ORDER)
+                found = apart(runs[h], runs[finest]) / (1.0 - own**ORDER)
                 told = by_three * h / of_scene, by_two * h / (TWO * of_scene)
-                yield Row(name, of_scene, h, quantity, *told, found)
+                yield Row(name, group_of(name), of_scene, h, quantity, *told, found)
 
 
 def moved_by(scene: Scene, problem: Problem, spacing: float) -> Trajectory:
     """The motion of a lattice. ValueError where it does not reach the end."""
-    return moved._run(scene, problem, spacing)[0].trajectory
+    found = motion(scene, problem, spacing)
+    if isinstance(found, Motion):
+        return found.run.trajectory
+    raise ValueError(f"{found}; make the scene's motion smaller")
 
 
 def _near(runs: Mapping[float, Trajectory], spacing: float) -> Trajectory:
@@ -157,7 +203,7 @@ def _near(runs: Mapping[float, Trajectory], spacing: float) -> Trajectory:
 
 def main() -> None:
     """Write what is missing of the table."""
-    tasks = {name: partial(rows, name) for name in SCENES}
+    tasks = {name: partial(rows, name) for name in (*SCENES, *CHECKS)}
     complete(TABLE, Row, tasks, lambda one: one.scene)
 
 
