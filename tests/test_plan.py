@@ -24,7 +24,7 @@ from study.plan import elements as elements_plan
 from study.plan import motions as motions_plan
 from study.plan import moved as moved_plan
 from study.plan import plan as planning
-from study.plan.candidates import Omitted, candidates
+from study.plan.candidates import Candidate, Omitted, candidates
 from study.plan.look import lattice_at_rest, look, on_lattice
 from study.plan.plan import choose, in_time, lines, measure, plan
 from study.plan.prediction import Foresight, Part, Prediction
