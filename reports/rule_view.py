@@ -228,7 +228,8 @@ def _draw_output(axes: Axes, view: Arrays, kind: str) -> None:
     axes.axvline(answer, color=colour, linewidth=1.6, label=label)
     axes.set(xlim=(view["y"][0], _output_end(view)), ylim=(0.0, 1.05), yticks=[0.0, 0.5, 1.0])
     axes.set_xlabel(f"stiffness [{unit}]", labelpad=1)
-    axes.legend(loc="upper right", handlelength=1.6, borderpad=0.2, labelspacing=0.12)
+    box: Style = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 1.0}
+    axes.legend(loc="upper right", handlelength=1.6, borderpad=0.2, labelspacing=0.12, **box)
 
 
 def _draw_union(axes: Axes, view: Arrays) -> None:
