@@ -16,7 +16,7 @@ from msm.grid import Grids, grids_of
 from msm.integrators import INTEGRATORS
 from msm.lattice import LatticeMesh
 from msm.laws import force_law_of
-from msm.linearised import farthest
+from msm.linearised import farthest, largest_vector_change
 from msm.network import Network
 from msm.stability import DEFAULT, CriticalStepTracker
 from msm.timestep import LOOK
@@ -68,7 +68,13 @@ class LatticeStepper:
         self.contact_state = contact_state(self.contact)
         self.restart()
         self.limit_at_rest = self.tracker.limit(self.u)
+        self._compile()
+
+    def _compile(self) -> None:
+        """Compile the kernels of a motion, so that the time of its steps is theirs alone."""
         self.advance(0, 1.0)
+        self.farthest()
+        largest_vector_change(self.tracker.net, self.u, self.u)
 
     def advance(self, count: int, dt: float) -> None:
         """Take `count` steps of dt [s] without checking the critical step."""

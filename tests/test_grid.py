@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from msm import stability
+from msm import stepper as stepping
 from msm.assembly import Material, arrays, assemble
 from msm.calibration import reference_stiffness
 from msm.damping import NodalDamping
@@ -15,6 +17,7 @@ from msm.laws import Basafa, Hooke, piecewise
 from msm.simd import WIDTHS, widest
 from msm.stability import critical_time_step
 from msm.stepper import LatticeStepper
+from msm.timestep import LOOK
 from msm.volume import volume_term
 from study.scene.file import read_scene
 from study.scene.problem import problem_of
@@ -226,6 +229,26 @@ def test_a_spring_pressed_to_a_point_is_not_a_number(bodies):
         u[j] = u[i] - net.rest[0]
         set_forces(made.law, grids, u)
         assert np.isnan(grids.grids[0].force[:, grids.place[[i, j]]]).any()
+
+
+def test_the_kernels_of_a_motion_are_compiled_before_it(bodies, monkeypatch):
+    """Each is called once, so that no compilation counts as time of the steps."""
+    called = []
+
+    def watched(module, name):
+        kernel = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given: called.append(name) or kernel(*given))
+
+    for module in (stepping, stability):
+        for name in ("farthest", "largest_vector_change", "nodal_bounds"):
+            if hasattr(module, name):
+                watched(module, name)
+    assembly = bodies("block")
+    stepper = LatticeStepper(assembly, material(assembly), np.ones_like)
+    before = set(called)
+    called.clear()
+    stepper.take_steps(3 * LOOK, 0.1 * stepper.limit_at_rest)
+    assert set(called) == before == {"farthest", "largest_vector_change", "nodal_bounds"}
 
 
 def test_after_a_divergence_the_grid_is_as_new(bodies):
