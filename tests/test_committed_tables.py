@@ -174,7 +174,7 @@ def test_fronts_of_the_trade_off_are_those_of_its_errors_and_costs():
         ("pareto_any_load", [line for line in lines if line["any_load"] == "True"]),
     ):
         places = [(float(one["field_error"]), float(one["wall_per_s"])) for one in group]
-        marks = [str(not tradeoff.is_beaten(place, places)) for place in places]
+        marks = [str(not tradeoff.is_dominated(place, places)) for place in places]
         assert marks == [one[column] for one in group]
 
 

@@ -295,7 +295,7 @@ def test_a_row_that_does_not_belong_is_named_by_its_line(name, change, said, sig
         (
             "score_differences.csv",
             lambda lines: altered(lines, 5, 7, "0.5"),
-            "line 6: low and",
+            "line 6: the difference is not between low and high",
         ),
         (
             "score_differences.csv",

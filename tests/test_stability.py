@@ -320,11 +320,15 @@ def test_divergence_is_seen_within_a_sample_of_many_steps(collapse):
 
 
 def test_steps_beyond_a_falling_limit_are_undone():
-    """A law that stiffens 25-fold under a blow: the limit falls faster than it is looked at."""
-    body, material = column((4, 4, 6), gravity=60.0)
+    """A law that stiffens 25-fold under a blow: the limit falls faster than it is looked at.
+
+    No cell is turned inside out, after which the motion would depend on rounding.
+    """
+    body, material = column((4, 4, 6), gravity=50.0)
     material = dataclasses.replace(material, law=STIFFENING, damping=NodalDamping(5.0))
     found = run(body, material, np.ones_like, watch(body, 0.5, 26))
     assert found.trajectory.status == "finished"
+    assert found.inverted_cells == 0
     assert found.repeated_steps > 0
     assert found.smallest_step < 0.5 * found.critical_time_step
     assert found.margin >= 1 / 0.95 - 1e-6

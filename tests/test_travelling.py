@@ -299,7 +299,7 @@ def test_a_plan_foretells_lattices_and_corrected_ones():
     finer = parts[0.01, 0.015][1]
     assert coarser / left == pytest.approx(2.0**1.5)
     assert mesh / finer == pytest.approx(1.0 / 0.75**2)
-    assert seen.spacing == 0.01
+    assert seen.finest.spacing == 0.01
     assert left < seen.error  # which the error of this lattice alone is
     with pytest.raises(ValueError, match=r"require\.error: .* nearest is"):
         plan(replace(wanted, require=replace(wanted.require, error=1e-3)))

@@ -242,7 +242,7 @@ class PreparedLattice:
             else f"at rest {100 * found.apart:.2g} % off the finest cells throughout"
         )
         yield (
-            f"{self.model.name}: cells {cells}, {lattice.hanging} nodes hang; the finest reach "
+            f"{self.model.name}: cells {cells}, {lattice.hanging} hanging nodes; the finest reach "
             f"{1e3 * found.radius:.3g} mm, {apart}"
         )
 
