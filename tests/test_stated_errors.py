@@ -24,7 +24,6 @@ from study.models.errors import (
     time_step_errors,
     tool_force_errors,
 )
-from study.models.finite_elements import _of_subspace
 from study.models.mesh_error import (
     LARGEST_JUMP,
     MeshSolution,
@@ -316,32 +315,3 @@ def test_a_mesh_alone_one_that_locks_and_a_motion_that_ended_early_tell_no_error
     assert mesh_error(POSED, meshes(status="diverged")) is None
     soft = SimpleNamespace(**vars(POSED) | {"tissue": SimpleNamespace(poisson_ratio=0.4)})
     assert mesh_error(soft, meshes("p1")) is not None
-
-
-# --- the subspace where linear elasticity means nothing -------------------------------------------
-
-
-def in_a_subspace(strain, *change):
-    return SimpleNamespace(
-        found=SimpleNamespace(truncation=CurveChange(*change), largest_strain=strain)
-    )
-
-
-def test_a_subspace_that_misses_its_limits_fails_up_to_the_strain_that_inverts_tissue():
-    checks, note = _of_subspace(in_a_subspace(0.99, 0.02, 0.2))
-    assert [one.passed for one in checks] == [False, False]
-    assert not note
-
-
-def test_beyond_that_strain_what_is_missed_is_a_note_with_its_numbers():
-    checks, note = _of_subspace(in_a_subspace(2.29, 0.007, 0.19))
-    assert not checks
-    assert "229 %" in note
-    assert "19 %" in note
-    assert "0.7 %" not in note  # within its limit
-
-
-def test_a_subspace_within_its_limits_is_checked_at_any_strain():
-    checks, note = _of_subspace(in_a_subspace(2.29, 0.001, 0.01))
-    assert [one.passed for one in checks] == [True, True]
-    assert not note

@@ -32,7 +32,7 @@ from study.models.errors import (
 from study.models.grading import GROWTHS, growth_for, is_graded, next_graded, next_graded_by
 from study.models.in_contact import contact_record, force_step_errors, resolving, rest_in_contact
 from study.models.large_strain import compare
-from study.models.linear_limits import is_large, is_meaningless
+from study.models.linear_limits import is_large
 from study.models.mesh_error import (
     MeshSolution,
     is_too_coarse,
@@ -236,9 +236,8 @@ class PreparedElements:
         record = model_record(
             model.name, model.label, self.problem, model.damping, best, steps, elements
         )
-        of_subspace, unchecked = _of_subspace(best)
-        checks = (*self._step_checks(steps), *of_subspace)
-        notes = [self._keep_fields(best, watch), note, unchecked]
+        checks = (*self._step_checks(steps), *_subspace_checks(best))
+        notes = [self._keep_fields(best, watch), note]
         if error is None:
             why = why_unknown(self.problem, best)
             notes.append(f"The reference's discretisation error is not estimated: {why}.")
@@ -513,20 +512,6 @@ def _subspace_checks(solved: MeshSolution) -> Iterator[Check]:
             limit=limit,
             meaning=f"largest relative L2 change of a {kind} curve by the subspace's last quarter",
         )
-
-
-def _of_subspace(solved: MeshSolution) -> tuple[tuple[Check, ...], str]:
-    """Checks of the subspace, or a note instead if one fails where the model means nothing."""
-    checks = tuple(_subspace_checks(solved))
-    missed = [f"{100 * one.value:.2g} %" for one in checks if not one.passed]
-    if not missed or not is_meaningless(solved.found.largest_strain):
-        return checks, ""
-    return (), (
-        f"Linear elements strain by {100 * solved.found.largest_strain:.0f} %, where linear "
-        "elasticity does not describe tissue. Their subspace leaves an error of up to "
-        f"{' and '.join(missed)} in a curve of a control point, which is stated with the curves "
-        "and not held against a limit. Use the model hyperelastic."
-    )
 
 
 def reference_of(scene: Scene) -> FiniteElements:
