@@ -25,7 +25,7 @@ from study.plan.prediction import (
     Part,
     Prediction,
 )
-from study.scene import Scene
+from study.scene import Lattice, Scene
 
 SIZES = (1.0, 0.75, 0.75**2, 0.75**3)
 """Element sizes over the scene's: levels of its organ."""
@@ -161,19 +161,23 @@ def _lattices(scene: Scene, look: Look, foresight: Foresight) -> Iterator[Candid
         yield replace(found, prediction=Prediction(parts))
 
 
-def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:
-    """The lattice of the tissue's modulus at a spacing [m], stepped explicitly, and its cost."""
-    seen = _nearest(look, spacing)
-    finer = seen.spacing / spacing
-    chosen = replace(
+def lattice_settings(scene: Scene, spacing: float) -> Lattice:
+    """The scene's table of a lattice of a spacing [m], with steps that follow the limit."""
+    return replace(
         scene.lattice,
         spacing=spacing,
         springs="lattice",
         volume_term=lacks_poisson_ratio(scene),
         time_step=None,
         step_rate=None,
-        step_fraction=FRACTION,
     )
+
+
+def lattice(scene: Scene, look: Look, spacing: float) -> Candidate:
+    """The lattice of the tissue's modulus at a spacing [m], stepped explicitly, and its cost."""
+    seen = _nearest(look, spacing)
+    finer = seen.spacing / spacing
+    chosen = replace(lattice_settings(scene, spacing), step_fraction=FRACTION)
     return Candidate(
         name=lattice_name(spacing),
         scene=replace(scene, models=("fem", "tissue"), lattice=chosen),

@@ -20,8 +20,7 @@ from study.models.lattice import LatticeModel
 from study.models.remainder import plus
 from study.models.spacing_error import force_differences
 from study.models.table import model
-from study.models.tissue import lacks_poisson_ratio
-from study.plan.candidates import Omitted, lattice_name
+from study.plan.candidates import Omitted, lattice_name, lattice_settings
 from study.plan.prediction import Measure
 from study.problem.problem import Problem
 from study.problem.trajectory import Trajectory
@@ -77,7 +76,7 @@ def motion(scene: Scene, problem: Problem, spacing: float) -> Motion | Omitted:
     """The motion of a lattice of a spacing [m], or why it is lost."""
     name, started = lattice_name(spacing), time.perf_counter()
     try:
-        prepared = _lattice(scene, settings(scene, spacing)).prepare(problem)
+        prepared = _lattice(scene, lattice_settings(scene, spacing)).prepare(problem)
         run = prepared.moved()
     except ValueError as error:  # a tool or support that misses it, or no equilibrium
         return Omitted(name, str(error))
@@ -93,7 +92,7 @@ def motion(scene: Scene, problem: Problem, spacing: float) -> Motion | Omitted:
 
 def beyond_linear(scene: Scene, problem: Problem, given: Motion) -> Trajectory:
     """The nonlinear part of a lattice's motion, by the same steps."""
-    linear = replace(settings(scene, given.spacing), geometry="linear")
+    linear = replace(lattice_settings(scene, given.spacing), geometry="linear")
     run = _lattice(scene, linear).prepare(problem).moved(Counts(given.run.substeps))
     return plus(given.run.trajectory, run.trajectory, -1.0)
 
@@ -103,18 +102,6 @@ def _lattice(scene: Scene, given: Lattice) -> LatticeModel:
     tissue = model(scene, "tissue")
     assert isinstance(tissue, LatticeModel)  # noqa: S101 - it is one by its kind
     return replace(tissue, scene=replace(tissue.scene, lattice=given))
-
-
-def settings(scene: Scene, spacing: float) -> Lattice:
-    """The scene's table of a lattice of a spacing [m], with steps that follow the limit."""
-    return replace(
-        scene.lattice,
-        spacing=spacing,
-        springs="lattice",
-        volume_term=lacks_poisson_ratio(scene),
-        time_step=None,
-        step_rate=None,
-    )
 
 
 def difference(

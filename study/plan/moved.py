@@ -28,9 +28,17 @@ from study.models.finite_elements import PreparedElements
 from study.models.remainder import plus
 from study.models.spacing_error import COARSER, ESTIMATE, ORDER
 from study.models.table import kind
-from study.plan.candidates import SIZES, SPACINGS, Candidate, Omitted, lattice_name, on_elements
+from study.plan.candidates import (
+    SIZES,
+    SPACINGS,
+    Candidate,
+    Omitted,
+    lattice_name,
+    lattice_settings,
+    on_elements,
+)
 from study.plan.look import ElementsLook, Look, Rest, meshes
-from study.plan.motions import Motion, Motions, beyond_linear, difference, motions, settings
+from study.plan.motions import Motion, Motions, beyond_linear, difference, motions
 from study.plan.prediction import (
     CAUTION,
     MESH,
@@ -251,7 +259,7 @@ def _lattice(scene: Scene, seen: MovedLook, spacing: float) -> Candidate:
     finer = known.spacing / spacing
     return Candidate(
         name=lattice_name(spacing),
-        scene=replace(scene, models=("tissue",), lattice=settings(scene, spacing)),
+        scene=replace(scene, models=("tissue",), lattice=lattice_settings(scene, spacing)),
         prediction=Prediction((Part(SPACING, seen.error / finer**ORDER),)),
         step=known.run.smallest_step / finer,
         step_wall=known.step_wall * finer**3,

@@ -65,8 +65,8 @@ def _force_check(name: str, run: ModelRun, required: Require) -> Iterator[Check]
 def _force_errors(record: ModelRecord) -> list[float]:
     """Sum of the estimated errors of each tool's force; none where one of them is unknown."""
     if record.spacing_errors is not None and record.tool_force_errors:
-        by_steps, share = record.tool_force_errors, _share_of_bar(record.spacing_errors)
-        return [share * e + by_steps[tool] for tool, e in record.spacing_errors.peak_force.items()]
+        by_steps, stated = record.tool_force_errors, record.spacing_errors
+        return [_of_force(stated, e) + by_steps[tool] for tool, e in stated.peak_force.items()]
     elements = record.elements
     if elements is None or elements.law is None or elements.contact is None:
         return []
@@ -78,6 +78,17 @@ def _force_errors(record: ModelRecord) -> list[float]:
 def _share_of_bar(stated: SpacingErrors) -> float:
     """The estimated error over a stated error bar, which has a larger factor."""
     return ESTIMATE / stated.safety_factor
+
+
+def _of_force(stated: SpacingErrors, bar: float) -> float:
+    """The estimated relative error of a force with this stated error bar.
+
+    The bar of a force that falls with refinement is 1 - (1 + d)^-3, so its estimate is the same
+    with the smaller exponent; other bars, 3 d, are scaled. Below one a bar may be either, and the
+    former estimate is the larger.
+    """
+    share = _share_of_bar(stated)
+    return 1.0 - float((1.0 - bar) ** share) if bar < 1.0 else share * bar
 
 
 def _errors(run: ModelRun, reference: ModelRun | None, probes: tuple[str, ...]) -> dict[str, float]:
